@@ -1,0 +1,131 @@
+"""What a scene says about the contact with the ground, and the two effects that come of it."""
+
+import math
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt
+
+from dynamics.effects._ground import Ground
+from dynamics.effects._scene import cannot, checked
+from dynamics.vector import Vec3
+from dynamics.vehicles.airframe import Airframe
+
+NotNegative = Annotated[float, Ge(0)]
+Positive = Annotated[float, Gt(0)]
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    friction: Literal["anchor", "smooth"] = "anchor"
+    stiffness: Positive = 1.0e6  # [N/m] of one foot
+    damping: NotNegative = 1.0e3  # [N s/m] of one foot
+    transition_width: Positive = 1.0e-4  # [m] depth over which the normal force sets in
+    friction_static: NotNegative = 0.5
+    friction_dynamic: NotNegative = 0.3
+    tangential_stiffness: Positive = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
+    stick_velocity: Positive = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
+    critical_velocity: Positive = 1.0e-3  # [m/s] slip of the highest friction; friction "smooth"
+    slope: tuple[float, float] = (0.0, 0.0)  # rise of the ground along world x and y, tangent of the angle
+    bump_height: NotNegative = 0.0  # [m]
+    bump_length: Positive = 1.0  # [m]
+
+
+class GroundContact(NamedTuple):
+    """Feet that stick where they stand until the friction cone lets go (theory.md, eq. (2.12) to (2.16)).
+
+    The friction is a spring and damper between each foot and its anchor on the ground; the anchor is dragged along
+    when the force leaves the Coulomb cone. Source: Cundall and Strack, Geotechnique 29 (1979) 47, with a static
+    coefficient for feet at rest or coming to rest and a dynamic one for feet that break away. Valid for hard ground
+    and feet that are points; the ground's slope below 45 degrees.
+    """
+
+    ground: Ground
+    feet: tuple[Vec3, ...]  # [m] body, with the hull's points
+    reach: float  # [m] beyond which no foot can be from the centre of mass, measured along world z
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    inverse_width: float  # [1/m]
+    static: float
+    dynamic: float
+    tangential_stiffness: float  # [N/m]
+    square_stick_velocity: float  # [m^2/s^2]
+    rate_bound: float  # [1/s] of the fastest mode in contact
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundContact | GroundContactSmooth":
+        """With the airframe's feet and mass."""
+        given = checked(Settings, table)
+        if given.friction_dynamic > given.friction_static:
+            raise ValueError(f".friction_dynamic: must not exceed friction_static = {given.friction_static}")
+        points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
+        feet = points.feet + points.hull
+        steep = math.hypot(*given.slope, given.bump_height * 2.0 * math.pi / given.bump_length)
+        if steep > 1.0:
+            raise ValueError(f".slope: ground steeper than 45 degrees (tangent {steep:.2f})")
+        reach = max(math.hypot(*foot) for foot in feet) * math.sqrt(1.0 + steep**2) + given.bump_height
+        a, b = given.slope
+        normal_z = 1.0 / math.sqrt(1.0 + a * a + b * b)
+        normal = (-a * normal_z, -b * normal_z, normal_z)
+        common = (
+            Ground(given.slope, given.bump_height, 2.0 * math.pi / given.bump_length, normal),
+            feet, reach, given.stiffness, given.damping, 1.0 / given.transition_width,
+            given.friction_static, given.friction_dynamic,
+        )  # fmt: skip
+        if given.friction == "smooth":
+            rate = _rate_bound(airframe, points.feet, given.stiffness, 0.0)
+            return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
+        rate = _rate_bound(airframe, points.feet, given.stiffness, given.tangential_stiffness)
+        return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
+
+    def initial_memory(self):
+        """No foot is on the ground."""
+        return ((0.0, 0.0, FREE, 0.0),) * len(self.feet)
+
+
+class GroundContactSmooth(NamedTuple):
+    """Feet under a friction that is a function of velocity only (theory.md, eq. (2.17)).
+
+    Source: the "smooth stick-slip" law that Pappalardo et al. 2023, section 6.1, take from Simscape Multibody. It
+    creeps on a slope, and near rest it is a damper of about 1.5 mu_s m g / v_c, so stiff that steps are split while in
+    contact.
+    """
+
+    ground: Ground
+    feet: tuple[Vec3, ...]  # [m] body
+    reach: float  # [m]
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    inverse_width: float  # [1/m]
+    static: float
+    dynamic: float
+    inverse_critical: float  # [s/m]
+    rate_bound: float  # [1/s]
+    mobility: float  # [1/kg] highest acceleration of a foot by a unit force on all feet
+
+    def initial_memory(self):
+        """Nothing to remember, foot by foot."""
+        return ((),) * len(self.feet)
+
+
+# A foot's memory: x and y of its anchor [m], one of these, and the square of its slip [m^2/s^2] after the last step.
+FREE, STICKING, SLIDING = 0.0, 1.0, 2.0
+STABLE = 1.25  # [rad] of the fastest oscillation in one step
+SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
+STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
+
+
+def _mobility(airframe: Airframe, points: tuple[Vec3, ...]) -> float:
+    inertia = airframe.mass.inertia
+    arm = max(point[0] ** 2 + point[1] ** 2 + point[2] ** 2 for point in points)
+    return 1.0 / airframe.mass.total + arm / min(inertia)
+
+
+def _rate_bound(airframe: Airframe, feet: tuple[Vec3, ...], normal: float, tangential: float) -> float:
+    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it."""
+    mass = airframe.mass
+    xx, yy, zz = (sum(foot[i] ** 2 for foot in feet) for i in range(3))
+    heave = len(feet) * normal / mass.total
+    roll = (normal * yy + tangential * zz) / mass.inertia[0]
+    pitch = (normal * xx + tangential * zz) / mass.inertia[1]
+    return math.sqrt(max(heave, roll, pitch))

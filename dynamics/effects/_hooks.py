@@ -1,0 +1,211 @@
+"""What an effect may do, and how a scene's effects are combined without run-time cost.
+
+A scene's effects are a tuple of parameter NamedTuples, one per active effect, sorted by name; beside it runs a tuple of
+equal length with each effect's memory. An effect registers compiled functions ("hooks") for its parameter type. From
+the *types* in the tuple the calls are written out as straight-line code when the plant is compiled: an effect that is
+not in the tuple leaves no trace in the machine code.
+
+The stages of one evaluation, in order, each a hook:
+
+    air       (e, memory, s, air) -> Air                     density and wind at the vehicle
+    factors   (e, memory, s, factors) -> Factors             on each rotor's thrust and torque
+    loads     (e, memory, s, factors, loads) -> Loads        thrust and torque of each rotor, added to those before
+    supply    (e, memory, voltage) -> voltage                what the battery lets the motors have
+    motor     (e, memory, s, loads, voltage) -> (acceleration, current) of each rotor; one effect only
+    wrench    (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
+    wrench_body  the same with the force in body coordinates
+    torque    (e, memory, s, rotors) -> torque_body [N m], where there is no force
+
+and between evaluations:
+
+    body      (e, memory, body) -> MassProperties      mass and inertia for the next exchange interval
+    sample    (e, memory, s, rotors, key, tick, interval) -> memory    once an exchange interval, before its first step;
+                                                       s and rotors are those without the effects that can sleep
+    asleep    (e, memory, motion, h) -> bool           can the effect do nothing within the next step?
+    substeps  (e, memory, motion, h) -> int            how many steps to split the next one into, when awake
+    settle    (e, memory, motion, h) -> memory         after every step, when awake
+    contact   (e, memory, s) -> bool                   does the vehicle touch the ground?
+
+While all effects that can sleep are asleep, steps are taken without them, at no cost but the question.
+
+The memory of an effect is a tuple of floats that its parameter class gives with `initial_memory()`; () without it.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba.extending import overload
+
+from dynamics.kernel import leaf
+from dynamics.vector import add, apply
+
+HOOKS: dict[str, dict[type, Callable]] = {}
+
+
+def _hook(name: str) -> Callable:
+    registered = HOOKS.setdefault(name, {})
+
+    def for_type(parameters: type) -> Callable:
+        def register(function: Callable) -> Callable:
+            registered[parameters] = leaf(function)
+            return registered[parameters]
+
+        return register
+
+    return for_type
+
+
+body = _hook("body")
+air = _hook("air")
+factors = _hook("factors")
+loads = _hook("loads")
+supply = _hook("supply")
+motor = _hook("motor")
+wrench = _hook("wrench")
+wrench_body = _hook("wrench_body")
+torque = _hook("torque")
+sample = _hook("sample")
+settle = _hook("settle")
+substeps = _hook("substeps")
+contact = _hook("contact")
+asleep = _hook("asleep")
+
+
+def initial_memory(e: Any) -> tuple:
+    """What an effect remembers before the first exchange."""
+    return e.initial_memory() if hasattr(e, "initial_memory") else ()
+
+
+def _written_out(
+    fold: str, hook: str, arguments: str, call: str, result: str, default: str = "", more: str = ""
+) -> Callable:
+    """A function of (effects, memory, arguments) that calls `hook` for each effect that has it.
+
+    `call` is the line for effect number {i}, with hook function f{i}, and `more` that for every one but the first
+    where it differs; `result` is the expression returned at the end; `default` that if no effect has the hook.
+    """
+
+    def function(effects, memory, *rest):
+        raise NotImplementedError("compiled code only")
+
+    function.__name__ = function.__qualname__ = fold
+
+    def generate(effects: Any) -> Callable:
+        active = [(i, e.instance_class) for i, e in enumerate(effects.types)]
+        names: dict[str, Any] = {"add": add, "apply": apply}
+        lines: list[str] = []
+        members = [f"memory[{i}]" for i, _ in active]
+        for i, parameters in active:
+            if parameters in HOOKS[hook]:
+                names[f"f{i}"] = HOOKS[hook][parameters]
+                lines.append((more if lines and more else call).format(i=i))
+                members[i] = f"m{i}"
+        end = default if default and not lines else result
+        if end == "memory":
+            end = f"({', '.join(members)}{',' if len(members) == 1 else ''})"
+        text = "\n    ".join([f"def {fold}(effects, memory, {arguments}):", *lines, f"return {end}"])
+        exec(text, names)
+        return names[fold]
+
+    scope = {"generate": generate}
+    exec(f"def typing(effects, memory, {arguments}):\n    return generate(effects)\n", scope)
+    overload(function, jit_options={"forceinline": True})(scope["typing"])
+    return function
+
+
+def _chain(hook: str, before: str = "") -> Callable:
+    call = f"value = f{{i}}(effects[{{i}}], memory[{{i}}], {before}value)"
+    return _written_out(f"all_{hook}", hook, f"{before}value", call, "value")
+
+
+all_body = _chain("body")
+all_air = _chain("air", "s, ")
+all_factors = _chain("factors", "s, ")
+all_loads = _chain("loads", "s, factors, ")
+all_supply = _chain("supply")
+all_torques = _written_out(
+    "all_torques",
+    "torque",
+    "s, rotors, torque",
+    "torque = add(torque, f{i}(effects[{i}], memory[{i}], s, rotors))",
+    "torque",
+)
+all_body_wrenches = _written_out(
+    "all_body_wrenches",
+    "wrench_body",
+    "s, rotors, lift, torque",
+    "force, moment = f{i}(effects[{i}], memory[{i}], s, rotors); torque = add(torque, moment)",
+    "(apply(s.R_world_body, (force[0], force[1], force[2] + lift)), torque)",
+    # thrust alone needs only the third column
+    default="((lift * s.R_world_body[2], lift * s.R_world_body[5], lift * s.R_world_body[8]), torque)",
+    more="w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
+)
+all_wrenches = _written_out(
+    "all_wrenches",
+    "wrench",
+    "s, rotors, force, torque",
+    "w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
+    "(force, torque)",
+)
+all_motors = _written_out(
+    "all_motors",
+    "motor",
+    "s, loads, voltage, default",
+    "value = f{i}(effects[{i}], memory[{i}], s, loads, voltage)",
+    "value",
+    default="default",
+)
+all_samples = _written_out(
+    "all_samples",
+    "sample",
+    "s, rotors, key, tick, interval",
+    "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
+    "memory",
+)
+all_settled = _written_out(
+    "all_settled",
+    "settle",
+    "motion, h",
+    "m{i} = f{i}(effects[{i}], memory[{i}], motion, h)",
+    "memory",
+)
+all_substeps = _written_out(
+    "all_substeps",
+    "substeps",
+    "motion, h",
+    "n = f{i}(effects[{i}], memory[{i}], motion, h)",
+    "n",
+    default="1",
+    more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
+)
+all_contacts = _written_out(
+    "all_contacts",
+    "contact",
+    "s",
+    "touching = f{i}(effects[{i}], memory[{i}], s)",
+    "touching",
+    default="False",
+    more="touching = touching or f{i}(effects[{i}], memory[{i}], s)",
+)
+all_asleep = _written_out(
+    "all_asleep",
+    "asleep",
+    "motion, h",
+    "sleeping = f{i}(effects[{i}], memory[{i}], motion, h)",
+    "sleeping",
+    default="True",
+    more="sleeping = sleeping and f{i}(effects[{i}], memory[{i}], motion, h)",
+)
+
+
+def without_sleepers(effects, values):
+    """The members of `values`, one for each effect, that belong to effects that never sleep."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(without_sleepers, jit_options={"forceinline": True})
+def _without_sleepers(effects, values):
+    kept = "".join(f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["asleep"])
+    names: dict[str, Any] = {}
+    exec(f"def without_sleepers(effects, values):\n    return ({kept})\n", names)
+    return names["without_sleepers"]

@@ -1,0 +1,42 @@
+"""From a scene's table to an effect's parameters."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NoReturn, TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from dynamics.vehicles.airframe import one_line
+
+T = TypeVar("T")
+
+
+@cache
+def _adapter(cls: type) -> TypeAdapter:
+    return TypeAdapter(cls, config=ConfigDict(strict=True, allow_inf_nan=False))
+
+
+def checked(cls: type[T], table: Mapping[str, Any]) -> T:
+    """The NamedTuple `cls` with the keys of a table.
+
+    Raises:
+        ValueError: one line that begins with `.key` if a key is missing, unknown, of the wrong type or out of range.
+    """
+    try:
+        return _adapter(cls).validate_python(_tuples(table))  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise ValueError(one_line(error, "", getattr(cls, "_fields", ()))) from None
+
+
+def _tuples(value: Any) -> Any:
+    """TOML's lists as tuples."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_tuples(item) for item in value)
+    return value
+
+
+def cannot(reason: str) -> NoReturn:
+    """Refuse an effect that the vehicle cannot have."""
+    raise ValueError(f": {reason}")

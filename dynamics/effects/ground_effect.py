@@ -1,0 +1,72 @@
+"""More thrust close to the ground."""
+
+import math
+from typing import NamedTuple
+
+from dynamics.effects._hooks import asleep, factors
+from dynamics.effects._rotors import each
+from dynamics.effects._scene import cannot, checked
+from dynamics.effects._types import Factors
+from dynamics.kernel import leaf
+from dynamics.vehicles.airframe import Airframe
+
+LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the factor is kept
+FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.4 %, is faded out
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class GroundEffect(NamedTuple):
+    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z over level ground (theory.md, eq. (2.25)).
+
+    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), hovering, each rotor by itself. Valid over the plane z = 0 for
+    heights above half a radius.
+    """
+
+    inverse_radius: float  # [1/m]
+    highest: float  # [m] of the centre of mass, above which no rotor feels the ground
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundEffect":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        radius = 0.5 * propeller.diameter
+        reach = max(math.hypot(*position) for position in airframe.rotors.position)
+        return cls(1.0 / radius, FADE_TO * radius + reach)
+
+
+@leaf
+def gain(height):
+    """Thrust over that far from the ground, at a height in radii."""
+    z = max(height, LOWEST)
+    square = 0.0625 / (z * z)
+    fade = min(max((z - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)
+    return 1.0 + square / (1.0 - square) * (1.0 - fade * fade * (3.0 - 2.0 * fade))
+
+
+@leaf
+def _height(c, x, y):
+    e, s = c
+    R = s.R_world_body
+    return e.inverse_radius * (s.motion.position_world[2] + R[6] * x + R[7] * y)
+
+
+@leaf
+def _gained(_, factor, height):
+    return factor * gain(height)
+
+
+@factors(GroundEffect)
+def ground_effect(e, memory, s, before):
+    """Factors on thrust; the torque stays."""
+    heights = each(_height, (e, s), s.layout.x_body, s.layout.y_body)
+    return Factors(each(_gained, 0.0, before.thrust, heights), before.torque)
+
+
+@asleep(GroundEffect)
+def high(e, memory, motion, h):
+    """Too high for any rotor to feel the ground within a step?"""
+    return motion.position_world[2] + 2.0 * h * min(motion.velocity_world[2], 0.0) > e.highest

@@ -1,0 +1,66 @@
+"""A payload that is let go."""
+
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt
+
+from dynamics.effects._hooks import body, sample
+from dynamics.effects._scene import cannot, checked
+from dynamics.effects._types import MassProperties, body_of
+from dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
+    mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
+    size: tuple[Annotated[float, Gt(0)], Annotated[float, Gt(0)], Annotated[float, Gt(0)]] = (0.20, 0.13, 0.23)  # [m]
+
+
+class Payload(NamedTuple):
+    """A uniform box at the centre of mass; once it is released the vehicle has neither its mass nor its inertia.
+
+    See theory.md, eq. (2.26). Source: the payload of Pappalardo et al. 2023, Table 2; size chosen. Valid for a payload
+    near the centre of mass, released at rest relative to the vehicle: the centre of mass does not move.
+    """
+
+    release_time: float  # [s]
+    loaded: MassProperties
+    empty: MassProperties
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "Payload":
+        """Mass properties with and without the box."""
+        given = checked(Settings, table)
+        mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
+        if mass >= total:
+            raise ValueError(f".mass: must be below the vehicle's {total} kg, got {mass}")
+        x, y, z = given.size
+        box = (mass * (y * y + z * z) / 12.0, mass * (z * z + x * x) / 12.0, mass * (x * x + y * y) / 12.0)
+        inertia = airframe.mass.inertia
+        rest = (inertia[0] - box[0], inertia[1] - box[1], inertia[2] - box[2])
+        if min(rest) <= 0.0 or 2.0 * max(rest) > sum(rest):
+            cannot("takes more inertia than the vehicle has: make its mass or size smaller")
+        release = float("inf") if given.release_time is None else given.release_time
+        return cls(release, body_of(total, inertia), body_of(total - mass, rest))
+
+    def initial_memory(self):
+        """1 once released."""
+        return (0.0,)
+
+
+RELEASED = (1.0,)
+"""Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
+
+
+@sample(Payload)
+def release(e, memory, s, rotors, key, tick, interval):
+    """Let go when the time has come."""
+    return (1.0,) if s.t >= e.release_time else memory
+
+
+@body(Payload)
+def payload(e, memory, before):
+    """Mass properties with or without it."""
+    return e.empty if memory[0] > 0.0 else e.loaded

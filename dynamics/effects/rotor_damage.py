@@ -1,0 +1,67 @@
+"""A propeller that is damaged or lost in flight."""
+
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from dynamics.effects._hooks import factors, sample
+from dynamics.effects._rotors import each
+from dynamics.effects._scene import checked
+from dynamics.effects._types import Factors
+from dynamics.kernel import leaf
+from dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    rotor: Annotated[int, Gt(0)]  # number of the rotor, from 1
+    time: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
+    thrust_left: Annotated[float, Ge(0), Le(1)] = 0.0  # fraction
+    torque_left: Annotated[float, Ge(0), Le(2)] = 0.0  # fraction; a torn blade may drag more
+
+
+class RotorDamage(NamedTuple):
+    """From a moment on one rotor has only a part of its thrust and torque (theory.md, eq. (2.27)).
+
+    Source: the definition. Valid for a torn or lost blade as far as its mean loads go: imbalance and vibration are
+    left out, and the motor goes on turning.
+    """
+
+    time: float  # [s]
+    thrust_left: tuple[float, ...]  # fraction of each rotor
+    torque_left: tuple[float, ...]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorDamage":
+        """For one of the airframe's rotors."""
+        given = checked(Settings, table)
+        count = len(airframe.rotors.position)
+        if given.rotor > count:
+            raise ValueError(f".rotor: the vehicle has rotors 1 to {count}, got {given.rotor}")
+
+        def only_this(left):
+            return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))
+
+        return cls(given.time, only_this(given.thrust_left), only_this(given.torque_left))
+
+    def initial_memory(self):
+        """Fractions of thrust and torque in force."""
+        return (1.0,) * len(self.thrust_left), (1.0,) * len(self.torque_left)
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@sample(RotorDamage)
+def strike(e, memory, s, rotors, key, tick, interval):
+    """The fractions for the next interval."""
+    return (e.thrust_left, e.torque_left) if s.t >= e.time else memory
+
+
+@factors(RotorDamage)
+def rotor_damage(e, memory, s, before):
+    """Factors on the damaged rotor's loads."""
+    return Factors(each(_product, 0.0, before.thrust, memory[0]), each(_product, 0.0, before.torque, memory[1]))

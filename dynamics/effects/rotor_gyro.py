@@ -1,0 +1,44 @@
+"""What the spinning rotors' angular momentum does to the body."""
+
+from typing import NamedTuple
+
+from dynamics.effects._hooks import torque
+from dynamics.effects._rotors import each, total
+from dynamics.effects._scene import checked
+from dynamics.kernel import leaf
+from dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [rotors] says it all."""
+
+
+class RotorGyro(NamedTuple):
+    """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
+
+    Source: Euler's equations of a body with rotors that spin about its z axis; the propeller's inertia is averaged over
+    a turn. Valid while the rotors turn many times faster than the body.
+    """
+
+    inertia: float  # [kg m^2] of one rotor about its axis
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorGyro":
+        """From the airframe's rotors."""
+        checked(Settings, table)
+        return cls(airframe.rotors.inertia)
+
+
+@leaf
+def _signed(_, sign, value):
+    return sign * value
+
+
+@torque(RotorGyro)
+def rotor_gyro(e, memory, s, rotors):
+    """Torque [N m] in body coordinates."""
+    sign, omega = s.layout.yaw_sign, s.motion.omega_body
+    # a rotor that pushes the body to +z turns about -z itself
+    momentum = -e.inertia * total(each(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
+    spin_up = e.inertia * total(each(_signed, 0.0, sign, rotors.acceleration))
+    return (-omega[1] * momentum, omega[0] * momentum, spin_up)

@@ -1,0 +1,84 @@
+"""Correction of the rotors' thrust and torque for air that comes along their axis."""
+
+import math
+from typing import NamedTuple
+
+from dynamics.effects._hooks import loads
+from dynamics.effects._rotors import each
+from dynamics.effects._scene import cannot, checked
+from dynamics.effects._types import Loads
+from dynamics.kernel import leaf
+from dynamics.vector import subtract
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class RotorInflow(NamedTuple):
+    """What climb takes from, and descent adds to, the static loads of `rotor_thrust` (theory.md, eq. (2.5)).
+
+    The blade meets the air at an angle that falls with the advance per turn over the pitch: T = T_0 (1 - w / speed) and
+    the induced part of the torque with the square, where w = 2 pi V / pitch. Source: the paper's blade section at the
+    pitch minus the inflow angle, both small. Valid for |w| below half the rotor speed, where
+    it is held, outside the vortex ring state.
+    """
+
+    thrust_constant: float  # [m^4/rad^2]
+    induced_torque_constant: float  # [m^5/rad^2]
+    turn_per_metre: float  # [rad/m] 2 pi over pitch
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorInflow":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        if propeller.zero_lift_angle != 0.0:
+            cannot("the propeller's zero_lift_angle must be 0: the correction is derived for that")
+        profile, induced = drag_coefficients(propeller)
+        square = (2.0 * math.pi) ** 2
+        return cls(
+            thrust_coefficient(propeller) * propeller.diameter**4 / square,
+            torque_coefficient(propeller) * induced / (profile + induced) * propeller.diameter**5 / square,
+            2.0 * math.pi / propeller.pitch,
+        )
+
+
+@leaf
+def _slowed(w, speed, _):
+    return min(max(w, -0.5 * speed), 0.5 * speed)
+
+
+@leaf
+def _square_change(_, speed, w):
+    return w * (speed + speed - w)
+
+
+@leaf
+def _less(constant, before, both):
+    return before - (constant * both[1]) * both[0]
+
+
+@leaf
+def _pair(_, a, b):
+    return a, b
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@loads(RotorInflow)
+def rotor_inflow(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`; the axial speed is that of the centre of mass."""
+    R, air = s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world)
+    speed, density = s.motion.rotor_speed, s.air.density
+    w = each(_slowed, e.turn_per_metre * (R[2] * air[0] + R[5] * air[1] + R[8] * air[2]), speed, speed)
+    linear, square = each(_product, 0.0, speed, w), each(_square_change, 0.0, speed, w)
+    return Loads(
+        each(_less, e.thrust_constant * density, before.thrust, each(_pair, 0.0, linear, factors.thrust)),
+        each(_less, e.induced_torque_constant * density, before.torque, each(_pair, 0.0, square, factors.torque)),
+    )

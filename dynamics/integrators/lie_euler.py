@@ -1,0 +1,18 @@
+"""Lie-Euler: forward Euler along the group exponential.
+
+This is also the seed's forward Euler on a manifold, fEulM: its retraction on SO(3) is the same exponential.
+"""
+
+from dynamics.integrators._march import token
+from dynamics.kernel import leaf
+from dynamics.tree import retract, scale
+
+ORDER = 1
+ON_MANIFOLD = True
+Method = token(__name__)
+
+
+@leaf
+def step(rate, p, t, x, h):
+    """x exp(h f) (theory.md, eq. (6.2))."""
+    return retract(x, scale(h, rate(p, t, x)))

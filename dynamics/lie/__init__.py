@@ -1,0 +1,1 @@
+"""Lie groups and homogeneous spaces: exponential, logarithm, their derivatives, retraction, transport."""

@@ -1,0 +1,264 @@
+"""The plant: one rigid body with rotors, driven by motor voltages, under the effects that its scene names.
+
+Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
+every force is an effect (dynamics/effects). All functions are pure.
+"""
+
+import sys
+from typing import NamedTuple
+
+from numba.extending import overload
+
+from dynamics.effects import _hooks as hooks
+from dynamics.effects._rotors import each, total
+from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
+from dynamics.vector import Vec3, scale
+from dynamics.vehicles.airframe import Airframe
+
+STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
+
+
+class RotorLayout(NamedTuple):
+    """The rotors and their motors, as far as the bare plant needs them."""
+
+    x_body: PerRotor  # [m]
+    y_body: PerRotor  # [m]
+    z_body: PerRotor  # [m]
+    yaw_sign: PerRotor  # sign of the torque on the body about z
+    inertia: float  # [kg m^2] of one rotor about its axis
+    volt_per_speed: float  # [V s/rad] at the rotor = [N m/A]: motor constant over belt ratio
+    speed_per_volt: float  # [rad/(s V)]
+    lag_rate: float  # [1/s]
+    max_voltage: float  # [V]
+    idle_current: float  # [A]
+
+
+class MultirotorParameters(NamedTuple):
+    """A vehicle in a scene."""
+
+    body: MassProperties
+    layout: RotorLayout
+    effects: tuple  # parameter NamedTuples of the active effects, sorted by name
+
+
+class MultirotorState(NamedTuple):
+    """All that the plant remembers from one exchange to the next."""
+
+    motion: Motion
+    memory: tuple  # one tuple for each effect
+
+
+class MultirotorDrive(NamedTuple):
+    """What the rate of change depends on and stays fixed over a step."""
+
+    parameters: MultirotorParameters
+    body: MassProperties
+    memory: tuple
+    voltage: PerRotor  # [V]
+
+
+class MultirotorObservation(NamedTuple):
+    """What can be said about a state beyond the state itself."""
+
+    acceleration_world: Vec3  # [m/s^2] of the centre of mass
+    angular_acceleration_body: Vec3  # [rad/s^2]
+    thrust: PerRotor  # [N]
+    torque: PerRotor  # [N m] of the air against each rotor
+    rotor_acceleration: PerRotor  # [rad/s^2]
+    motor_voltage: PerRotor  # [V]
+    motor_current: PerRotor  # [A]
+    motor_power: PerRotor  # [W] taken by each motor
+    air_density: float  # [kg/m^3]
+    wind_world: Vec3  # [m/s]
+    mass: float  # [kg]
+    in_contact: bool
+
+
+@leaf
+def _lag(s, speed, voltage):
+    return s.layout.lag_rate * (s.layout.speed_per_volt * voltage - speed)
+
+
+@leaf
+def _static_current(s, torque, voltage):
+    """Current that holds the air's torque (theory.md, eq. (1.14)); none when the controller is off."""
+    return torque / s.layout.volt_per_speed + s.layout.idle_current if voltage > 0.0 else 0.0
+
+
+@leaf
+def _product(c, a, b):
+    return a * b
+
+
+@leaf
+def _constant(c, a, b):
+    return c
+
+
+@leaf
+def evaluate(drive, t, motion):
+    """One evaluation of all effects: (situation, rotors, force_world [N], torque_body [N m])."""
+    p, memory = drive.parameters, drive.memory
+    layout, speed = p.layout, motion.rotor_speed
+    body = drive.body
+    R_world_body = rotation_matrix(motion.attitude)
+    still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
+    s = Situation(t, motion, R_world_body, body, layout, still)
+    s = Situation(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still))
+    # adding to -0.0 changes no number, so the compiler drops it
+    one, zero = each(_constant, 1.0, speed, speed), each(_constant, -0.0, speed, speed)
+    factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
+    loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
+    voltage = hooks.all_supply(p.effects, memory, drive.voltage)
+    lag = (each(_lag, s, speed, voltage), each(_static_current, s, loads.torque, voltage))
+    acceleration, current = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
+    rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage)
+    torque = (
+        total(each(_product, 0.0, layout.y_body, loads.thrust)),
+        -total(each(_product, 0.0, layout.x_body, loads.thrust)),
+        total(each(_product, 0.0, layout.yaw_sign, loads.torque)),
+    )
+    torque = hooks.all_torques(p.effects, memory, s, rotors, torque)
+    force, torque = hooks.all_body_wrenches(p.effects, memory, s, rotors, total(loads.thrust), torque)
+    force, torque = hooks.all_wrenches(p.effects, memory, s, rotors, force, torque)
+    return s, rotors, force, torque
+
+
+@leaf
+def _angular_acceleration(body, omega, torque):
+    """Euler's equations along principal axes."""
+    gyration, inverse = body.gyration, body.inverse_inertia
+    return (
+        gyration[0] * (omega[1] * omega[2]) + inverse[0] * torque[0],
+        gyration[1] * (omega[2] * omega[0]) + inverse[1] * torque[1],
+        gyration[2] * (omega[0] * omega[1]) + inverse[2] * torque[2],
+    )
+
+
+@leaf
+def rate(drive, t, motion):
+    """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
+    s, rotors, force, torque = evaluate(drive, t, motion)
+    omega = motion.omega_body
+    acceleration = scale(s.body.inverse_mass, force)
+    return Motion(
+        motion.velocity_world, omega, acceleration, _angular_acceleration(s.body, omega, torque), rotors.acceleration
+    )
+
+
+def _step(method, drive, t, motion, h):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_step, jit_options={"forceinline": True})
+def _step_inlined(method, drive, t, motion, h):
+    one_step = sys.modules[method.instance_class.__module__].step
+    # inlined into `advance`, so that what a whole interval has in common is computed once
+    return lambda method, drive, t, motion, h: one_step(rate, drive, t, motion, h)
+
+
+@leaf
+def _within(limit, voltage, _):
+    return min(max(voltage, 0.0), limit)
+
+
+@leaf
+def _airborne(p, body, memory, voltage):
+    """The drive without the effects that can sleep."""
+    effects = hooks.without_sleepers(p.effects, p.effects)
+    kept = hooks.without_sleepers(p.effects, memory)
+    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects), body, kept, voltage)
+
+
+@kernel
+def _awake_step(method, drive, t, motion, h):
+    """(motion, memory) a step later with every effect taking part, in as many parts as they ask for."""
+    p, body, memory, voltage = drive
+    parts = hooks.all_substeps(p.effects, memory, motion, h)
+    part = h / parts
+    for j in range(parts):
+        motion = _step(method, MultirotorDrive(p, body, memory, voltage), t + j * part, motion, part)
+        memory = hooks.all_settled(p.effects, memory, motion, part)
+    return motion, memory
+
+
+@kernel
+def advance(method, p, key, tick, state, command, h, n):
+    """The state one exchange interval later: n steps of length h [s] under constant voltages.
+
+    Args:
+        method: `Method()` of an integrator's module.
+        p: MultirotorParameters.
+        key: of the vehicle's random numbers (dynamics/noise.py); effects draw at `tick`.
+        tick: number of the exchange; it starts at tick n h seconds.
+        state: MultirotorState.
+        command: voltage [V] of each motor, held within 0 and the highest.
+        h: [s] step.
+        n: steps in the interval.
+    """
+    layout = p.layout
+    voltage = each(_within, layout.max_voltage, command, command)
+    motion, memory = state
+    interval = n * h
+    start = tick * interval
+    before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
+    s, rotors, _, _ = evaluate(before, start, motion)
+    memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
+    body = hooks.all_body(p.effects, memory, p.body)
+    airborne = _airborne(p, body, memory, voltage)
+    for i in range(n):
+        if hooks.all_asleep(p.effects, memory, motion, h):
+            motion = _step(method, airborne, start + i * h, motion, h)
+        else:
+            motion, memory = _awake_step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, motion, h)
+    return MultirotorState(motion, memory)
+
+
+@kernel
+def observe(p, tick, interval, state, command):
+    """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
+    layout, motion = p.layout, state.motion
+    voltage = each(_within, layout.max_voltage, command, command)
+    body = hooks.all_body(p.effects, state.memory, p.body)
+    drive = MultirotorDrive(p, body, state.memory, voltage)
+    s, rotors, force, torque = evaluate(drive, tick * interval, motion)
+    return MultirotorObservation(
+        scale(s.body.inverse_mass, force),
+        _angular_acceleration(s.body, motion.omega_body, torque),
+        rotors.thrust,
+        rotors.torque,
+        rotors.acceleration,
+        rotors.voltage,
+        rotors.current,
+        each(_product, 0.0, rotors.voltage, rotors.current),
+        s.air.density,
+        s.air.wind_world,
+        s.body.mass,
+        hooks.all_contacts(p.effects, state.memory, s),
+    )
+
+
+def parameters(airframe: Airframe, effects: tuple = ()) -> MultirotorParameters:
+    """The compiled plant's numbers for an airframe under effects (from `dynamics.effects.from_scene`)."""
+    mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
+    x_body, y_body, z_body = zip(*rotors.position, strict=True)
+    layout = RotorLayout(
+        x_body, y_body, z_body, rotors.yaw_sign, rotors.inertia,
+        engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
+        engine.max_voltage, engine.idle_current,
+    )  # fmt: skip
+    return MultirotorParameters(body_of(mass.total, mass.inertia), layout, effects)
+
+
+def initial_state(
+    p: MultirotorParameters,
+    position_world: Vec3 = (0.0, 0.0, 0.0),
+    attitude: Quaternion = NO_ROTATION,
+    rotor_speed: float = 0.0,
+) -> MultirotorState:
+    """At rest in the world, all rotors at the same speed [rad/s], the effects' memory fresh."""
+    still = (0.0, 0.0, 0.0)
+    motion = Motion(position_world, attitude, still, still, (rotor_speed,) * len(p.layout.x_body))
+    return MultirotorState(motion, tuple(hooks.initial_memory(e) for e in p.effects))

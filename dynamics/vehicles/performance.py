@@ -1,0 +1,138 @@
+"""What a multirotor can do in steady flight, from the same models that the plant integrates.
+
+Steady level flight balances weight, fuselage drag (theory.md, eq. (2.7)) and the thrust of equal rotors in the air that
+comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque (theory.md, section 1.4).
+"""
+
+import math
+from typing import NamedTuple
+
+from scipy.optimize import brentq, minimize_scalar
+
+from dynamics.effects.air_density import EXPONENT, KELVIN, LAPSE_RATE, SEA_LEVEL_DENSITY
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+
+GRAVITY = 9.80665  # [m/s^2]
+DENSITY = 1.225  # [kg/m^3]
+CELL_VOLTAGE = 3.7  # [V] nominal
+
+
+class Trim(NamedTuple):
+    """Steady level flight."""
+
+    tilt: float  # [rad] from the vertical
+    thrust: float  # [N] of one rotor
+    rotor_speed: float  # [rad/s]
+    voltage: float  # [V] of one motor
+    current: float  # [A] of one motor
+    power: float  # [W] of all motors
+
+
+def trim(airframe: Airframe, speed: float = 0.0, density: float = DENSITY, mass: float | None = None) -> Trim:
+    """Steady level flight at a speed [m/s]; `mass` [kg] instead of the airframe's.
+
+    Raises:
+        ValueError: the airframe has no propeller, or no drag areas and a speed above 0.
+    """
+    propeller, count = _propeller(airframe), len(airframe.rotors.position)
+    if speed > 0.0 and airframe.drag is None:
+        raise ValueError("the vehicle has no [drag]: its performance at speed is not defined")
+    weight = (airframe.mass.total if mass is None else mass) * GRAVITY
+    ahead, _, below = airframe.drag.area if airframe.drag else (0.0, 0.0, 0.0)
+    pressure = 0.5 * density * speed * speed
+
+    def forces(tilt: float) -> tuple[float, float]:
+        """What the rotors must push forward and up."""
+        c, s = math.cos(tilt), math.sin(tilt)
+        return pressure * (ahead * c * c + below * s * s), weight + pressure * (below - ahead) * s * c
+
+    tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
+    thrust = math.hypot(*forces(tilt)) / count
+    square = (2.0 * math.pi) ** 2
+    k_thrust = density * thrust_coefficient(propeller) * propeller.diameter**4 / square
+    k_torque = density * torque_coefficient(propeller) * propeller.diameter**5 / square
+    profile, induced = drag_coefficients(propeller)
+    w = 2.0 * math.pi * speed * math.sin(tilt) / propeller.pitch
+    omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
+    torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
+    motor = airframe.motor
+    current = torque / motor.rotor_constant + motor.idle_current
+    voltage = motor.rotor_constant * omega + motor.resistance * current
+    return Trim(tilt, thrust, omega, voltage, current, count * voltage * current)
+
+
+def highest_thrust(airframe: Airframe, density: float = DENSITY) -> float:
+    """Of all rotors at rest in the air [N], at the highest voltage, or at the highest current if that comes first."""
+    propeller, motor = _propeller(airframe), airframe.motor
+    square = (2.0 * math.pi) ** 2
+    k_thrust = density * thrust_coefficient(propeller) * propeller.diameter**4 / square
+    k_torque = density * torque_coefficient(propeller) * propeller.diameter**5 / square
+    constant, resistance = motor.rotor_constant, motor.resistance
+
+    def excess(omega: float) -> float:
+        return constant * omega + resistance * (k_torque * omega**2 / constant + motor.idle_current) - motor.max_voltage
+
+    by_voltage = brentq(excess, 0.0, motor.max_voltage / constant)
+    by_current = math.sqrt((motor.esc_current - motor.idle_current) * constant / k_torque)
+    return len(airframe.rotors.position) * k_thrust * min(by_voltage, by_current) ** 2
+
+
+def battery_energy(airframe: Airframe) -> float:
+    """Nominal [J], drawn to the last."""
+    if airframe.battery is None:
+        raise ValueError("the vehicle has no [battery]: hover time and range are not defined")
+    return airframe.battery.cells * CELL_VOLTAGE * airframe.battery.capacity
+
+
+def hover_time(airframe: Airframe, density: float = DENSITY) -> float:
+    """[s] at constant power."""
+    return battery_energy(airframe) / trim(airframe, 0.0, density).power
+
+
+def highest_payload(airframe: Airframe, density: float = DENSITY) -> float:
+    """[kg] that the highest thrust lifts beyond the empty vehicle, nothing kept for control."""
+    return highest_thrust(airframe, density) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
+
+
+def highest_tilt(airframe: Airframe, density: float = DENSITY) -> float:
+    """[rad] at which the highest thrust still carries the weight."""
+    return math.acos(min(airframe.mass.total * GRAVITY / highest_thrust(airframe, density), 1.0))
+
+
+def ceiling(airframe: Airframe, temperature: float = 15.0) -> float:
+    """Altitude [m] at which the highest thrust is the weight, by the density law of theory.md, eq. (2.3)."""
+    kelvin, weight = KELVIN + temperature, airframe.mass.total * GRAVITY
+
+    def excess(altitude: float) -> float:
+        density = SEA_LEVEL_DENSITY * KELVIN / kelvin * (1.0 - LAPSE_RATE * altitude / kelvin) ** EXPONENT
+        return highest_thrust(airframe, density) - weight
+
+    return brentq(excess, 0.0, 30_000.0) if excess(0.0) > 0.0 else 0.0
+
+
+def highest_speed(airframe: Airframe, density: float = DENSITY) -> float:
+    """[m/s] in level flight, where the voltage is all used."""
+    highest = airframe.motor.max_voltage
+
+    def excess(speed: float) -> float:
+        return trim(airframe, speed, density).voltage - highest
+
+    return brentq(excess, 0.0, 200.0) if excess(0.0) < 0.0 else 0.0
+
+
+def longest_range(airframe: Airframe, density: float = DENSITY) -> tuple[float, float]:
+    """(distance [m], at the speed [m/s]) in still air."""
+    energy = battery_energy(airframe)
+    best = minimize_scalar(
+        lambda speed: -speed / trim(airframe, speed, density).power,
+        bounds=(0.1, highest_speed(airframe, density)),
+        method="bounded",
+    )
+    return -best.fun * energy, best.x
+
+
+def _propeller(airframe: Airframe):
+    if airframe.propeller is None:
+        raise ValueError("the vehicle has no [propeller]: its performance is not defined")
+    return airframe.propeller
