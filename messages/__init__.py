@@ -1,0 +1,19 @@
+"""What crosses the wire: ROS 2 message types, their CDR encoding, the topic table.
+
+`from messages import Imu, header`: the classes are generated from `msg/<package>/<Name>.msg`; adding a message is
+adding such a file.
+"""
+
+from typing import Any
+
+from messages import types
+from messages.instants import header, nanoseconds, stamp, stamp_ns
+from messages.types import TYPES, message_class
+
+__all__ = ["TYPES", "header", "message_class", "nanoseconds", "stamp", "stamp_ns"]
+__all__ += [cls.__name__ for cls in TYPES.values()]
+
+
+def __getattr__(name: str) -> Any:
+    """Message classes by their short names."""
+    return getattr(types, name)

@@ -1,0 +1,65 @@
+"""The topic table: every topic, its type, its rate, and whether it is recorded and reproducible. Declared only here."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from messages.types import (
+    Actuators,
+    BatteryState,
+    Clock,
+    Estimate,
+    FluidPressure,
+    Imu,
+    MagneticField,
+    NavSatFix,
+    Odometry,
+    PoseStamped,
+    Range,
+    Setpoint,
+    Status,
+    TFMessage,
+    TwistWithCovarianceStamped,
+    VehicleState,
+    WallTime,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Topic:
+    """One topic, for all vehicles where its name has the place `{vehicle}`."""
+
+    name: str  # "{vehicle}/imu" or "clock", without a leading slash
+    message: Any  # message class
+    rate: str | None = None  # scene key of its rate; None: every exchange tick
+    recorded: bool = True
+    deterministic: bool = True  # same scene and seed, same bytes; only such topics enter the digest
+
+    def key(self, vehicle: str = "") -> str:
+        """ROS name and name in the log: "/drone1/imu"."""
+        return "/" + self.name.format(vehicle=vehicle)
+
+    def zenoh_key(self, vehicle: str, space: str) -> str:
+        """Zenoh key expression in a run's key space: "space/drone1/imu"."""
+        return f"{space}/{self.name.format(vehicle=vehicle)}"
+
+
+CLOCK = Topic("clock", Clock, rate="rates.pose")
+TF = Topic("tf", TFMessage, rate="rates.pose")
+WALL_TIME = Topic("wall_time", WallTime, rate="rates.status", deterministic=False)
+
+TRUTH = Topic("{vehicle}/truth", VehicleState)
+POSE = Topic("{vehicle}/pose", PoseStamped, rate="rates.pose")
+ODOM = Topic("{vehicle}/odom", Odometry, rate="rates.pose")
+IMU = Topic("{vehicle}/imu", Imu, rate="sensors.imu.rate")
+MAG = Topic("{vehicle}/mag", MagneticField, rate="sensors.magnetometer.rate")
+GPS = Topic("{vehicle}/gps/fix", NavSatFix, rate="sensors.gps.rate")
+GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate="sensors.gps.rate")
+BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
+SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
+BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
+SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
+ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
+ACTUATORS = Topic("{vehicle}/actuators", Actuators)
+STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
+
+TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

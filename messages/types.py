@@ -1,0 +1,34 @@
+"""Every message class, found from the `.msg` files beside this module: `messages.types.Imu` and so on."""
+
+from pathlib import Path
+from typing import Any
+
+from messages.codec import make_class
+from messages.parse import read_folder
+
+TYPES: dict[str, Any] = {}
+"""Message class by full name ("sensor_msgs/msg/Imu")."""
+
+_definitions = read_folder(Path(__file__).parent / "msg")
+for _name, _definition in _definitions.items():
+    TYPES[_name] = make_class(_definition, _definitions, TYPES)
+_by_name = {cls.__name__: cls for cls in TYPES.values()}
+if len(_by_name) != len(TYPES):
+    raise ValueError("messages/msg: two packages hold a message of the same name")
+globals().update(_by_name)
+
+
+def message_class(type_name: str) -> Any:
+    """The class of a full type name.
+
+    Raises:
+        ValueError: there is no such type; names the choices.
+    """
+    if type_name not in TYPES:
+        raise ValueError(f"unknown message type {type_name}; known: {', '.join(sorted(TYPES))}")
+    return TYPES[type_name]
+
+
+def __getattr__(name: str) -> Any:
+    """Reached only for names that do not exist; also tells type checkers that names are made at import."""
+    raise AttributeError(f"module 'messages.types' has no message {name!r}")

@@ -1,0 +1,1 @@
+"""The autopilot: estimator and controller (theory.md, section 4)."""

@@ -1,0 +1,49 @@
+"""Attitude error and its rate about the body axes, in two ways: angle by angle, or on SO(3)."""
+
+import math
+
+from dynamics.kernel import leaf
+from dynamics.lie.quaternion import conjugate, from_roll_pitch_yaw, log, multiply, rotate
+from dynamics.vector import subtract
+
+
+@leaf
+def wrap(angle):
+    """The same angle in [-pi, pi] [rad]."""
+    return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
+
+
+@leaf
+def angle_rates(roll, pitch, omega_body):
+    """Rates of roll, pitch and yaw [rad/s] from the body rates (theory.md, eq. (4.17)); pitch away from +-pi/2."""
+    s, c = math.sin(roll), math.cos(roll)
+    turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
+    return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
+
+
+@leaf
+def body_rates(roll, pitch, rates):
+    """Inverse of `angle_rates`: omega_body of the rates of roll, pitch and yaw."""
+    s, c = math.sin(roll), math.cos(roll)
+    turn = math.cos(pitch) * rates[2]
+    return (rates[0] - math.sin(pitch) * rates[2], c * rates[1] + s * turn, c * turn - s * rates[1])
+
+
+@leaf
+def error_by_angle(angles, angles_reference, rates_reference, omega_body):
+    """Reference minus measured (roll, pitch, yaw) [rad], and its derivative [rad/s]: the cascade of the paper."""
+    rates = angle_rates(angles[0], angles[1], omega_body)
+    roll, pitch, yaw = subtract(angles_reference, angles)
+    return (roll, pitch, wrap(yaw)), subtract(rates_reference, rates)
+
+
+@leaf
+def error_on_so3(attitude, angles_reference, rates_reference, omega_body):
+    """Rotation vector [rad] in body axes from the attitude to the reference, and its rate [rad/s].
+
+    It has no preferred order of the angles and no singularity (theory.md, eq. (4.18)).
+    """
+    reference = from_roll_pitch_yaw(angles_reference[0], angles_reference[1], angles_reference[2])
+    between = multiply(conjugate(attitude), reference)
+    omega_reference = rotate(between, body_rates(angles_reference[0], angles_reference[1], rates_reference))
+    return log(between), subtract(omega_reference, omega_body)

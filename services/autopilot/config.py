@@ -1,0 +1,38 @@
+"""The `[autopilot]` of a scene: gains, what the controller flies on, and the attitude loop."""
+
+from typing import ClassVar, Literal
+
+from services.autopilot.gains import GainSet, load
+from services.scene import Scene, Section
+from services.sections import airframe
+
+NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
+
+
+class Autopilot(Section):
+    """How the vehicle is flown."""
+
+    TABLE: ClassVar[str] = "autopilot"
+    gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
+    estimator: Literal["sensors", "truth"] = "sensors"
+    attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
+
+    def gain_set(self, scene: Scene) -> GainSet:
+        """The gain set that the scene names; ValueError if there is none."""
+        name = str(scene.path.parent / self.gains) if self.gains.endswith(".toml") else self.gains
+        return load(name)
+
+    def check(self, scene: Scene) -> None:
+        """The gain set is there, the vehicle suits the controller, and the sensors that it needs are carried."""
+        try:
+            self.gain_set(scene)
+        except ValueError as error:
+            raise ValueError(f"gains: {error}") from None
+        if (n := len(airframe(scene).rotors.position)) != 4:
+            raise ValueError(f"gains: the controller flies vehicles of 4 rotors, this airframe has {n}")
+        if self.estimator == "sensors":
+            missing = [name for name in NEEDED if name not in scene.tables("sensors")]
+            if missing:
+                raise ValueError(
+                    f'estimator: "sensors" needs {", ".join(f"[sensors.{n}]" for n in missing)}, or say "truth"'
+                )

@@ -1,0 +1,159 @@
+"""The controller: four PID loops in the paper's cascade, saturated, down to the motors' voltages
+(theory.md, section 4.2)."""
+
+import math
+from typing import NamedTuple
+
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import to_roll_pitch_yaw
+from dynamics.vector import ZERO, Vec3, subtract
+from services.autopilot.attitude import error_by_angle, error_on_so3
+from services.autopilot.interface import Command
+from services.autopilot.mixer import Quotas, clamp, mix, saturate
+from services.autopilot.motor import Motor, voltage
+from services.autopilot.pid import Pid, integrate, output
+from services.autopilot.reference import AT_REST, Angle, Smoothing, advance
+from services.autopilot.stage import FLYING, LANDED, ON_GROUND, Stage, advance_stage
+
+
+class Parameters(NamedTuple):
+    """A gain set on an airframe; `gains.build` makes it."""
+
+    lift: Pid  # [N] of every rotor over [m]
+    yaw: Pid  # [N] over [rad]
+    roll_inner: Pid  # [N] over [rad] of the tilt to the left: negative gains
+    pitch_inner: Pid  # [N] over [rad]
+    roll_outer: Pid  # [rad] of tilt over [m]
+    pitch_outer: Pid  # [rad] over [m]
+    smoothing: Smoothing  # of the tilt references
+    tilt_limit: float  # [rad] about either axis
+    weight_quota: float  # [N] fed forward to every rotor; 0 where nothing is fed forward
+    gravity: float  # [m/s^2]
+    torque_quotas: Vec3  # (roll, pitch, yaw) quota of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
+    geometric: bool  # attitude error on SO(3) instead of angle by angle
+    signs: tuple[Vec3, Vec3, Vec3, Vec3]  # (roll, pitch, yaw) share of every rotor, each +1 or -1
+    thrust_max: float  # [N] of a rotor
+    motor: Motor
+    resting_height: float  # world z of the vehicle's origin when it stands [m]
+
+
+class State(NamedTuple):
+    """Memory of the controller."""
+
+    stage: Stage
+    integral_world: Vec3  # of the position error [m s]
+    integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
+    tilt_x: Angle  # reference of the pitch
+    tilt_y: Angle  # reference of the tilt to the left, -roll
+    cut: Quotas  # sign of what saturation cut off each quota at the last tick
+    tilt_cut: tuple[float, float]  # the same of the limited tilts, in world axes
+
+
+START = State(ON_GROUND, ZERO, ZERO, AT_REST, AT_REST, Quotas(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+
+
+@leaf
+def sign(x):
+    """-1.0, 0.0 or 1.0."""
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@leaf
+def to_heading(yaw, v_world):
+    """Components along the heading and to its left of a vector in world axes (theory.md, eq. (4.11))."""
+    s, c = math.sin(yaw), math.cos(yaw)
+    return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
+
+
+@leaf
+def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
+    """Tilts [rad] towards the heading and to its left that the outer loops ask for (theory.md, eq. (4.12))."""
+    x, y = to_heading(yaw, error)
+    vx, vy = to_heading(yaw, error_rate)
+    ix, iy = to_heading(yaw, integral)
+    tilt_x, tilt_y = output(p.pitch_outer, ix, x, vx), output(p.roll_outer, iy, y, vy)
+    if p.weight_quota > 0.0:
+        ax, ay = to_heading(yaw, acceleration_world)
+        tilt_x, tilt_y = tilt_x + ax / p.gravity, tilt_y + ay / p.gravity
+    return tilt_x, tilt_y
+
+
+@leaf
+def lift_quota(p, integral, error, error_rate, acceleration, roll, pitch):
+    """Lift [N] of every rotor; with feed-forward, the weight and the tilt are made up for (theory.md, eq. (4.13))."""
+    lift = output(p.lift, integral, error, error_rate)
+    if p.weight_quota > 0.0:
+        upright = max(math.cos(roll) * math.cos(pitch), 0.5)
+        lift = (lift + p.weight_quota * (1.0 + acceleration / p.gravity)) / upright
+    return lift
+
+
+@kernel
+def step(p, s, dt, estimate, setpoint):
+    """The command of one tick, and the state after it.
+
+    Args:
+        p: Parameters.
+        s: State; `START` at first.
+        dt: length of the tick [s].
+        estimate: Estimate at the tick.
+        setpoint: Setpoint at the tick.
+    """
+    roll, pitch, yaw = to_roll_pitch_yaw(estimate.attitude)
+    angles = (roll, pitch, yaw)
+    stage = advance_stage(s.stage, p.resting_height, estimate, setpoint, dt)
+    if stage.name != FLYING:
+        off = (0.0, 0.0, 0.0, 0.0)
+        rest = State(stage, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
+        return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, stage.name == LANDED)
+
+    error = subtract(setpoint.position_world, estimate.position_world)
+    error_rate = subtract(setpoint.velocity_world, estimate.velocity_world)
+    # Along the two tilts the integral is kept in world axes: a steady wind does not turn with the heading.
+    pushes = error[0] * s.tilt_cut[0] + error[1] * s.tilt_cut[1] > 0.0
+    integral = (
+        s.integral_world[0] if pushes else s.integral_world[0] + dt * error[0],
+        s.integral_world[1] if pushes else s.integral_world[1] + dt * error[1],
+        integrate(p.lift, s.integral_world[2], error[2], s.cut.lift, dt),
+    )
+    wanted_x, wanted_y = tilt_targets(p, yaw, integral, error, error_rate, setpoint.acceleration_world)
+    limited_x, limited_y = clamp(wanted_x, -p.tilt_limit, p.tilt_limit), clamp(wanted_y, -p.tilt_limit, p.tilt_limit)
+    cut_x, cut_y = sign(wanted_x - limited_x), sign(wanted_y - limited_y)
+    tilt_x = advance(p.smoothing, s.tilt_x, limited_x, dt)
+    tilt_y = advance(p.smoothing, s.tilt_y, limited_y, dt)
+
+    # References valid at this tick are those of the old state where the motors' lag is modelled: see eq. (4.16).
+    now_x, now_y = (s.tilt_x, s.tilt_y) if p.smoothing.lag > 0.0 else (tilt_x, tilt_y)
+    angles_reference = (-now_y.angle, now_x.angle, setpoint.yaw)
+    rates_reference = (-now_y.rate, now_x.rate, setpoint.yaw_rate)
+    if p.geometric:
+        turn, turn_rate = error_on_so3(estimate.attitude, angles_reference, rates_reference, estimate.omega_body)
+    else:
+        turn, turn_rate = error_by_angle(angles, angles_reference, rates_reference, estimate.omega_body)
+    integral_angles = (
+        integrate(p.roll_inner, s.integral_angles[0], -turn[0], s.cut.roll, dt),
+        integrate(p.pitch_inner, s.integral_angles[1], turn[1], s.cut.pitch, dt),
+        integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
+    )
+    wanted = Quotas(
+        lift_quota(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
+        output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
+        - p.torque_quotas[0] * tilt_y.demand_acceleration,
+        output(p.pitch_inner, integral_angles[1], turn[1], turn_rate[1])
+        + p.torque_quotas[1] * tilt_x.demand_acceleration,
+        output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
+    )
+    given = saturate(p.signs, wanted, p.thrust_max)
+    cut = Quotas(
+        sign(wanted.lift - given.lift),
+        sign(wanted.roll - given.roll),
+        sign(wanted.pitch - given.pitch),
+        sign(wanted.yaw - given.yaw),
+    )
+    t = mix(p.signs, given)
+    top = p.thrust_max
+    thrust = (clamp(t[0], 0.0, top), clamp(t[1], 0.0, top), clamp(t[2], 0.0, top), clamp(t[3], 0.0, top))
+    m = p.motor
+    volts = (voltage(m, thrust[0]), voltage(m, thrust[1]), voltage(m, thrust[2]), voltage(m, thrust[3]))
+    state = State(stage, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
+    return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw, False)

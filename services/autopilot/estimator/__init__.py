@@ -1,0 +1,29 @@
+"""Estimator: where the vehicle is and how it moves, from its sensors (theory.md, section 3.3).
+
+An error-state Kalman filter. Pure: every function takes the parameters and a state and returns the next state.
+"""
+
+from services.autopilot.estimator.gps import update_gps, update_gps_velocity
+from services.autopilot.estimator.heading import update_magnetometer
+from services.autopilot.estimator.height import update_barometer, update_sonar
+from services.autopilot.estimator.parameters import PRESETS, Estimator
+from services.autopilot.estimator.predict import predict
+from services.autopilot.estimator.standstill import update_standstill
+from services.autopilot.estimator.state import SOURCES, Estimate, State, estimate, initial
+
+__all__ = [
+    "PRESETS",
+    "SOURCES",
+    "Estimate",
+    "Estimator",
+    "State",
+    "estimate",
+    "initial",
+    "predict",
+    "update_barometer",
+    "update_gps",
+    "update_gps_velocity",
+    "update_magnetometer",
+    "update_sonar",
+    "update_standstill",
+]

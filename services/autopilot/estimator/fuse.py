@@ -1,0 +1,80 @@
+"""Kalman update by one scalar measurement at a time (theory.md, eqs. (3.26) to (3.28)).
+
+The caller fills `memory.row` with one row of the measurement matrix. Corrections gather in `memory.correction`, so that
+the rows of one reading are all taken about the same estimate.
+"""
+
+from dynamics.kernel import kernel, leaf
+from dynamics.vector import Vec3
+from services.autopilot.estimator.state import ACCELEROMETER, POSITION, SIZE, THETA, VELOCITY, WANDER
+
+_FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
+
+
+@leaf
+def clear(m):
+    """Empty the row."""
+    m.row[:] = 0.0
+
+
+@kernel
+def innovation_variance(m, variance):
+    """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
+    m.product[:] = 0.0
+    for j in range(SIZE):
+        h = m.row[j]
+        if h != 0.0:
+            for i in range(SIZE):
+                m.product[i] += h * m.covariance[j, i]
+    total = variance + _FLOOR
+    for i in range(SIZE):
+        total += m.row[i] * m.product[i]
+    return total
+
+
+@kernel
+def fuse(m, innovation, variance):
+    """Take in the row's measurement; returns its normalised innovation squared."""
+    s = innovation_variance(m, variance)
+    y = innovation
+    for i in range(SIZE):
+        y -= m.row[i] * m.correction[i]
+    inverse = 1.0 / s
+    for i in range(SIZE):
+        m.correction[i] += m.product[i] * y * inverse
+        for j in range(SIZE):
+            m.covariance[i, j] -= (m.product[i] * m.product[j]) * inverse  # exactly symmetric
+    return y * y * inverse
+
+
+@kernel
+def acceleration_row(m, force_world, r, axis, k):
+    """Add k times the row of the acceleration's error: theta x f - R b (theory.md, eq. (3.22))."""
+    x, y, z = force_world
+    if axis == 0:
+        theta: Vec3 = (0.0, z, -y)
+    elif axis == 1:
+        theta = (-z, 0.0, x)
+    else:
+        theta = (y, -x, 0.0)
+    for i in range(3):
+        m.row[THETA + i] += k * theta[i]
+        m.row[ACCELEROMETER + i] -= k * r[3 * axis + i]
+
+
+@leaf
+def late_position_row(m, force_world, r, axis, delay):
+    """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30))."""
+    clear(m)
+    m.row[POSITION + axis] = 1.0
+    m.row[VELOCITY + axis] = -delay
+    m.row[WANDER + axis] = 1.0
+    acceleration_row(m, force_world, r, axis, 0.5 * delay * delay)
+
+
+@leaf
+def late_velocity_row(m, force_world, r, axis, delay):
+    """Row of the velocity `delay` seconds ago."""
+    clear(m)
+    m.row[VELOCITY + axis] = 1.0
+    acceleration_row(m, force_world, r, axis, -delay)

@@ -1,0 +1,110 @@
+"""Late position and velocity of a satellite receiver (theory.md, eqs. (3.29) and (3.30))."""
+
+from dynamics.geodesy import geodetic_to_enu
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotation_matrix
+from dynamics.vector import ZERO, add, scale, subtract
+from services.autopilot.estimator.doubt import doubt
+from services.autopilot.estimator.fuse import fuse, innovation_variance, late_position_row, late_velocity_row
+from services.autopilot.estimator.state import GPS, GPS_VELOCITY, HISTORY, corrected
+from services.autopilot.estimator.watch import judge, repeated
+
+
+@leaf
+def _past(p, s, age):
+    """Position and velocity `age` ticks ago, from the estimate now and the IMU readings since."""
+    i, m = s.inertial, s.memory
+    age = min(age, i.tick, HISTORY - 1)
+    slot = (i.tick - age) % HISTORY
+    h = m.history
+    velocity_gain = (h[slot, 0], h[slot, 1], h[slot, 2])
+    distance_gain = (h[slot, 3], h[slot, 4], h[slot, 5])
+    delay = age * p.interval
+    moment = subtract(scale(delay, i.velocity_gain), subtract(i.distance_gain, distance_gain))
+    position = add(subtract(s.nominal.position_world, scale(delay, s.nominal.velocity_world)), moment)
+    velocity = subtract(s.nominal.velocity_world, subtract(i.velocity_gain, velocity_gain))
+    return position, velocity, delay
+
+
+@leaf
+def _wander_variance(p, axis):
+    return (p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal) ** 2
+
+
+@kernel
+def update_gps(p, s, latitude_deg, longitude_deg, height, variance, age, valid):
+    """State after a position fix.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        latitude_deg: [deg].
+        longitude_deg: [deg].
+        height: [m] over the ellipsoid.
+        variance: [m^2] east, north, up, as the receiver states it.
+        age: [ticks] how long ago it was true.
+        valid: whether there is a fix.
+    """
+    m = s.memory
+    if not valid or repeated(m, GPS, (latitude_deg, longitude_deg, height), ZERO, variance[0] > 0.0, 1):
+        judge(m, GPS, False, 0.0)
+        return s
+    measured = geodetic_to_enu(p.home, latitude_deg, longitude_deg, height)
+    position, _, delay = _past(p, s, age)
+    innovation = subtract(measured, add(position, s.nominal.gps_wander))
+    r = rotation_matrix(s.nominal.attitude)
+    accepted = True
+    nis = 0.0
+    for axis in range(3):
+        late_position_row(m, s.inertial.force_world, r, axis, delay)
+        white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
+        ratio = innovation[axis] ** 2 / innovation_variance(m, white)
+        nis += ratio
+        accepted = accepted and ratio < p.gate**2
+    if accepted:
+        nis = 0.0
+        for axis in range(3):
+            late_position_row(m, s.inertial.force_world, r, axis, delay)
+            white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
+            nis += fuse(m, innovation[axis], white)
+    judge(m, GPS, accepted, nis)
+    if not accepted:
+        doubt(p, m, GPS)
+    return corrected(s)
+
+
+@kernel
+def update_gps_velocity(p, s, velocity_world, variance, age, valid):
+    """State after a velocity fix.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        velocity_world: [m/s].
+        variance: [(m/s)^2] per axis.
+        age: [ticks] how long ago it was true.
+        valid: whether there is a fix.
+    """
+    m = s.memory
+    if not valid or repeated(m, GPS_VELOCITY, velocity_world, ZERO, variance > 0.0, 1):
+        judge(m, GPS_VELOCITY, False, 0.0)
+        return s
+    _, velocity, delay = _past(p, s, age)
+    innovation = subtract(velocity_world, velocity)
+    r = rotation_matrix(s.nominal.attitude)
+    accepted = True
+    nis = 0.0
+    for axis in range(3):
+        late_velocity_row(m, s.inertial.force_world, r, axis, delay)
+        ratio = innovation[axis] ** 2 / innovation_variance(m, variance)
+        nis += ratio
+        accepted = accepted and ratio < p.gate**2
+    if accepted:
+        nis = 0.0
+        for axis in range(3):
+            late_velocity_row(m, s.inertial.force_world, r, axis, delay)
+            nis += fuse(m, innovation[axis], variance)
+    judge(m, GPS_VELOCITY, accepted, nis)
+    if not accepted:
+        doubt(p, m, GPS_VELOCITY)
+    return corrected(s)

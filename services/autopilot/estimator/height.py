@@ -1,0 +1,80 @@
+"""Height by the sonar near the ground and by the barometer (theory.md, eqs. (3.31) and (3.32))."""
+
+import math
+
+from dynamics.geodesy import pressure_altitude
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import rotation_matrix
+from dynamics.vector import ZERO
+from services.autopilot.estimator.doubt import doubt
+from services.autopilot.estimator.fuse import clear, fuse, innovation_variance
+from services.autopilot.estimator.state import BARO, BAROMETER, POSITION, SCALE, SONAR, corrected
+from services.autopilot.estimator.watch import judge, repeated
+
+
+@kernel
+def _scalar(p, s, source, innovation, variance):
+    """Gate and take in the row."""
+    m = s.memory
+    nis = innovation**2 / innovation_variance(m, variance)
+    accepted = nis < p.gate**2
+    if accepted:
+        fuse(m, innovation, variance)
+    judge(m, source, accepted, nis)
+    if not accepted:
+        doubt(p, m, source)
+    return corrected(s)
+
+
+@kernel
+def update_barometer(p, s, pressure, variance, valid):
+    """State after a pressure reading.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        pressure: [Pa].
+        variance: [Pa^2].
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    if not valid or not pressure > 0.0 or repeated(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
+        judge(m, BARO, False, 0.0)
+        return s
+    altitude = pressure_altitude(pressure, p.temperature_celsius) - p.home.height
+    slope = pressure_altitude(pressure + 1.0, p.temperature_celsius) - p.home.height - altitude  # [m/Pa]
+    clear(m)
+    m.row[POSITION + 2] = 1.0
+    m.row[BAROMETER] = 1.0
+    innovation = altitude - s.nominal.position_world[2] - s.nominal.barometer_bias
+    return _scalar(p, s, BARO, innovation, variance * slope * slope)
+
+
+@kernel
+def update_sonar(p, s, distance, variance, valid):
+    """State after an echo.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        distance: [m]; infinite where there is none, which is no fault.
+        variance: [m^2].
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    if not valid:
+        judge(m, SONAR, False, 0.0)
+        return s
+    height = s.nominal.position_world[2] - p.ground_height
+    if math.isinf(distance) or height > p.sonar_height_max:
+        m.refused[SONAR] = 0
+        m.since[SONAR] = 0
+        return s
+    cosine = rotation_matrix(s.nominal.attitude)[8]
+    tilt = math.acos(min(max(cosine, -1.0), 1.0))
+    slant = 1.0 / math.cos(max(0.0, tilt - math.radians(p.sonar_half_beam_deg)))
+    clear(m)
+    factor = slant * (1.0 + s.nominal.sonar_scale)
+    m.row[POSITION + 2] = factor
+    m.row[SCALE] = slant * height
+    return _scalar(p, s, SONAR, distance - factor * height, variance)

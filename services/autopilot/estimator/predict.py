@@ -1,0 +1,160 @@
+"""Prediction by the inertial measurement unit (theory.md, eqs. (3.21) to (3.24))."""
+
+import math
+
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
+from dynamics.vector import add, apply, norm, scale, subtract
+from services.autopilot.estimator.state import (
+    ACCELEROMETER,
+    BAROMETER,
+    GYRO,
+    HISTORY,
+    IMU,
+    IRON,
+    POSITION,
+    SIZE,
+    SOURCES,
+    THETA,
+    VELOCITY,
+    WANDER,
+    Inertial,
+    Nominal,
+    State,
+)
+from services.autopilot.estimator.watch import repeated
+
+_IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
+
+
+@leaf
+def _transform_rows(c, f, r, dt):
+    """c <- F c, with F = I + A dt: row blocks in an order in which none is overwritten before it is read."""
+    for j in range(SIZE):
+        for i in range(3):
+            c[POSITION + i, j] += dt * c[VELOCITY + i, j]
+        tx, ty, tz = c[THETA, j], c[THETA + 1, j], c[THETA + 2, j]
+        ax, ay, az = c[ACCELEROMETER, j], c[ACCELEROMETER + 1, j], c[ACCELEROMETER + 2, j]
+        gx, gy, gz = c[GYRO, j], c[GYRO + 1, j], c[GYRO + 2, j]
+        c[VELOCITY, j] += dt * (ty * f[2] - tz * f[1] - (r[0] * ax + r[1] * ay + r[2] * az))
+        c[VELOCITY + 1, j] += dt * (tz * f[0] - tx * f[2] - (r[3] * ax + r[4] * ay + r[5] * az))
+        c[VELOCITY + 2, j] += dt * (tx * f[1] - ty * f[0] - (r[6] * ax + r[7] * ay + r[8] * az))
+        c[THETA, j] -= dt * (r[0] * gx + r[1] * gy + r[2] * gz)
+        c[THETA + 1, j] -= dt * (r[3] * gx + r[4] * gy + r[5] * gz)
+        c[THETA + 2, j] -= dt * (r[6] * gx + r[7] * gy + r[8] * gz)
+
+
+@leaf
+def _propagate_covariance(c, f, r, dt):
+    """c <- F c F^T."""
+    _transform_rows(c, f, r, dt)
+    _transform_rows(c.T, f, r, dt)
+    for i in range(GYRO):  # the two passes round differently: keep it exactly symmetric
+        for j in range(i):
+            c[i, j] = c[j, i]
+
+
+@leaf
+def _fade(c, keep):
+    """First-order decay of the receiver's wander."""
+    for i in range(WANDER, WANDER + 3):
+        for j in range(SIZE):
+            c[i, j] *= keep
+            c[j, i] *= keep
+
+
+@leaf
+def _held(p, i, omega, force):
+    """Whether a reading is a spike: it jumps away from a reading that was itself trusted."""
+    return not i.held and (
+        norm(subtract(omega, i.omega)) > p.jolt_rate or norm(subtract(force, i.force)) > p.jolt_force
+    )
+
+
+@kernel
+def predict(p, s, omega_body, specific_force_body, omega_variance, specific_force_variance, valid):
+    """State one interval later.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        omega_body: [rad/s] reading of the gyroscopes now.
+        specific_force_body: [m/s^2] reading of the accelerometers now.
+        omega_variance: [(rad/s)^2] per axis.
+        specific_force_variance: [(m/s^2)^2] per axis.
+        valid: whether there is a reading; without one the last is used again.
+    """
+    n, i, m = s.nominal, s.inertial, s.memory
+    dt = p.interval
+    first = i.tick == 0
+    frozen = valid and repeated(m, IMU, omega_body, specific_force_body, omega_variance > 0.0, p.frozen)
+    spike = valid and not first and _held(p, i, omega_body, specific_force_body)
+    usable = valid and not spike and not frozen
+    omega = omega_body if usable else i.omega
+    force = specific_force_body if usable else i.force
+    omega_before = omega if first else i.omega
+
+    # Trapezoidal in the world frame: the readings are of the instants at both ends of the interval.
+    omega_mean = subtract(scale(0.5, add(omega_before, omega)), n.gyro_bias)
+    attitude = normalise(multiply(n.attitude, exp(scale(dt, omega_mean))))
+    r0, r = rotation_matrix(n.attitude), rotation_matrix(attitude)
+    f0 = apply(r0, subtract(i.force, n.accelerometer_bias))
+    f1 = apply(r, subtract(force, n.accelerometer_bias))
+    a0, a1 = (f0[0], f0[1], f0[2] - p.gravity), (f1[0], f1[1], f1[2] - p.gravity)
+    dv = scale(0.5 * dt, add(a0, a1))
+    dd = scale(dt * dt / 6.0, add(scale(2.0, a0), a1))
+    velocity = add(n.velocity_world, dv)
+    position = add(n.position_world, add(scale(dt, n.velocity_world), dd))
+    distance_gain = add(i.distance_gain, add(scale(dt, i.velocity_gain), dd))
+    velocity_gain = add(i.velocity_gain, dv)
+    tick = i.tick + 1
+    for k in range(3):
+        m.history[tick % HISTORY, k] = velocity_gain[k]
+        m.history[tick % HISTORY, 3 + k] = distance_gain[k]
+
+    c = m.covariance
+    _propagate_covariance(c, scale(0.5, add(f0, f1)), r, dt)
+    keep = math.exp(-dt / p.gps_wander_time)
+    _fade(c, keep)
+
+    rate = norm(omega_mean)
+    jolt = norm(subtract(specific_force_body, i.force))
+    twist = norm(subtract(omega_body, i.omega))
+    q_theta = dt * dt * omega_variance + dt * rate * p.gyro_scale_std**2
+    q_velocity = dt * dt * specific_force_variance
+    if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
+        q_velocity += max(0.5 * dt * jolt, _IMPACT) ** 2
+    if not first and (twist > p.jolt_rate or spike):
+        q_theta += (0.5 * dt * twist) ** 2
+    if not valid or frozen:  # flying on old readings: they may be wrong by as much as a manoeuvre changes them
+        q_velocity += dt * 1.0
+        q_theta += dt * 0.1
+    for k in range(3):
+        c[THETA + k, THETA + k] += q_theta
+        c[VELOCITY + k, VELOCITY + k] += q_velocity
+        c[GYRO + k, GYRO + k] += dt * p.gyro_bias_walk**2
+        c[ACCELEROMETER + k, ACCELEROMETER + k] += dt * p.accelerometer_bias_walk**2
+        deviation = p.gps_wander_vertical if k == 2 else p.gps_wander_horizontal
+        c[WANDER + k, WANDER + k] += (1.0 - keep * keep) * deviation**2
+        c[IRON + k, IRON + k] += dt * p.magnetometer_bias_walk**2
+    c[BAROMETER, BAROMETER] += dt * p.barometer_walk**2
+
+    for k in range(len(SOURCES)):
+        if m.since[k] >= 0:
+            m.since[k] += 1
+    m.refused[IMU] = 0 if usable else 1
+    if usable:
+        m.since[IMU] = 0
+    nominal = Nominal(
+        attitude,
+        velocity,
+        position,
+        n.gyro_bias,
+        n.accelerometer_bias,
+        scale(keep, n.gps_wander),
+        n.magnetometer_bias,
+        n.heading_bias,
+        n.barometer_bias,
+        n.sonar_scale,
+    )
+    return State(nominal, Inertial(tick, omega, force, f1, velocity_gain, distance_gain, spike), m)

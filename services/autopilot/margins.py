@@ -1,0 +1,83 @@
+"""Stability margins of the loops about hover, from their frequency responses (theory.md, eqs. (4.30)-(4.34))."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from services.autopilot.control import Parameters
+from services.autopilot.gains import Airframe
+from services.autopilot.pid import Pid
+
+FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 250 Hz
+
+
+class Margins(NamedTuple):
+    """How far a loop is from instability."""
+
+    crossover: float  # the highest frequency of unit gain [rad/s]
+    phase: float  # least phase margin over all crossings of unit gain [rad]
+    gain: float  # factor on the gain that makes the loop unstable, from above
+    reduction: float  # factor below 1 on the gain that makes it unstable, 0 where none does
+
+
+def open_loops(
+    p: Parameters, airframe: Airframe, tick: float, delay: int = 1, gain: float = 1.0
+) -> dict[str, np.ndarray]:
+    """Open-loop responses at FREQUENCIES of every loop.
+
+    lift, yaw: their single loops; roll, pitch: the inner loops, the outer ones open; y, x: the outer loops, the inner
+    ones closed; y_motors, x_motors: both loops of an axis, cut where the torque leaves the motors.
+
+    Args:
+        p: the controller.
+        airframe: what it controls.
+        tick: the controller's period [s]; the command is held over it, which delays by half of it.
+        delay: whole ticks between a measurement and its command's effect.
+        gain: true over believed acceleration per thrust, as a lighter or stronger vehicle has it.
+    """
+    s = 1j * FREQUENCIES
+    lag = 1.0 / (1.0 + airframe.motor.time_constant * s)
+    late = gain * np.exp(-(delay + 0.5) * tick * s)
+    arm_x = sum(abs(y) for y in airframe.rotor_y)
+    arm_y = sum(abs(x) for x in airframe.rotor_x)
+    arm_z = 4.0 * airframe.torque_per_thrust
+    i_x, i_y, i_z = airframe.inertia_body
+    loops = {
+        "lift": _pid(p.lift, s) * 4.0 / airframe.mass * lag * late / s**2,
+        "yaw": _pid(p.yaw, s) * arm_z / i_z * lag * late / s**2,
+    }
+    smooth = p.smoothing.bandwidth**2 / (
+        s**2 + 2.0 * p.smoothing.damping * p.smoothing.bandwidth * s + p.smoothing.bandwidth**2
+    )
+    for tilt, way, feedback, outer, effect in (
+        ("roll", "y", -_pid(p.roll_inner, s), p.roll_outer, arm_x / i_x),
+        ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, arm_y / i_y),
+    ):
+        turn = effect * lag * late / s**2  # tilt over quota
+        demand = feedback * smooth  # quota over tilt asked for
+        if p.smoothing.lag > 0.0:
+            demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
+        position = _pid(outer, s) * p.gravity / s**2  # tilt asked for over tilt
+        loops[tilt] = turn * feedback
+        loops[way] = position * turn * demand / (1.0 + turn * feedback)
+        loops[f"{way}_motors"] = turn * (feedback + position * demand)
+    return loops
+
+
+def margins(loop: np.ndarray) -> Margins:
+    """The margins of an open loop sampled at FREQUENCIES; it may begin with any number of integrators."""
+    size, angle = np.abs(loop), np.unwrap(np.angle(loop))
+    unit = np.flatnonzero(np.diff(np.sign(size - 1.0)))
+    turn = np.flatnonzero(np.diff(np.sign(np.cos(0.5 * angle))))  # crossings of -180 degrees and its like
+    at = size[turn]
+    above, below = at[at < 1.0], at[at >= 1.0]
+    return Margins(
+        crossover=float(FREQUENCIES[unit[-1]]),
+        phase=float(np.min(np.abs(np.angle(-loop[unit])))),
+        gain=float(1.0 / above.max()) if above.size else np.inf,
+        reduction=float(1.0 / below.min()) if below.size else 0.0,
+    )
+
+
+def _pid(g: Pid, s: np.ndarray) -> np.ndarray:
+    return g.p + g.i / s + g.d * s

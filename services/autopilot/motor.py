@@ -1,0 +1,31 @@
+"""From thrust to the motor's voltage: the propulsion's static chain backwards (theory.md, eq. (4.24))."""
+
+import math
+from typing import NamedTuple
+
+from dynamics.kernel import leaf
+
+RPM = 30.0 / math.pi  # revolutions per minute of 1 rad/s
+
+
+class Motor(NamedTuple):
+    """What the autopilot knows of a motor with its belt and propeller."""
+
+    thrust_coefficient: float  # thrust over the square of the propeller's speed [N/(rad/s)^2]
+    belt_ratio: float  # propeller speed / motor speed
+    speed_constant: float  # KV [rpm/V]
+    time_constant: float  # of the first-order lag of the speed [s]
+
+
+@leaf
+def voltage(motor, thrust):
+    """The voltage [V] that holds the speed of a thrust [N] >= 0."""
+    propeller = math.sqrt(thrust / motor.thrust_coefficient)
+    return RPM * propeller / (motor.belt_ratio * motor.speed_constant)
+
+
+@leaf
+def thrust_at(motor, volts):
+    """The steady thrust [N] at a voltage [V]; inverse of `voltage`."""
+    propeller = motor.speed_constant * volts * motor.belt_ratio / RPM
+    return motor.thrust_coefficient * propeller * propeller

@@ -1,0 +1,28 @@
+"""One proportional-integral-derivative loop with anti-windup (theory.md, eq. (4.10))."""
+
+from typing import NamedTuple
+
+from dynamics.kernel import leaf
+
+
+class Pid(NamedTuple):
+    """Gains in output units u over error units e; their common sign is free."""
+
+    p: float  # [u/e]
+    i: float  # [u/(e s)]
+    d: float  # [u s/e]
+
+
+@leaf
+def integrate(gains, integral, error, cut, dt):
+    """The integral of the error [e s] after dt [s], held while it would push further into saturation.
+
+    `cut` is the sign of the part of the last output that saturation cut off, 0 where nothing was cut.
+    """
+    return integral if gains.i * error * cut > 0.0 else integral + dt * error
+
+
+@leaf
+def output(gains, integral, error, error_rate):
+    """P error + I integral + D error_rate [u]."""
+    return gains.p * error + gains.i * integral + gains.d * error_rate

@@ -1,0 +1,36 @@
+"""When the motors run: take-off, landing, cut-off (theory.md, section 4.5)."""
+
+from typing import NamedTuple
+
+from dynamics.kernel import leaf
+
+STANDING, FLYING, LANDED = 0, 1, 2  # motors off before take-off, flying, cut off for good
+CUT_HEIGHT = (
+    0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
+)
+PATIENCE = 2.0  # [s] asked to stand and still: the motors stop although the estimated height says otherwise
+DOUBT = 0.5  # [m] how wrong the estimated height may be for that
+STILL = 0.1  # [m/s] vertical speed of a vehicle that stands, as estimated
+
+
+class Stage(NamedTuple):
+    """Where the flight is."""
+
+    name: int  # STANDING, FLYING or LANDED
+    waiting: float  # [s] since the vehicle was asked to stand and seemed still
+
+
+ON_GROUND = Stage(STANDING, 0.0)
+
+
+@leaf
+def advance_stage(stage, resting_height, estimate, setpoint, dt):
+    """The stage one tick of dt [s] on; `resting_height` is world z of the standing vehicle [m]."""
+    height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
+    asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
+    if stage.name == STANDING:
+        return Stage(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else STANDING, 0.0)
+    if stage.name == LANDED or asked_height >= CUT_HEIGHT or asked_speed > 0.0:
+        return Stage(stage.name, 0.0)
+    waiting = stage.waiting + dt if abs(speed) < STILL and height < DOUBT else 0.0
+    return Stage(LANDED if height < CUT_HEIGHT or waiting > PATIENCE else FLYING, waiting)

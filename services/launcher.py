@@ -1,0 +1,234 @@
+"""Starts the services of a scene as processes, watches them, and ends them all together."""
+
+import fcntl
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from services.bus import ZenohBus, mesh
+from services.process import ALIVE_KEY, WAITING_KEY
+
+STALL = 2.5  # [s] without any message after which somebody is held to be frozen
+GRACE = 1.5  # [s] a process gets to end after SIGTERM
+FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick
+WATCHER = "mission"
+REFUSED = 2  # exit code of a service whose user can mend what is wrong
+
+
+class RunFailed(RuntimeError):
+    """A run that did not reach its end; the text names the culprit."""
+
+
+class SpaceInUse(ValueError):
+    """Another run uses this key space."""
+
+
+def loopback_endpoints(names: Iterable[str]) -> dict[str, str]:
+    """A free TCP endpoint on the loopback interface for each name."""
+    sockets = {name: socket.create_server(("127.0.0.1", 0)) for name in names}
+    endpoints = {name: f"tcp/127.0.0.1:{s.getsockname()[1]}" for name, s in sockets.items()}
+    for s in sockets.values():
+        s.close()
+    return endpoints
+
+
+def check_space(space: str) -> None:
+    """Refuse what cannot be the first part of a Zenoh key.
+
+    Raises:
+        ValueError: characters that a key cannot have, or an empty part.
+    """
+    if not re.fullmatch(r"[\w.-]+(/[\w.-]+)*", space, re.ASCII):
+        raise ValueError(f"--space {space}: expected letters, digits, _, - and . (parts joined by /)")
+
+
+@contextmanager
+def key_space(space: str) -> Iterator[None]:
+    """Hold a key space on this machine for the length of a run.
+
+    Raises:
+        SpaceInUse: another run holds it.
+        ValueError: not a key space.
+    """
+    check_space(space)
+    path = Path(tempfile.gettempdir()) / f"lapwing-{os.getuid()}-{space.replace('/', '_')}.lock"
+    with path.open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SpaceInUse(
+                f"--space {space}: another run uses this key space; wait for its end or choose another name"
+            ) from None
+        yield
+
+
+class Watch:
+    """What a launcher sees of a run: who is there, how far it is, what it waits for."""
+
+    def __init__(self, bus: ZenohBus, space: str, topics: Iterable[str]):
+        """Follow the Zenoh keys `topics`; `newest` holds the last (time [ns], payload) of each."""
+        self._space = space
+        self.newest: dict[str, tuple[int, bytes]] = {}
+        self.waiting: dict[str, str] = {}
+        self.present: set[str] = set()
+        self.gone: set[str] = set()
+        self.time_ns = 0
+        self.began: float | None = None  # [s] of the monotonic clock, at the first message
+        self.wall = 0.0  # [s] from the first message to the newest
+        self.ended = False  # the last message has come
+        self.last_news = time.monotonic()
+        self._news = bus.subscribe(*topics, f"{space}/{WAITING_KEY}/*")
+        bus.watch_alive(f"{space}/{ALIVE_KEY}/*", self._alive)
+
+    def _alive(self, key: str, alive: bool) -> None:
+        name = key.rsplit("/", 1)[1]
+        if alive:
+            self.present.add(name)
+            self.gone.discard(name)
+        elif name in self.present:
+            self.gone.add(name)
+
+    def poll(self, seconds: float) -> None:
+        """Take in what arrives during `seconds`."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            news = self._news.get_with_key(timeout=left)
+            if news is None:
+                return
+            key, time_ns, payload = news
+            head, _, name = key.removeprefix(f"{self._space}/").partition("/")
+            if head == WAITING_KEY:
+                self.waiting[name] = payload.decode()
+                continue
+            self.last_news = time.monotonic()
+            self.waiting.clear()
+            if payload:
+                self.began = self.began or self.last_news
+                self.wall = self.last_news - self.began
+                self.time_ns = max(self.time_ns, time_ns)
+                self.newest[key] = (time_ns, payload)
+            else:
+                self.ended = True
+
+    def frozen(self, names: Iterable[str]) -> str | None:
+        """A sentence that names who holds up the run, None while it goes on."""
+        if self.ended or time.monotonic() - self.last_news < STALL:
+            return None
+        silent = sorted(set(names) - set(self.waiting))
+        where = f"at t = {self.time_ns * 1e-9:.3f} s"
+        if silent:
+            return f"{', '.join(silent)}: no answer since {STALL:g} s, {where}"
+        return f"the run stands still {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())
+
+
+def launch(
+    names: list[str],
+    command: Callable[[str], list[str]],
+    space: str,
+    topics: list[str],
+    observe: Callable[[Watch], bool],
+) -> None:
+    """Run the services `names` as processes of this one until the run has ended.
+
+    Args:
+        names: the services.
+        command: the arguments of `lapwing` that start one of them, without its endpoints.
+        space: the key space.
+        topics: Zenoh keys to follow.
+        observe: called about five times a second; says whether to stop.
+
+    Raises:
+        RunFailed: a service died or froze.
+        ValueError: a service refused to start; the text says why.
+    """
+    endpoints = loopback_endpoints([*names, WATCHER])
+    peers = ",".join(f"{name}={endpoint}" for name, endpoint in endpoints.items())
+    children: dict[str, subprocess.Popen] = {}
+    errors = {name: tempfile.TemporaryFile() for name in names}  # noqa: SIM115 (closed below, with the processes)
+    try:
+        for name in names:
+            arguments = [sys.executable, "-m", "services.cli", *command(name), "--peers", peers, "--with-parent"]
+            children[name] = subprocess.Popen(
+                arguments, stdin=subprocess.PIPE, stdout=errors[name], stderr=errors[name], start_new_session=True
+            )
+        listen, connect = mesh(WATCHER, endpoints)
+        with ZenohBus(listen, connect) as bus:
+            try:
+                _follow(Watch(bus, space, topics), children, observe, errors)
+            finally:
+                _ask_to_end(children)  # before this session closes, which takes a while
+    finally:
+        _end(children)
+        for file in errors.values():
+            file.close()
+
+
+def _follow(watch: Watch, children: dict, observe: Callable[[Watch], bool], errors: dict) -> None:
+    ended_at = None
+    while any(child.poll() is None for child in children.values()):
+        watch.poll(0.2)
+        for name, child in children.items():
+            code = child.poll()
+            if code == REFUSED:
+                raise ValueError(f"{name}{_last_words(errors[name])}")
+            if code is not None and (code != 0 or (not watch.ended and ended_at is None and not _grace(watch))):
+                raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
+        if set(children) <= watch.present and (culprit := watch.frozen(children)):
+            raise RunFailed(culprit)
+        if not watch.present >= set(children):
+            watch.last_news = time.monotonic()
+        if observe(watch):
+            return
+        if watch.ended:
+            ended_at = ended_at or time.monotonic()
+            if time.monotonic() - ended_at > FAREWELL:
+                left = ", ".join(name for name, child in children.items() if child.poll() is None)
+                raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
+    observe(watch)
+
+
+def _grace(watch: Watch) -> bool:
+    """Whether the news of the end arrives now, just after a process that knew of it has ended."""
+    watch.poll(0.5)
+    return watch.ended
+
+
+def _at(watch: Watch) -> str:
+    return f"at t = {watch.time_ns * 1e-9:.3f} s"
+
+
+def _reason(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _last_words(file: "tempfile._TemporaryFileWrapper") -> str:  # type: ignore[name-defined]
+    file.seek(0)
+    lines = file.read().decode(errors="replace").strip().splitlines()
+    return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
+
+
+def _ask_to_end(children: dict[str, subprocess.Popen]) -> None:
+    for child in children.values():
+        if child.poll() is None:
+            child.terminate()
+
+
+def _end(children: dict[str, subprocess.Popen]) -> None:
+    """End what still runs: first asked, then forced."""
+    _ask_to_end(children)
+    deadline = time.monotonic() + GRACE
+    for child in children.values():
+        try:
+            child.wait(timeout=max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+        if child.stdin:
+            child.stdin.close()

@@ -1,0 +1,1 @@
+"""The dynamics plant: owns time, turns motor voltages into motion."""

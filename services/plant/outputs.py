@@ -1,0 +1,99 @@
+"""The plant's state as messages."""
+
+import math
+from typing import Any
+
+from dynamics.effects._types import Motion
+from dynamics.lie.quaternion import rotate_back
+from dynamics.vehicles.multirotor import MultirotorObservation
+from messages import (
+    BatteryState,
+    Clock,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    Quaternion,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+    VehicleState,
+    header,
+    stamp,
+)
+
+WORLD = "world"
+
+
+def _pose(motion: Motion) -> Any:
+    q = motion.attitude
+    return Pose(Point(*motion.position_world), Quaternion(q.x, q.y, q.z, q.w))
+
+
+def truth(time_ns: int, vehicle: str, motion: Motion, seen: MultirotorObservation) -> Any:
+    """The whole true state."""
+    return VehicleState(
+        header(time_ns, WORLD),
+        _pose(motion),
+        Vector3(*motion.velocity_world),
+        Vector3(*motion.omega_body),
+        Vector3(*seen.acceleration_world),
+        rotor_speed=motion.rotor_speed,
+        motor_voltage=seen.motor_voltage,
+        motor_current=seen.motor_current,
+        motor_power=seen.motor_power,
+        rotor_thrust=seen.thrust,
+        rotor_torque=seen.torque,
+        wind=Vector3(*seen.wind_world),
+        air_density=seen.air_density,
+        ground_contact=seen.in_contact,
+    )
+
+
+def pose(time_ns: int, motion: Motion) -> Any:
+    """Pose of the body in the world."""
+    return PoseStamped(header(time_ns, WORLD), _pose(motion))
+
+
+def odometry(time_ns: int, vehicle: str, motion: Motion) -> Any:
+    """Pose in the world, velocities in the body frame, as nav_msgs defines them."""
+    velocity_body = rotate_back(motion.attitude, motion.velocity_world)
+    twist = Twist(Vector3(*velocity_body), Vector3(*motion.omega_body))
+    exact = (0.0,) * 36
+    return Odometry(
+        header(time_ns, WORLD), vehicle, PoseWithCovariance(_pose(motion), exact), TwistWithCovariance(twist, exact)
+    )
+
+
+def transform(time_ns: int, vehicle: str, motion: Motion) -> Any:
+    """The frame tree: world to body."""
+    q = motion.attitude
+    body = Transform(Vector3(*motion.position_world), Quaternion(q.x, q.y, q.z, q.w))
+    return TFMessage((TransformStamped(header(time_ns, WORLD), vehicle, body),))
+
+
+def clock(time_ns: int) -> Any:
+    """Simulation time."""
+    return Clock(stamp(time_ns))
+
+
+def battery(time_ns: int, vehicle: str, voltage: float, current: float, cells: int) -> Any:
+    """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it."""
+    return BatteryState(
+        header(time_ns, vehicle),
+        voltage=voltage,
+        temperature=math.nan,
+        current=-current,
+        charge=math.nan,
+        capacity=math.nan,
+        design_capacity=math.nan,
+        percentage=math.nan,
+        power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+        power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
+        present=True,
+        cell_voltage=(voltage / cells,) * cells if cells else (),
+    )

@@ -1,0 +1,1 @@
+"""Writes what the services say to an MCAP log."""

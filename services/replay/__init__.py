@@ -1,0 +1,1 @@
+"""Publishes a log as the live run did."""

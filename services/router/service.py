@@ -1,0 +1,19 @@
+"""The door for programs outside a run, a viewer or a ROS 2 bridge: they connect to it as clients.
+
+It is no part of the lock step: the services are joined pairwise, and the router only passes on what they publish.
+"""
+
+import time
+
+from services.process import POLL, Process
+from services.table import RECORDER
+
+MODE = "router"  # of its Zenoh session: peers do not pass on to clients
+
+
+def run(process: Process, log: None) -> None:
+    """Keep the door open until the recorder has the whole run, or until asked to stop."""
+    process.join()
+    process.end_with(RECORDER)
+    while not process.stopping:
+        time.sleep(POLL)

@@ -1,0 +1,86 @@
+"""Static-pressure sensor (theory.md, section 3.2)."""
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Lt
+
+from dynamics.geodesy import air_pressure
+from dynamics.kernel import kernel
+from dynamics.noise import TURN_ON, normal, normal3
+from dynamics.vector import Vec3
+from services.sensors import errors
+from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+
+CHANNELS = ("pressure",)
+
+
+class Barometer(NamedTuple):
+    """Parameters."""
+
+    noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
+    bias_instability_pa: Annotated[float, Ge(0)] = 0.0  # peak of the Allan deviation of the bias walk, with the weather
+    bias_time: Annotated[float, Gt(0)] = 1000.0  # [s] correlation time of the bias walk
+    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # one standard deviation
+    scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
+    range_pa: Annotated[float, Gt(0)] = math.inf
+    resolution_pa: Annotated[float, Ge(0)] = 0.0
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
+    faults: tuple[Fault, ...] | None = None
+
+
+class BarometerState(NamedTuple):
+    """State of a barometer."""
+
+    scale: float
+    turn_on: float  # [Pa]
+    walk: Vec3  # [Pa], the first of the three
+    line: Line  # the first of the three
+
+
+class BarometerReading(NamedTuple):
+    """One reading."""
+
+    pressure: float  # [Pa]
+    variance: float  # [Pa^2], of the white noise
+    valid: bool
+
+
+@kernel
+def initial(p, key, truth):
+    """State before the first sample."""
+    draw = normal3(key, TURN_ON, 0)
+    true = air_pressure(truth.home.height + truth.position_world[2], truth.temperature_celsius)
+    scale = 1.0 + p.scale_error * draw[0]
+    turn_on = p.turn_on_pa * draw[1]
+    walk = errors.walk_deviation(p.bias_instability_pa) * draw[2]
+    return BarometerState(scale, turn_on, (walk, 0.0, 0.0), new_line((scale * true + turn_on + walk, 0.0, 0.0)))
+
+
+@kernel
+def sample(p, s, key, tick, truth):
+    """Next state and reading; arguments as of `imu.sample`."""
+    deviation = errors.walk_deviation(p.bias_instability_pa)
+    walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
+    noise = errors.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
+    true = air_pressure(truth.home.height + truth.position_world[2], truth.temperature_celsius)
+    measured = s.scale * true + s.turn_on + walk[0] + noise
+    measured = errors.quantise(errors.limit(measured, p.range_pa), p.resolution_pa)
+    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
+    variance = errors.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
+    return BarometerState(s.scale, s.turn_on, walk, line), BarometerReading(arrived[0], variance, valid)
+
+
+# TE MS5611-01BA03 data sheet: 1.2 Pa RMS and 1 Pa resolution at the highest oversampling, +-150 Pa, 1.2 bar. Here
+# 1.5 Pa in samples at 50 Hz; instability (weather, warming) chosen.
+MS5611 = Barometer(
+    noise_pa_per_sqrt_hz=0.3,
+    bias_instability_pa=3.0,
+    turn_on_pa=75.0,
+    scale_error=1e-4,
+    range_pa=120e3,
+    resolution_pa=1.0,
+)
+
+PRESETS = {"ms5611": MS5611, "ideal": Barometer()}

@@ -1,0 +1,91 @@
+"""Ultrasonic range finder that looks down (theory.md, section 3.2)."""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Lt
+
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotation_matrix
+from dynamics.noise import TURN_ON, normal
+from services.sensors import errors
+from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+
+CHANNELS = ("range",)
+
+
+class Sonar(NamedTuple):
+    """Parameters of a range finder at the body's origin, along -z of the body."""
+
+    noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
+    scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: speed of sound
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m]
+    range_max: Annotated[float, Gt(0)] = math.inf  # [m]
+    resolution: Annotated[float, Ge(0)] = 0.0  # [m]
+    half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # the nearest ground within the beam gives the echo
+    tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # tilted more, the echo goes elsewhere
+    rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
+    faults: tuple[Fault, ...] | None = None
+
+
+class SonarState(NamedTuple):
+    """State of a sonar."""
+
+    scale: float
+    line: Line  # the first of the three
+
+
+class SonarReading(NamedTuple):
+    """One reading, as sensor_msgs/Range has it."""
+
+    range: float  # [m], rounded to float32; +inf: no echo, -inf: nearer than range_min
+    variance: float  # [m^2], of the white noise, rounded to float32
+    valid: bool
+
+
+@leaf
+def _distance(p, truth):
+    """Distance to level ground along the ray of the beam nearest to the vertical; +inf without an echo (eq. (3.16))."""
+    cosine = rotation_matrix(truth.attitude)[8]
+    tilt = math.acos(min(max(cosine, -1.0), 1.0))
+    if tilt > math.radians(p.tilt_max_deg):
+        return math.inf
+    return truth.height_above_ground / math.cos(max(0.0, tilt - math.radians(p.half_beam_deg)))
+
+
+@kernel
+def initial(p, key, truth):
+    """State before the first sample."""
+    return SonarState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((_distance(p, truth), 0.0, 0.0)))
+
+
+@kernel
+def sample(p, s, key, tick, truth):
+    """Next state and reading; arguments as of `imu.sample`."""
+    noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
+    measured = (s.scale * _distance(p, truth) + noise, 0.0, 0.0)
+    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
+    distance = errors.quantise(arrived[0], p.resolution)
+    if distance > p.range_max:
+        distance = math.inf
+    elif distance < p.range_min:
+        distance = -math.inf
+    variance = errors.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
+    return SonarState(s.scale, line), SonarReading(float(np.float32(distance)), float(np.float32(variance)), valid)
+
+
+# MaxBotix MB1202 (I2CXL-MaxSonar-EZ0) data sheet: 42 kHz, 0.20 to 7.65 m, 1 cm, widest beam of its family; from there
+# the echo takes 45 ms, so 10 Hz is safe. Noise, speed-of-sound error, beam and lost-echo angles: chosen.
+MB1202 = Sonar(
+    noise_m_per_sqrt_hz=2e-3,
+    scale_error=2e-3,
+    range_min=0.20,
+    range_max=7.65,
+    resolution=0.01,
+    half_beam_deg=10.0,
+    tilt_max_deg=25.0,
+)
+
+PRESETS = {"mb1202": MB1202, "ideal": Sonar(half_beam_deg=MB1202.half_beam_deg)}  # the beam is no error

@@ -1,0 +1,34 @@
+"""The kinds of segment a channel can be built of: one file each, found by its name.
+
+To add a kind, add a file with one subclass of `Segment` and a test of it; a scene names it by its `kind`.
+"""
+
+import importlib
+import pkgutil
+
+from services.trajectory.segments.segment import Segment
+
+
+def _discover() -> dict[str, type[Segment]]:
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+    return {cls.kind_name(): cls for cls in sorted(Segment.__subclasses__(), key=lambda cls: cls.kind_name())}
+
+
+KINDS = _discover()
+"""Segment class by kind."""
+
+
+def choose(table: object) -> Segment:
+    """The validated segment that a table of a scene describes.
+
+    Raises ValueError for anything but a table with a known `kind`; names the choices.
+    """
+    if isinstance(table, Segment):
+        return table
+    choices = ", ".join(KINDS)
+    if not isinstance(table, dict) or "kind" not in table:
+        raise ValueError(f"a segment is a table with a kind ({choices}), not {table!r}")
+    if table["kind"] not in KINDS:
+        raise ValueError(f"unknown kind of segment {table['kind']!r}; choose one of {choices}")
+    return KINDS[table["kind"]].model_validate(table)

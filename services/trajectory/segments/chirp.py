@@ -1,0 +1,28 @@
+"""A sine whose frequency sweeps linearly: to identify a loop's response from a recorded flight."""
+
+import math
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Finite, Positive, Segment
+
+
+class Chirp(Segment):
+    """start + amplitude sin(phase), phase of linearly rising frequency (theory.md, eq. (4.4))."""
+
+    kind: Literal["chirp"] = "chirp"
+    amplitude: Finite  # [u]
+    first_frequency: Positive  # [Hz]
+    last_frequency: Positive  # [Hz]
+    duration: Positive  # [s]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """One swept piece."""
+        sweep = math.pi * (self.last_frequency - self.first_frequency) / self.duration
+        return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.first_frequency, sweep)]
+
+    def end(self, start: float, folder: Path) -> float:
+        """The value of the chirp where it is cut."""
+        cycles = 0.5 * (self.first_frequency + self.last_frequency) * self.duration
+        return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

@@ -1,0 +1,18 @@
+"""Stay at the value reached."""
+
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Positive, Segment
+
+
+class Hold(Segment):
+    """Constant for `duration`."""
+
+    kind: Literal["hold"] = "hold"
+    duration: Positive  # [s]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """One constant piece."""
+        return [Piece(self.duration, (start,))]

@@ -1,0 +1,24 @@
+"""The quintic of least squared jerk between two points of rest."""
+
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Finite, Positive, Segment
+
+
+class MinimumJerk(Segment):
+    """10 s^3 - 15 s^4 + 6 s^5 to the value `to` over `duration`: continuous acceleration (theory.md, eq. (4.3))."""
+
+    kind: Literal["minimum_jerk"] = "minimum_jerk"
+    to: Finite  # [u]
+    duration: Positive  # [s]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """One quintic piece."""
+        change, T = self.to - start, self.duration
+        return [Piece(T, (start, 0.0, 0.0, 10.0 * change / T**3, -15.0 * change / T**4, 6.0 * change / T**5))]
+
+    def end(self, start: float, folder: Path) -> float:
+        """`to`."""
+        return self.to

@@ -1,0 +1,27 @@
+"""A sine about the value reached."""
+
+import math
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Finite, Positive, Segment
+
+
+class Sine(Segment):
+    """start + amplitude sin(2 pi frequency t) for `duration` (theory.md, eq. (4.4) with f_0 = f_1)."""
+
+    kind: Literal["sine"] = "sine"
+    amplitude: Finite  # [u]
+    frequency: Positive  # [Hz]
+    duration: Positive  # [s]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """One sinusoidal piece."""
+        return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.frequency)]
+
+    def end(self, start: float, folder: Path) -> float:
+        """The value of the sine where it is cut."""
+        cycles = self.frequency * self.duration
+        # Whole cycles end where they began: 2 pi n is not representable and would leave a step of rounding.
+        return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

@@ -1,0 +1,24 @@
+"""A cubic that starts and ends at rest."""
+
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Finite, Positive, Segment
+
+
+class Smoothstep(Segment):
+    """3 s^2 - 2 s^3 to the value `to` over `duration`: continuous velocity (theory.md, eq. (4.2))."""
+
+    kind: Literal["smoothstep"] = "smoothstep"
+    to: Finite  # [u]
+    duration: Positive  # [s]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """One cubic piece."""
+        change, T = self.to - start, self.duration
+        return [Piece(T, (start, 0.0, 3.0 * change / T**2, -2.0 * change / T**3))]
+
+    def end(self, start: float, folder: Path) -> float:
+        """`to`."""
+        return self.to

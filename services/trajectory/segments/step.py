@@ -1,0 +1,22 @@
+"""A jump: the only segment that may break the continuity of a channel."""
+
+from pathlib import Path
+from typing import Literal
+
+from services.trajectory.piece import Piece
+from services.trajectory.segments.segment import Finite, Segment
+
+
+class Step(Segment):
+    """Jump to the value `to` at once; it takes no time."""
+
+    kind: Literal["step"] = "step"
+    to: Finite  # [u]
+
+    def pieces(self, start: float, folder: Path) -> list[Piece]:
+        """None: what follows starts at the new value."""
+        return []
+
+    def end(self, start: float, folder: Path) -> float:
+        """`to`."""
+        return self.to
