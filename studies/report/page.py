@@ -1,0 +1,124 @@
+"""The page: what the flight came to, and the plots."""
+
+import base64
+import io
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from jinja2 import Template
+from matplotlib.figure import Figure
+
+from studies.flown import AXES, Flown
+from studies.report import plots
+from studies.report.style import DPI, NotRecordedError, styled
+
+_TEMPLATE = Path(__file__).with_name("template.html")
+
+
+class Section(NamedTuple):
+    """A plot on the page: its PNG in base64 and caption, or why there is none."""
+
+    name: str
+    title: str
+    png: str = ""
+    caption: str = ""
+    missing: str = ""
+
+
+class Accuracy(NamedTuple):
+    """A line of the table of errors; `published` is None where nothing is."""
+
+    axis: str
+    unit: str
+    rmse: float
+    published: float | None
+
+
+def write(log: Path) -> Path:
+    """Write the report of a flight beside its MCAP log, with the ending .html, and return its path.
+
+    Raises:
+        ValueError: no such file, no MCAP log, no flight in it, or the report cannot be written.
+    """
+    log = Path(log)
+    flown = Flown(log)
+    scene = _scene(flown)
+    published = scene.get("published", {})
+    page = Template(
+        _TEMPLATE.read_text(encoding="utf-8"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    ).render(
+        log=log.name,
+        title=scene.get("run", {}).get("title", ""),
+        scene=flown.metadata.get("scene", ""),
+        facts=facts(flown),
+        accuracy=accuracy(flown, published.get("rmse", {})),
+        source=published.get("source", "published") if published.get("rmse") else "",
+        sections=sections(flown),
+    )
+    target = log.with_suffix(".html")
+    try:
+        target.write_text(page, encoding="utf-8")
+    except OSError as fault:
+        raise ValueError(f"{target}: cannot write the report: {fault.strerror or fault}") from None
+    return target
+
+
+def facts(flown: Flown) -> dict[str, str]:
+    """What identifies the flight and how it ended, by name."""
+    said = flown.metadata
+    t = flown.times("truth")
+    found = {
+        "vehicle": flown.vehicle,
+        "duration": f"{t[-1] - t[0]:.2f} s",
+        "landed": "yes" if flown.landed else "no",
+        "seed": said.get("seed", ""),
+        "mode": said.get("mode", ""),
+        "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
+        "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
+        "version": said.get("version", ""),
+        "commit": said.get("commit", ""),
+        "digest": flown.digest or "none: the log has no end",
+    }
+    return {name: value for name, value in found.items() if value}
+
+
+def accuracy(flown: Flown, published: dict[str, float]) -> list[Accuracy]:
+    """Root-mean-square error of each axis beside the published one; empty without a reference."""
+    units = dict(zip(AXES, ("m", "m", "m", "rad", "rad", "rad"), strict=True))
+    return [Accuracy(axis, units[axis], rmse, published.get(axis)) for axis, rmse in flown.rmse().items()]
+
+
+def sections(flown: Flown) -> list[Section]:
+    """Every plot that the log has the topics for, and a line for each of the others."""
+    return [_section(module, flown) for module in plots.modules()]
+
+
+def _section(module, flown: Flown) -> Section:
+    name = module.__name__.rpartition(".")[2]
+    lacking = [topic for topic in module.NEEDS if not flown.has(topic)]
+    if lacking:
+        return Section(name, module.TITLE, missing=f"the log has no topic {', '.join(lacking)}")
+    try:
+        with styled():
+            figure, caption = module.draw(flown)
+            return Section(name, module.TITLE, _png(figure), caption)
+    except NotRecordedError as reason:
+        return Section(name, module.TITLE, missing=str(reason))
+
+
+def _png(figure: Figure) -> str:
+    """The figure as PNG in base64."""
+    file = io.BytesIO()
+    # Compression level 3 is faster than the usual 6; the file is a tenth larger.
+    figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    return base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def _scene(flown: Flown) -> dict:
+    """The scene that the log carries; empty if it carries none."""
+    text = flown.attachments.get("scene.toml", b"")
+    try:
+        return tomllib.loads(text.decode("utf-8"))
+    except ValueError as fault:
+        raise ValueError(f"{flown.path}: its attachment scene.toml is not valid TOML: {fault}") from None
