@@ -1,0 +1,37 @@
+"""How fast the delivery mission flies: real-time factor with a process for each service, and with one for all.
+
+    python -m benchmarks.mission [REPEATS]
+
+The log is written in both modes. Kernels are compiled before anything is timed.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from statistics import median
+
+SCENE = "scenes/delivery_mission.toml"
+
+
+def fly(mode, folder):
+    """The figures of one run."""
+    figures = Path(folder, "figures.json")
+    arguments = ["run", SCENE, "--mode", mode, "--log", str(Path(folder, "log.mcap")), "--json", str(figures)]
+    subprocess.run([sys.executable, "-m", "services.cli", *arguments, "--space", "benchmark"], check=True,
+                   stdout=subprocess.DEVNULL)  # fmt: skip
+    return json.loads(figures.read_text())
+
+
+def main(repeats=3):
+    with tempfile.TemporaryDirectory() as folder:
+        fly("single", folder)
+        runs = {mode: [fly(mode, folder) for _ in range(repeats)] for mode in ("processes", "single")}
+    assert len({run["digest"] for mode in runs.values() for run in mode}) == 1, "the digests differ"
+    for mode, figures in runs.items():
+        print(f"mission, {mode:9}: real-time factor {median(run['real_time_factor'] for run in figures):6.1f}")
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

@@ -1,0 +1,162 @@
+"""Time of a plant step in nanoseconds, with the ratio to hand-written C++ in the same run.
+
+    python -m benchmarks.plant
+
+Best of many short runs, so that other work on the machine shows least. "bare" is gravity, thrust and lag; its kernel
+"without the catalogue" is written by hand here and knows of no effects: what inactive effects cost is the ratio.
+"""
+
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from dynamics import effects, noise
+from dynamics.effects._rotors import total
+from dynamics.effects._types import Motion
+from dynamics.integrators import get, rk4_renormalised
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotation_matrix
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import load_airframe
+
+HERE = Path(__file__).parent
+DRONE = load_airframe(HERE.parent / "scenes/vehicles/delivery_drone.toml")
+RK4 = get("rk4_renormalised").Method()
+KEY = noise.stream_key(1, "drone1", "effects")
+H, STEPS, REPETITIONS = 1e-3, 10_000, 60
+HOVER = (31.6, 31.61, 31.62, 31.6)  # nearly: all four rotors and all axes take part
+
+BARE = {"gravity": {}, "rotor_thrust": {}}
+MISSION = BARE | {"air_density": {}, "rotor_gyro": {}, "wind_random": {"mean": [3.0, 1.0, 0.0]}, "ground_contact": {}}
+ALL = {name: {} for name in effects.names() if name not in ("gravity", "rotor_quadratic")} | {
+    "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
+    "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 1.0, "duration": 1.0},
+    "wind_dryden": {"wind_speed": 5.0, "airspeed": 5.0},
+    "payload": {"release_time": 1.0},
+    "rotor_damage": {"rotor": 1, "time": 1.0, "thrust_left": 0.95, "torque_left": 0.95},
+}
+
+
+@kernel
+def exchanges(method, p, key, state, command, h, n, ticks):
+    for tick in range(ticks):
+        state = multirotor.advance(method, p, key, tick, state, command, h, n)
+    return state
+
+
+def best(*runs):
+    """Least ns per step of each, the runs taking turns so that they share the machine's moods."""
+    for run in runs:
+        run()
+    times = [[] for _ in runs]
+    for _ in range(REPETITIONS):
+        for run, taken in zip(runs, times, strict=True):
+            start = time.perf_counter()
+            run()
+            taken.append(time.perf_counter() - start)
+    least = [min(taken) / STEPS * 1e9 for taken in times]
+    return least if len(runs) > 1 else least[0]
+
+
+def measure(tables, height, command, n):
+    """ns per step, n steps in an exchange."""
+    p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
+    state = multirotor.initial_state(p, (0.0, 0.0, height), rotor_speed=330.0 if height > 1.0 else 0.0)
+    return best(lambda: exchanges(RK4, p, KEY, state, command, H, n, STEPS // n))
+
+
+@leaf
+def bare_rate(drive, t, m):
+    p, v = drive
+    layout, speed = p.layout, m.rotor_speed
+    gravity, rotor = p.effects
+    b, d = rotor.thrust_constant * multirotor.STANDARD_DENSITY, rotor.torque_constant * multirotor.STANDARD_DENSITY
+    s = (speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3])
+    f = (b * s[0], b * s[1], b * s[2], b * s[3])
+    q = (d * s[0], d * s[1], d * s[2], d * s[3])
+    x, y, sign = layout.x_body, layout.y_body, layout.yaw_sign
+    torque = (
+        (y[0] * f[0] + y[1] * f[1]) + (y[2] * f[2] + y[3] * f[3]),
+        -((x[0] * f[0] + x[1] * f[1]) + (x[2] * f[2] + x[3] * f[3])),
+        (sign[0] * q[0] + sign[1] * q[1]) + (sign[2] * q[2] + sign[3] * q[3]),
+    )
+    R, lift, k = rotation_matrix(m.attitude), total(f), p.body.inverse_mass
+    acceleration = (k * (R[2] * lift), k * (R[5] * lift), k * (R[8] * lift - gravity.acceleration * p.body.mass))
+    spin = multirotor._angular_acceleration(p.body, m.omega_body, torque)
+    a, r = layout.lag_rate, layout.speed_per_volt
+    lag = (a * (r * v[0] - speed[0]), a * (r * v[1] - speed[1]), a * (r * v[2] - speed[2]), a * (r * v[3] - speed[3]))
+    return Motion(m.velocity_world, m.omega_body, acceleration, spin, lag)
+
+
+one_step = rk4_renormalised.step
+
+
+@kernel
+def bare_steps(p, motion, command, h, n):
+    for i in range(n):
+        motion = one_step(bare_rate, (p, command), i * h, motion, h)
+    return motion
+
+
+def bare():
+    """(with the catalogue, without it), ns per step, and the position reached with it."""
+    p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
+    state = multirotor.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=330.0)
+    with_catalogue, without = best(
+        lambda: exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1),
+        lambda: bare_steps(p, state.motion, HOVER, H, STEPS),
+    )
+    reached = exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1).motion.position_world
+    return with_catalogue, without, reached
+
+
+def peer():
+    """(ns per step of the C++ peer, position reached); None where there is no compiler."""
+    if not shutil.which("g++"):
+        return None
+    p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
+    density, rotor = multirotor.STANDARD_DENSITY, p.effects[1]
+    numbers = [
+        p.body.mass, *p.body.inertia, *p.layout.x_body, *p.layout.y_body, *p.layout.yaw_sign,
+        rotor.thrust_constant * density, rotor.torque_constant * density, p.effects[0].acceleration, p.layout.lag_rate,
+        *(p.layout.speed_per_volt * v for v in HOVER), H, 10.0, 330.0,
+    ]  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "plant"
+        flags = ["-O3", "-march=native", "-ffp-contract=off", "-std=c++17"]
+        subprocess.run(["g++", *flags, str(HERE / "plant.cpp"), "-o", str(program)], check=True)
+        arguments = [str(program), str(STEPS), str(REPETITIONS)]
+        text = subprocess.run(
+            arguments, input=" ".join(map(repr, numbers)), capture_output=True, text=True, check=True
+        ).stdout.split()
+    return float(text[0]), tuple(map(float, text[1:]))
+
+
+def main() -> None:
+    with_catalogue, without, reached = bare()
+    rows = [
+        ("bare", with_catalogue),
+        ("bare, kernel without the catalogue", without),
+        ("mission, airborne", measure(MISSION, 2000.0, HOVER, STEPS)),
+        ("mission, airborne, exchange every 4 steps", measure(MISSION, 2000.0, HOVER, 4)),
+        ("mission, standing", measure(MISSION, 0.35, (0.0,) * 4, STEPS)),
+        (f"{len(ALL)} effects, airborne", measure(ALL, 2000.0, HOVER, STEPS)),
+        (f"{len(ALL)} effects, airborne, exchange every 4 steps", measure(ALL, 2000.0, HOVER, 4)),
+        (f"{len(ALL)} effects, standing", measure(ALL, 0.35, (0.0,) * 4, STEPS)),
+    ]
+    other = peer()
+    if other:
+        rows.append(("bare, hand-written C++ (g++ -O3)", other[0]))
+        error = max(abs(a - b) for a, b in zip(reached, other[1], strict=True))
+        print(f"C++ and plant end {error:.1e} m apart after {STEPS} steps")
+    reference = other[0] if other else without
+    print(f"{'RK4 step of the plant':55}   ns  ratio to {'C++' if other else 'bare'}")
+    for name, value in rows:
+        print(f"{name:55} {value:5.1f}  {value / reference:5.2f}")
+    print(f"inactive effects: {with_catalogue / without:.3f} of the kernel that knows none")
+
+
+if __name__ == "__main__":
+    main()
