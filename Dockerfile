@@ -1,0 +1,63 @@
+# Lapwing's images: `runtime` (every service, the launcher, replay) and `tests`.
+#
+#   make docker-build            also where no image can be pulled and no package index is reached from a container
+#   docker compose build         where both can
+#
+# BASE is any image with Debian bookworm, Python 3.11 with pip, and passwd; deploy/base-image.sh makes one. Debian's
+# release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder of
+# older engines takes it too: no mounts, no here-documents.
+ARG BASE=python:3.11-slim-bookworm
+
+
+FROM ${BASE} AS dependencies
+# Where pip looks, when there are no wheels in build/wheels; only in this stage, of which no layer is shipped.
+ARG PIP_INDEX_URL
+ARG PIP_EXTRA_INDEX_URL
+ARG PIP_TRUSTED_HOST
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
+COPY deploy/requirements.lock deploy/requirements-tests.lock deploy/slim.py deploy/install.sh build/wheel[s] /build/
+RUN /build/install.sh
+
+
+FROM ${BASE} AS runtime
+# Machine code for a fixed kind of processor, so that the kernels warmed here are found on every machine. Scalar code
+# is as fast as the host's own kind; the numbers are the same bits. On ARM: --build-arg NUMBA_CPU_NAME=generic.
+ARG NUMBA_CPU_NAME=x86-64-v3
+ENV PATH=/opt/lapwing/bin:$PATH \
+    NUMBA_CPU_NAME=${NUMBA_CPU_NAME} \
+    NUMBA_CPU_FEATURES= \
+    LAPWING_CACHE=/var/cache/lapwing \
+    MPLCONFIGDIR=/var/cache/lapwing/matplotlib \
+    HOME=/tmp \
+    PYTHONUNBUFFERED=1
+RUN useradd --uid 1000 --home-dir /app --no-create-home --shell /usr/sbin/nologin lapwing
+COPY --from=dependencies /opt/lapwing /opt/lapwing
+WORKDIR /app
+COPY pyproject.toml README.md ./
+COPY dynamics dynamics
+COPY messages messages
+COPY services services
+COPY studies studies
+COPY scenes scenes
+COPY deploy/entrypoint.sh deploy/warm.sh /opt/lapwing/bin/
+RUN warm.sh
+USER lapwing
+ENTRYPOINT ["entrypoint.sh"]
+CMD ["lapwing", "--help"]
+
+
+FROM runtime AS tests
+USER root
+COPY --from=dependencies /opt/lapwing-tests /opt/lapwing-tests
+ENV PYTHONPATH=/opt/lapwing-tests PYTHONDONTWRITEBYTECODE=1
+COPY benchmarks benchmarks
+COPY deploy deploy
+COPY docs docs
+COPY tests tests
+COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose.yml ./
+USER lapwing
+CMD ["python", "-m", "pytest", "-p", "no:cacheprovider"]
+
+
+# What `docker build .` gives.
+FROM runtime

@@ -1,0 +1,94 @@
+#!/bin/sh
+# Proves the images on a running engine (`make docker-test`): the mission flies in containers, to the same bits.
+#
+#   [LAPWING=.venv/bin/lapwing] [BASE=IMAGE] deploy/docker_test.sh
+#
+# Works in a folder and a compose project of its own and removes both; the images stay, so a second run is fast.
+set -eu
+cd "$(dirname "$0")/.."
+. deploy/compose.sh
+
+skip() { echo "docker-test: skipped: $*"; exit 0; }
+docker info > /dev/null 2>&1 || skip "no Docker engine answers"
+$COMPOSE version > /dev/null 2>&1 || skip "no docker compose"
+
+LAPWING=$(realpath --no-symlinks "${LAPWING:-.venv/bin/lapwing}")
+SCENE=scenes/delivery_mission.toml
+IMAGE=${IMAGE:-lapwing}
+LIMIT=700000000 # [bytes] of an image
+TIMEOUT=300     # [s] for the mission to begin, fly and end
+PORT=${PORT:-0}   # any free one
+export SCENE IMAGE PORT
+
+deploy/build.sh
+
+work=$(mktemp -d)
+COMPOSE_PROJECT_NAME="lapwing-test-$$"
+export COMPOSE_PROJECT_NAME
+cleanup() {
+    cd "$work"
+    $COMPOSE down --timeout 2 --volumes --remove-orphans > /dev/null 2>&1 || true
+    cd /
+    rm -rf "$work"
+}
+trap cleanup EXIT
+trap 'exit 1' INT TERM
+
+fail() {
+    echo "docker-test: FAILED: $*" >&2
+    tail -40 "$work/compose.log" >&2 2> /dev/null || true
+    exit 1
+}
+passed() { echo "docker-test: $*"; }
+
+for image in "$IMAGE" "$IMAGE-tests"; do
+    size=$(docker image inspect --format '{{.Size}}' "$image")
+    [ "$size" -lt $LIMIT ] || fail "$image has $size bytes, allowed are $LIMIT"
+    [ "$(docker run --rm --network none "$image" id -u)" -ne 0 ] || fail "$image runs as root"
+    passed "$image: $((size / 1000000)) MB, not root"
+done
+
+# A user's folder; where that can be tried it belongs to somebody who is neither root nor known to the image.
+cp -r docker-compose.yml scenes "$work/"
+mkdir "$work/recordings"
+if [ "$(id -u)" -eq 0 ]; then chown 4321:4321 "$work/recordings"; fi
+owner=$(stat -c %u:%g "$work/recordings")
+cd "$work"
+
+begun=$(date +%s)
+# shellcheck disable=SC2086  # may be two words
+timeout $TIMEOUT $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null ||
+    fail "compose up mission ended with exit code $?"
+containers=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")
+for container in $containers; do
+    name=$(docker inspect --format '{{index .Config.Labels "com.docker.compose.service"}}' "$container")
+    code=$(timeout 30 docker wait "$container") || fail "$name did not end by itself"
+    [ "$code" -eq 0 ] || { docker logs --tail 20 "$container" >&2; fail "$name ended with exit code $code"; }
+    names="${names:+$names }$name"
+done
+passed "ended by themselves with exit code 0 after $(($(date +%s) - begun)) s: $names"
+
+field() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"; }
+[ -s recordings/mission.json ] || fail "no recordings/mission.json"
+[ "$(field recordings/mission.json landed)" = True ] || fail "the drone has not landed"
+for file in recordings/mission.json "$(field recordings/mission.json log)" "$(field recordings/mission.json report)"; do
+    [ -s "$file" ] || fail "$file is not there"
+    [ "$(stat -c %u:%g "$file")" = "$owner" ] || fail "$file belongs to $(stat -c %u:%g "$file"), expected $owner"
+done
+passed "landed; log and report are there and belong to $owner"
+
+"$LAPWING" run $SCENE --mode single --log local.mcap --json local.json > local.log 2>&1 ||
+    { tail -5 local.log >&2; fail "the local run failed"; }
+there=$(field recordings/mission.json digest)
+here=$(field local.json digest)
+[ "$there" = "$here" ] || fail "digest $there in containers, $here locally"
+passed "digest equal to the local run's: $here"
+
+# The log on the bus again, from the container to nobody: it must play to its end and say so.
+LOG=recordings/mission.mcap
+export LOG
+# shellcheck disable=SC2086
+timeout 120 $COMPOSE run --rm -T replay lapwing replay "$LOG" --speed max > replay.log 2>&1 < /dev/null ||
+    { tail -5 replay.log >&2; fail "docker compose run replay ended with exit code $?"; }
+grep -q "messages published" replay.log || fail "the replay did not say what it published"
+passed "replay: $(tail -1 replay.log)"

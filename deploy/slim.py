@@ -1,0 +1,62 @@
+"""Make a folder of installed packages small: drop tests, headers, dialects nobody speaks here, and symbols.
+
+Used by the Dockerfile:  python3 slim.py SITE_PACKAGES...
+"""
+
+import shutil
+import struct
+import sys
+from pathlib import Path
+
+UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
+DIALECTS = {"__init__", "minimal", "standard", "common", "ardupilotmega", "all"}
+ELF64_LITTLE = b"\x7fELF\x02\x01"
+PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr
+
+
+def loadable_end(elf: bytes) -> int:
+    """Offset behind the last byte that any program header of an ELF64 file names."""
+    table, entry, count = struct.unpack_from("<Q", elf, 32)[0], *struct.unpack_from("<HH", elf, 54)
+    end = table + entry * count
+    for k in range(count):
+        offset, _, _, size = struct.unpack("<4Q", elf[table + k * entry :][PT_LOAD_END])
+        end = max(end, offset + size)
+    return end
+
+
+def strip(path: Path) -> int:
+    """Cut a shared library behind its last segment: symbols, debug data, section headers. Returns the bytes saved.
+
+    The dynamic loader reads program headers only. This is what binutils' strip is for; slim base images have none.
+    """
+    elf = path.read_bytes()
+    if not elf.startswith(ELF64_LITTLE):
+        return 0
+    end = loadable_end(elf)
+    head = bytearray(elf[:64])
+    head[40:48] = bytes(8)  # e_shoff
+    head[60:64] = bytes(4)  # e_shnum, e_shstrndx
+    path.write_bytes(bytes(head) + elf[64:end])
+    return len(elf) - end
+
+
+def slim(packages: Path) -> int:
+    """Slim one folder of packages. Returns the bytes saved."""
+    saved = 0
+    for folder in sorted(packages.rglob("tests"), reverse=True):
+        if folder.is_dir():
+            saved += sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+            shutil.rmtree(folder)
+    for path in [path for path in packages.rglob("*.*") if path.suffix in UNUSED]:
+        saved += path.stat().st_size
+        path.unlink()
+    for path in packages.glob("pymavlink/dialects/v*/**/*.*"):
+        if path.suffix == ".xml" or path.name.split(".")[0] not in DIALECTS:
+            saved += path.stat().st_size
+            path.unlink()
+    return saved + sum(strip(path) for path in packages.rglob("*.so*") if not path.is_symlink())
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        print(f"{name}: {slim(Path(name)) / 1e6:.0f} MB saved")
