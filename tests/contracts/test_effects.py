@@ -1,0 +1,140 @@
+"""What holds for every effect that the catalogue finds."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics import effects
+from dynamics.effects import _hooks as hooks
+from dynamics.effects._types import Motion
+from dynamics.integrators import get, rk4_renormalised
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotation_matrix
+from dynamics.noise import stream_key
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import load_airframe
+
+ROOT = Path(__file__).parents[2]
+DRONE = load_airframe(ROOT / "scenes/vehicles/delivery_drone.toml")
+EULER, RK4 = get("lie_euler").Method(), get("rk4_renormalised").Method()
+KEY = stream_key(1, "drone1", "effects")
+HOVER = (32.6, 32.5, 32.7, 32.6)
+
+NEEDED = {  # the keys that a scene cannot leave out
+    "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
+    "rotor_damage": {"rotor": 1},
+    "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
+    "wind_dryden": {"wind_speed": 5.0, "airspeed": 5.0},
+    "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 0.0, "duration": 1.0},
+}
+ALL = {name: NEEDED.get(name, {}) for name in effects.names() if name not in ("gravity", "rotor_quadratic")}
+
+
+@pytest.mark.parametrize("name", effects.names())
+def test_is_documented(name):
+    """Equation, source, validity and units, and the equation stands in the theory."""
+    text = effects.parameter_class(name).__doc__
+    assert "Valid" in text
+    equation = re.search(r"theory\.md,\s+eq\.\s+(\(\d+\.\d+\))", text).group(1)
+    assert f"**{equation}**" in (ROOT / "docs/theory.md").read_text()
+
+
+@pytest.mark.parametrize("name", effects.names())
+def test_registers_a_hook(name):
+    assert any(effects.parameter_class(name) in registered for registered in hooks.HOOKS.values())
+
+
+@pytest.mark.parametrize("name", effects.names())
+def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
+    (e,) = effects.from_scene({name: NEEDED.get(name, {})}, DRONE)
+    assert type(e) is effects.parameter_class(name)
+    assert isinstance(hooks.initial_memory(e), tuple)
+    with pytest.raises(ValueError, match=rf"^effects\.{name}\.nonsense: ") as error:
+        effects.from_scene({name: {**NEEDED.get(name, {}), "nonsense": 1.0}}, DRONE)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_names_the_key_that_is_missing(name):
+    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: field required"):
+        effects.from_scene({name: {}}, DRONE)
+
+
+def test_unknown_effect_lists_the_choices():
+    with pytest.raises(ValueError, match=r"unknown effect 'gravitation': choose from air_density, battery"):
+        effects.from_scene({"gravitation": {}}, DRONE)
+
+
+def test_two_of_a_kind_exclude_each_other():
+    with pytest.raises(ValueError, match=r"effects.gravity_altitude: excludes effects.gravity, both are a gravity"):
+        effects.from_scene({"gravity": {}, "gravity_altitude": {}}, DRONE)
+
+
+def fly(tables, method=EULER, seconds=0.2, height=20.0):
+    p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
+    state = multirotor.initial_state(p, (0.0, 0.0, height), rotor_speed=330.0)
+    for tick in range(round(seconds / 0.004)):
+        state = multirotor.advance(method, p, KEY, tick, state, HOVER, 1e-3, 4)
+    return state
+
+
+def test_all_effects_at_once_fly():
+    state = fly(ALL)
+    numbers = np.concatenate([np.ravel(part) for part in state.motion])
+    assert np.isfinite(numbers).all()
+    assert np.linalg.norm(state.motion.velocity_world) < 5.0
+    assert [len(memory) > 0 for memory in state.memory].count(True) >= 6
+
+
+def test_the_order_of_the_scenes_tables_does_not_matter():
+    one = effects.from_scene(ALL, DRONE)
+    assert one == effects.from_scene(dict(reversed(ALL.items())), DRONE)
+
+
+@leaf
+def bare_rate(p, t, m):
+    """Gravity, thrust and lag written by hand, from the same constants."""
+    layout, w = p.layout, m.rotor_speed
+    b = p.effects[1].thrust_constant * multirotor.STANDARD_DENSITY
+    d = p.effects[1].torque_constant * multirotor.STANDARD_DENSITY
+    f = (b * (w[0] * w[0]), b * (w[1] * w[1]), b * (w[2] * w[2]), b * (w[3] * w[3]))
+    q = (d * (w[0] * w[0]), d * (w[1] * w[1]), d * (w[2] * w[2]), d * (w[3] * w[3]))
+    x, y, s = layout.x_body, layout.y_body, layout.yaw_sign
+    mx = (y[0] * f[0] + y[1] * f[1]) + (y[2] * f[2] + y[3] * f[3])
+    my = -((x[0] * f[0] + x[1] * f[1]) + (x[2] * f[2] + x[3] * f[3]))
+    mz = (s[0] * q[0] + s[1] * q[1]) + (s[2] * q[2] + s[3] * q[3])
+    R, lift, k = rotation_matrix(m.attitude), (f[0] + f[1]) + (f[2] + f[3]), p.body.inverse_mass
+    weight = p.effects[0].acceleration * p.body.mass
+    g, i, o = p.body.gyration, p.body.inverse_inertia, m.omega_body
+    spin = (g[0] * (o[1] * o[2]) + i[0] * mx, g[1] * (o[2] * o[0]) + i[1] * my, g[2] * (o[0] * o[1]) + i[2] * mz)
+    a, r, v = layout.lag_rate, layout.speed_per_volt, HOVER
+    lag = (a * (r * v[0] - w[0]), a * (r * v[1] - w[1]), a * (r * v[2] - w[2]), a * (r * v[3] - w[3]))
+    acceleration = (k * (lift * R[2]), k * (lift * R[5]), k * (lift * R[8] - weight))
+    return Motion(m.velocity_world, o, acceleration, spin, lag)
+
+
+one_step = rk4_renormalised.step
+
+
+@kernel
+def bare_steps(p, m, h, n):
+    for k in range(n):
+        m = one_step(bare_rate, p, k * h, m, h)
+    return m
+
+
+def test_effects_that_are_off_leave_every_bit():
+    """The plant with the whole catalogue installed against a kernel that knows of no effects at all."""
+    state = fly({"gravity": {}, "rotor_thrust": {}}, RK4)
+    p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))
+    start = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=330.0)
+    assert bare_steps(p, start.motion, 1e-3, 200) == state.motion
+    assert not math.isclose(state.motion.omega_body[0], 0.0)
+
+
+def test_a_sleeping_effect_leaves_every_bit():
+    """High above the ground the contact changes nothing."""
+    assert fly({"gravity": {}, "ground_contact": {}}, RK4).motion == fly({"gravity": {}}, RK4).motion

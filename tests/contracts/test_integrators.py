@@ -1,0 +1,161 @@
+"""Every integrator there is: its measured order on each kind of space, and whether it stays on the manifold."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from dynamics import integrators
+from dynamics.integrators import RATES, march
+from dynamics.kernel import kernel, leaf
+from dynamics.lie import quaternion, s2, so3, ts2
+from dynamics.lie.quaternion import Quaternion, rotate_back
+from dynamics.lie.s2 import Direction
+from dynamics.lie.se3 import Pose
+from dynamics.lie.so3 import Rotation
+from dynamics.lie.ts2 import Swing, tangent
+from dynamics.tree import embed, flatten, unflatten
+from dynamics.vector import Vec3, add, cross, divide, multiply, scale
+from dynamics.vehicles.rigid_body import RigidBody
+
+EPS = 2.2e-16
+
+
+class EverySpace(NamedTuple):
+    """One independent problem on each space, none of which commutes or is autonomous; as a product, one more test."""
+
+    pendulum: Vec3  # R^n: angle, velocity, and a number that is driven
+    quaternion: Quaternion
+    matrix: Rotation
+    direction: Direction
+    swing: Swing
+    pose: Pose
+
+
+class EverySpaceParameters(NamedTuple):
+    drive: float
+
+
+@leaf
+def _turning(drive, t, forward_in_body):
+    """Angular velocity that depends on time and attitude."""
+    return add((drive * math.cos(t), 0.5 * math.sin(2.0 * t), 0.8 + 0.3 * t), scale(0.7, forward_in_body))
+
+
+@kernel
+def every_space_rate(p, t, x):
+    angle, velocity, driven = x.pendulum
+    q = (x.direction[0], x.direction[1], x.direction[2])
+    target = (math.cos(p.drive * t), math.sin(2.0 * t), 0.4 * t)
+    twist = _turning(p.drive, t, rotate_back(x.pose.attitude, (0.0, 1.0, 0.0)))
+    swung = cross(x.swing.direction, add(target, scale(0.3, x.swing.omega)))
+    return EverySpace(
+        (velocity, -math.sin(angle) + p.drive * math.cos(1.3 * t), math.cos(2.0 * driven + angle * t)),
+        _turning(p.drive, t, rotate_back(x.quaternion, (1.0, 0.0, 0.0))),
+        _turning(p.drive, t, (x.matrix.m00, x.matrix.m01, x.matrix.m02)),
+        add(cross(q, target), cross(q, cross(q, (0.0, 0.5, q[0])))),
+        tangent(x.swing, swung),
+        (add((0.3, 0.2 * t, 1.0), scale(0.1, x.pose.position)), twist),
+    )
+
+
+class TwistedBodyParameters(NamedTuple):
+    """A rigid body under a torque of time and attitude."""
+
+    inertia: Vec3
+
+
+@leaf
+def twisted_body_rate(p, t, x):
+    o = x.omega_body
+    torque = cross((0.2, 0.0, 0.9), rotate_back(x.attitude, (0.3 * math.cos(t), 0.0, -1.0)))
+    return RigidBody(o, divide(add(torque, cross(multiply(p.inertia, o), o)), p.inertia))
+
+
+RATES.update({EverySpaceParameters: every_space_rate, TwistedBodyParameters: twisted_body_rate})
+
+SPACES = (
+    EverySpaceParameters(1.1),
+    EverySpace(
+        (1.0, 0.2, 0.0),
+        quaternion.exp((0.3, -0.5, 0.2)),
+        so3.exp((0.3, -0.5, 0.2)),
+        s2.normalise(Direction(0.3, -0.5, 0.9)),
+        ts2.normalise(Swing((0.3, -0.5, 0.9), (1.0, 0.4, 0.2))),
+        Pose((0.2, -0.1, 0.4), quaternion.exp((-0.4, 0.1, 0.6))),
+    ),
+)
+BODY = (TwistedBodyParameters((1.0, 1.6, 2.1)), RigidBody(quaternion.exp((0.3, -0.5, 0.2)), (0.6, -0.9, 1.2)))
+SPAN = 1.6
+COUNTS = {1: (512, 1024, 2048), 2: (64, 128, 256), 3: (32, 64, 128), 4: (20, 40, 80), 5: (24, 40, 64), 6: (4, 6, 9)}
+
+
+def reference(p, x0):
+    """SciPy's DOP853 in the embedding at 1e-13."""
+    rate = RATES[type(p)].py_func
+
+    def right_hand_side(t, y):
+        x = unflatten(x0, tuple(y))
+        return flatten(embed(x, rate(p, t, x)))
+
+    end = solve_ivp(right_hand_side, (0.0, SPAN), flatten(x0), method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    return unflatten(x0, tuple(map(float, end)))
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return {type(x0): reference(p, x0) for p, x0 in (SPACES, BODY)}
+
+
+def problem(method):
+    return BODY if hasattr(method, "REQUIRES") else SPACES
+
+
+def defect(x):
+    """Distance of the invariants of every manifold leaf from where they should be."""
+    if isinstance(x, Quaternion | Direction):
+        return abs(sum(c * c for c in x) - 1.0)
+    if isinstance(x, Rotation):
+        m = np.array(x).reshape(3, 3)
+        return abs(m.T @ m - np.eye(3)).max()
+    if isinstance(x, Swing):
+        q, omega = map(np.array, x)
+        return max(abs(q @ q - 1.0), abs(q @ omega) / (1.0 + abs(omega).max()))
+    return max(map(defect, x)) if isinstance(x, tuple) else 0.0
+
+
+def distance(x, y):
+    return np.linalg.norm(np.array(flatten(x)) - np.array(flatten(y)))
+
+
+@pytest.mark.parametrize("name", integrators.names())
+def test_order_and_manifold(name, exact):
+    method = integrators.get(name)
+    p, x0 = problem(method)
+    steps = [SPAN / n for n in COUNTS[method.ORDER]]
+    ends = [march(method.Method(), p, 0.0, x0, SPAN / n, n) for n in COUNTS[method.ORDER]]
+    if method.ON_MANIFOLD:
+        assert max(map(defect, ends)) < 8 * EPS
+    measured = {}
+    for i, space in enumerate(x0._fields):
+        errors = [distance(x[i : i + 1], exact[type(x0)][i : i + 1]) for x in ends]
+        assert min(errors) > 1e-13, f"{space}: errors {errors} too close to round-off to fit"
+        measured[space] = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    for space, order in measured.items():
+        declared = getattr(method, "FLAT_ORDER", method.ORDER) if space == "pendulum" else method.ORDER
+        assert declared - 0.2 < order < declared + 0.7, f"{space}: measured {measured}"
+
+
+def test_an_unknown_name_lists_the_choices():
+    with pytest.raises(ValueError, match=r"unknown integrator 'rk5': choose one of .*rk4.*rkmk4"):
+        integrators.get("rk5")
+
+
+def test_a_drifting_method_says_so():
+    p, x0 = SPACES
+    drifting = [n for n in integrators.names() if not integrators.get(n).ON_MANIFOLD]
+    assert drifting
+    for name in drifting:
+        assert defect(march(integrators.get(name).Method(), p, 0.0, x0, 0.1, 16)) > 1e-7

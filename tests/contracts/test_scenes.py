@@ -1,0 +1,46 @@
+"""Every scene that ships is valid; those that repeat published figures come out as they should."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.scene import load
+from services.sections import Published, Run
+
+ROOT = Path(__file__).parents[2]
+SCENES = sorted((ROOT / "scenes").glob("*.toml"))
+
+
+def fly(scene, folder):
+    """The figures of a run in one process."""
+    figures = folder / "figures.json"
+    command = [sys.executable, "-m", "services.cli", "run", str(scene), "--mode", "single"]
+    command += ["--log", str(folder / "log.mcap"), "--json", str(figures)]
+    subprocess.run(command, check=True, timeout=600)
+    return json.loads(figures.read_text())
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
+def test_scene_is_valid_and_says_what_it_is(scene):
+    assert load(scene)[Run].title
+
+
+def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
+    scene = ROOT / "scenes/delivery_mission.toml"
+    published = load(scene)[Published].rmse
+    flown = fly(scene, tmp_path)
+    assert flown["landed"]
+    for axis, value in published.items():
+        assert flown["rmse"][axis] < value, axis
+
+
+def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
+    scene = ROOT / "scenes/delivery_paper.toml"
+    published = load(scene)[Published].rmse
+    flown = fly(scene, tmp_path)
+    assert flown["landed"]
+    for axis in "xyz":
+        assert flown["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis

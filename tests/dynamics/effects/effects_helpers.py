@@ -1,0 +1,12 @@
+"""Small things that the tests of effects share."""
+
+import numpy as np
+
+from dynamics.effects._types import Factors, Loads
+
+NO_FACTORS = Factors((1.0,) * 4, (1.0,) * 4)
+NO_LOADS = Loads((0.0,) * 4, (0.0,) * 4)
+
+
+def rotation_of(s):
+    return np.array(s.R_world_body).reshape(3, 3)

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from dynamics import effects
+from dynamics.effects.payload import RELEASED, payload, release
+
+
+def make(drone, **table):
+    (e,) = effects.from_scene({"payload": table}, drone)
+    return e
+
+
+def test_mass_and_inertia_with_and_without(drone):
+    e = make(drone)
+    loaded, empty = payload.py_func(e, (0.0,), None), payload.py_func(e, RELEASED, None)
+    assert loaded.mass == 10.0224
+    assert empty.mass == pytest.approx(8.0224)
+    box = 2.0 / 12 * np.array([0.13**2 + 0.23**2, 0.20**2 + 0.23**2, 0.20**2 + 0.13**2])
+    assert np.subtract(loaded.inertia, empty.inertia) == pytest.approx(box)
+    assert np.multiply(empty.inertia, empty.inverse_inertia) == pytest.approx(np.ones(3))
+
+
+def test_lets_go_at_its_time_and_never_again(drone, situation, rotors):
+    e = make(drone, release_time=3.0)
+    assert release.py_func(e, (0.0,), situation(t=2.999), rotors(), (0, 0), 0, 0.004) == (0.0,)
+    assert release.py_func(e, (0.0,), situation(t=3.0), rotors(), (0, 0), 0, 0.004) == (1.0,)
+    assert release.py_func(make(drone), RELEASED, situation(t=9.0), rotors(), (0, 0), 0, 0.004) == (1.0,)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"mass": 11.0}, r"effects.payload.mass: must be below the vehicle's 10.0224 kg, got 11.0"),
+        ({"mass": -1.0}, r"effects.payload.mass: expected greater than 0, got -1.0"),
+        ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload: takes more inertia"),
+    ],
+)
+def test_refused(drone, table, message):
+    with pytest.raises(ValueError, match=message):
+        make(drone, **table)

@@ -1,0 +1,21 @@
+import pytest
+from effects_helpers import NO_FACTORS
+
+from dynamics import effects
+from dynamics.effects.rotor_damage import rotor_damage, strike
+
+
+def test_one_rotor_from_its_time(drone, situation, rotors):
+    (e,) = effects.from_scene(
+        {"rotor_damage": {"rotor": 2, "time": 4.0, "thrust_left": 0.6, "torque_left": 1.1}}, drone
+    )
+    memory = strike.py_func(e, e.initial_memory(), situation(t=3.99), rotors(), (0, 0), 0, 0.004)
+    assert rotor_damage.py_func(e, memory, situation(), NO_FACTORS) == NO_FACTORS
+    memory = strike.py_func(e, memory, situation(t=4.0), rotors(), (0, 0), 0, 0.004)
+    hurt = rotor_damage.py_func(e, memory, situation(), NO_FACTORS)
+    assert hurt == ((1.0, 0.6, 1.0, 1.0), (1.0, 1.1, 1.0, 1.0))
+
+
+def test_a_rotor_that_is_not_there(drone):
+    with pytest.raises(ValueError, match=r"effects.rotor_damage.rotor: the vehicle has rotors 1 to 4, got 5"):
+        effects.from_scene({"rotor_damage": {"rotor": 5}}, drone)

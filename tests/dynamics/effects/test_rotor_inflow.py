@@ -1,0 +1,57 @@
+import math
+
+import numpy as np
+import pytest
+from effects_helpers import NO_FACTORS, NO_LOADS
+from scipy.integrate import quad
+
+from dynamics import effects
+from dynamics.effects.rotor_inflow import rotor_inflow
+from dynamics.effects.rotor_thrust import rotor_thrust
+
+
+def both(drone, s):
+    inflow, thrust = effects.from_scene({"rotor_thrust": {}, "rotor_inflow": {}}, drone)
+    static = rotor_thrust.py_func(thrust, (), s, NO_FACTORS, NO_LOADS)
+    return static, rotor_inflow.py_func(inflow, (), s, NO_FACTORS, static)
+
+
+def test_thrust_falls_linearly_to_nothing_at_the_pitch_speed(drone, situation):
+    pitch_speed = 300.0 / (2 * math.pi) * drone.propeller.pitch
+    for part in (-0.4, 0.1, 0.3, 0.5):
+        static, total = both(drone, situation(velocity=(0, 0, part * pitch_speed)))
+        assert np.array(total.thrust) / static.thrust == pytest.approx(1 - part)
+
+
+def test_induced_torque_falls_with_the_square(drone, situation):
+    from dynamics.vehicles.propeller import drag_coefficients
+
+    profile, induced = drag_coefficients(drone.propeller)
+    pitch_speed = 300.0 / (2 * math.pi) * drone.propeller.pitch
+    static, total = both(drone, situation(velocity=(0, 0, 0.3 * pitch_speed)))
+    expected = (profile + induced * 0.7**2) / (profile + induced)
+    assert np.array(total.torque) / static.torque == pytest.approx(expected)
+
+
+def test_slope_against_blade_elements(drone, situation):
+    """A blade of constant pitch H, integrated over its radius, loses V / (n H) of its thrust to first order."""
+    radius, pitch, climb, n = 0.2794, 0.18796, 0.5, 300.0 / (2 * math.pi)
+
+    def lift(r, v):
+        return (math.atan(pitch / (2 * math.pi * r)) - math.atan(v / (2 * math.pi * n * r))) * r**2
+
+    loss = 1 - quad(lift, 0.05, radius, (climb,))[0] / quad(lift, 0.05, radius, (0.0,))[0]
+    static, total = both(drone, situation(velocity=(0, 0, climb)))
+    assert 1 - total.thrust[0] / static.thrust[0] == pytest.approx(loss, rel=0.1)
+
+
+def test_only_the_axial_air_speed_counts(drone, situation):
+    static, total = both(drone, situation(velocity=(4, 1, 2), wind=(0, 1, 2)))
+    assert total.thrust == pytest.approx(static.thrust)
+    static, total = both(drone, situation(velocity=(2, 0, 0), turn=(0, math.pi / 2, 0)))  # body z is world x
+    assert total.thrust[0] < static.thrust[0]
+
+
+def test_a_rotor_at_rest_has_no_loads(drone, situation):
+    _, total = both(drone, situation(velocity=(0, 0, -3), speed=(0, 0, 0, 0)))
+    assert total == ((0.0,) * 4, (0.0,) * 4)

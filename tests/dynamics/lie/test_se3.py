@@ -1,0 +1,92 @@
+"""SE(3) against 50-digit functions of the 6x6 adjoint matrix."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from dynamics.lie import se3
+
+mpmath.mp.dps = 60
+
+V = ((0.5, -0.2, 0.9), (0.3, -1.1, 0.7))
+B = (1.2, -0.4, 0.8)
+ANGLES = [1e-12, 1e-6, 0.2499, 0.9999, 1.0001, 2.0, math.pi, 5.0, 2 * math.pi - 1e-3, 2 * math.pi - 1e-6]
+
+
+def elements():
+    return [(B, tuple(a * c for c in d)) for a in ANGLES for d in ((0.6, -0.48, 0.64), (0.0, 0.0, 1.0))]
+
+
+def hat(v):
+    x, y, z = (mpmath.mpf(c) for c in v)
+    return mpmath.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def ad(u):
+    m = mpmath.zeros(6)
+    m[0:3, 0:3] = m[3:6, 3:6] = hat(u[1])
+    m[0:3, 3:6] = hat(u[0])
+    return m
+
+
+def dexp_reference(u):
+    """The series of ad^k / (k + 1)!, summed to 50 digits."""
+    total = term = mpmath.eye(6)
+    a = ad(u)
+    for k in range(1, 90):
+        term = term * a / (k + 1)
+        total = total + term
+    return total
+
+
+def column(v):
+    return mpmath.matrix([*v[0], *v[1]])
+
+
+def worst(got, exact):
+    return max(abs(g - e) for g, e in zip([*got[0], *got[1]], exact, strict=True))
+
+
+@pytest.mark.parametrize("u", elements())
+def test_exp_dexp_dexpinv(u):
+    m = mpmath.zeros(4)
+    m[0:3, 0:3] = hat(u[1])
+    for i in range(3):
+        m[i, 3] = u[0][i]
+    g = se3.exp(u)
+    exact = mpmath.expm(m)
+    assert max(abs(g.position[i] - exact[i, 3]) for i in range(3)) < 3e-15
+    d = dexp_reference(u)
+    assert worst(se3.dexp(u, V), list(d * column(V))) < 5e-15
+    inverse = mpmath.inverse(d)
+    assert worst(se3.dexpinv(u, V), list(inverse * column(V))) < 1e-14 * mpmath.mnorm(inverse, mpmath.inf)
+
+
+@pytest.mark.parametrize("u", [u for u in elements() if math.hypot(*u[1]) < math.pi])
+def test_log_inverts_exp(u):
+    back = se3.log(se3.exp(u))
+    assert back[0] == pytest.approx(u[0], abs=5e-15)
+    assert back[1] == pytest.approx(u[1], rel=1e-14)
+
+
+def test_adjoint_moves_the_exponential_across():
+    g, u = se3.exp(((0.3, 0.1, -2.0), (0.2, 0.5, -1.0))), (B, (0.1, -0.7, 0.4))
+    left, right = se3.compose(g, se3.exp(u)), se3.compose(se3.exp(se3.adjoint(g, u)), g)
+    assert left.position == pytest.approx(right.position, abs=2e-15)
+    assert left.attitude == pytest.approx(right.attitude, abs=2e-15)
+    assert se3.retract(g, u).position == pytest.approx(left.position, abs=2e-15)
+
+
+def test_embed_is_the_derivative_along_retract():
+    g, h = se3.exp(((0.3, 0.1, -2.0), (0.2, 0.5, -1.0))), 1e-6
+    ahead, behind = (se3.retract(g, tuple(tuple(s * h * c for c in part) for part in V)) for s in (1, -1))
+    position, attitude = se3.embed(g, V)
+    assert (np.array(ahead.position) - behind.position) / (2 * h) == pytest.approx(np.array(position), abs=1e-9)
+    assert (np.array(ahead.attitude) - behind.attitude) / (2 * h) == pytest.approx(np.array(attitude), abs=1e-9)
+
+
+def test_commutator_is_ad():
+    u, v = (B, (0.1, -0.7, 0.4)), V
+    assert worst(se3.commutator(u, v), list(ad(u) * column(v))) < 1e-15

@@ -1,0 +1,97 @@
+"""The fast path on redundant states is the general path, to round-off, on and off the constraints."""
+
+import numpy as np
+import pytest
+from test_augmented import PAPER
+
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import Quaternion
+from dynamics.multibody.augmented import accelerations
+from dynamics.multibody.delivery_drone import delivery_drone
+from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate, solve
+from dynamics.multibody.hold import together
+from dynamics.multibody.mechanisms import drone_system
+from dynamics.multibody.placement import displaced
+from dynamics.multibody.reactions import reactions
+
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+def scene(rng, driven):
+    """(drone, machine, five-body state, wrench, speeds, drive) at random."""
+    drone = delivery_drone(**PAPER, driven=driven)
+    speeds, drive = rng.uniform(-400.0, 400.0, 4), rng.normal(size=4)
+    wrench = rng.normal(size=(5, 6)) * [10, 10, 10, 1, 1, 1]
+    wrench[1:, 3:] *= 0.01
+    loads = tuple(Wrench(tuple(row[:3]), tuple(row[3:])) for row in wrench.tolist())
+    p = machine(drone, GRAVITY, drive, speeds, loads)
+    q = rng.normal(size=4)
+    q /= np.linalg.norm(q)
+    position, velocity, omega = rng.normal(size=(3, 3)).tolist()
+    chassis = BodyState(tuple(position), Quaternion(*q.tolist()), tuple(velocity), tuple(omega))
+    return drone, p, together(p, chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds)), wrench, speeds, drive
+
+
+def general(drone, x, wrench, speeds, drive, driven):
+    """The same by the general engine; a motor torque acts on propeller and chassis."""
+    q, v = arrays(x)
+    if driven == "speed":
+        system, imposed = drone_system(drone), np.stack([speeds, drive], axis=1)
+        return system, accelerations(system, q, v, wrench, imposed), imposed
+    system, wrench = drone_system(drone, (False,) * 4), wrench.copy()
+    for k in range(4):
+        # the motor's axis is the propeller's own z; seen from the chassis it is z as long as the hinge holds
+        wrench[k + 1, 5] += drive[k]
+        R0, R = (rotation(q[b, 3:]) for b in (0, k + 1))
+        wrench[0, 3:] -= drive[k] * R0.T @ R[:, 2]
+    return system, accelerations(system, q, v, wrench), None
+
+
+def rotation(q):
+    from dynamics.lie import quaternion
+
+    return np.array(quaternion.rotation_matrix(tuple(q))).reshape(3, 3)
+
+
+@pytest.mark.parametrize("driven", ["speed", "torque"])
+def test_identical_to_the_general_path(driven):
+    rng = np.random.default_rng(31)
+    for _ in range(20):
+        drone, p, x, wrench, speeds, drive = scene(rng, driven)
+        _, expected, _ = general(drone, x, wrench, speeds, drive, driven)
+        _, ours = arrays(rate(p, 0.0, x))
+        scale = np.abs(expected.acceleration).max()
+        np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-12)
+
+
+def test_identical_off_the_constraints_too():
+    """Index-1 equations hold wherever the integration has drifted to: hinges apart by 1 %."""
+    rng = np.random.default_rng(32)
+    for _ in range(20):
+        drone, p, x, wrench, speeds, drive = scene(rng, "torque")
+        q, v = arrays(x)
+        q, v = displaced(q, 0.01 * rng.normal(size=(5, 6))), v + 0.01 * rng.normal(size=(5, 6))
+        bodies = [
+            BodyState(tuple(a[:3]), Quaternion(*a[3:]), tuple(b[:3]), tuple(b[3:]))
+            for a, b in zip(q.tolist(), v.tolist(), strict=True)
+        ]
+        x = FiveBodies(bodies[0], tuple(bodies[1:]))
+        _, expected, _ = general(drone, x, wrench, speeds, drive, "torque")
+        _, ours = arrays(rate(p, 0.0, x))
+        scale = np.abs(expected.acceleration).max()
+        np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-11)
+
+
+@kernel
+def reacted(p, x):
+    leaves = solve(p, 0.0, x).leaves
+    return [(item.reaction_force, item.reaction_torque) for item in leaves]
+
+
+def test_reactions_are_the_multipliers():
+    drone, p, x, wrench, speeds, drive = scene(np.random.default_rng(33), "speed")
+    system, solution, imposed = general(drone, x, wrench, speeds, drive, "speed")
+    expected = reactions(system, *arrays(x), solution, imposed)
+    for k, (force, torque) in enumerate(reacted(p, x)):
+        np.testing.assert_allclose(force, expected[f"hinge {k + 1}"].force_world, atol=1e-10)
+        np.testing.assert_allclose(torque, expected[f"hinge {k + 1}"].torque_world, atol=1e-10)

@@ -1,0 +1,43 @@
+"""Against pymap3d (independent), and the pressure law against the standard atmosphere."""
+
+import numpy as np
+import pymap3d
+import pytest
+
+from dynamics import geodesy
+from dynamics.geodesy import Home
+
+HOMES = [Home(40.7686, 14.7907, 280.0), Home(-33.9, 151.2, 30.0), Home(0.0, 180.0, -20.0), Home(78.2, -15.6, 2500.0)]
+
+
+@pytest.mark.parametrize("home", HOMES)
+def test_against_pymap3d(home):
+    rng = np.random.default_rng(1)
+    for position in rng.uniform(-5000.0, 5000.0, (50, 3)):
+        expected = pymap3d.enu2geodetic(*position, *home)
+        latitude, longitude, height = geodesy.enu_to_geodetic(home, tuple(position))
+        assert latitude == pytest.approx(float(expected[0]), abs=1e-9)
+        assert (longitude - float(expected[1]) + 180.0) % 360.0 == pytest.approx(180.0, abs=1e-9)
+        assert height == pytest.approx(float(expected[2]), abs=1e-6)
+        back = geodesy.geodetic_to_enu(home, latitude, longitude, height)
+        np.testing.assert_allclose(back, position, atol=1e-7)
+        np.testing.assert_allclose(back, pymap3d.geodetic2enu(latitude, longitude, height, *home), atol=1e-6)
+
+
+def test_directions():
+    """North raises the latitude, east the longitude, up the height."""
+    home = Home()
+    assert geodesy.enu_to_geodetic(home, (0.0, 0.0, 0.0)) == pytest.approx(tuple(home), abs=1e-9)
+    assert geodesy.enu_to_geodetic(home, (0.0, 100.0, 0.0))[0] > home.latitude_deg + 8e-4
+    assert geodesy.enu_to_geodetic(home, (100.0, 0.0, 0.0))[1] > home.longitude_deg + 8e-4
+    assert geodesy.enu_to_geodetic(home, (0.0, 0.0, 7.0))[2] == pytest.approx(home.height + 7.0, abs=1e-6)
+
+
+def test_pressure_against_the_standard_atmosphere():
+    """ISO 2533 at 1000 m: 89 874.6 Pa. The paper's law divides by 273 + T where the standard has 288.15 K."""
+    assert geodesy.air_pressure(0.0, 15.0) == 101325.0
+    assert geodesy.air_pressure(1000.0, 15.15) == pytest.approx(89874.6, rel=2e-5)
+    for altitude in (-100.0, 0.0, 10.0, 3000.0):
+        assert geodesy.pressure_altitude(geodesy.air_pressure(altitude, 20.0), 20.0) == pytest.approx(
+            altitude, abs=1e-8
+        )

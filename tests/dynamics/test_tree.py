@@ -1,0 +1,86 @@
+"""Tree operations: shapes, values against hand-written ones, compiled against uncompiled."""
+
+import random
+from typing import NamedTuple
+
+import numba
+import pytest
+
+from dynamics import tree
+from dynamics.kernel import kernel
+from dynamics.lie import quaternion
+from dynamics.lie.quaternion import Quaternion
+
+
+class State(NamedTuple):
+    position: tuple
+    attitude: Quaternion
+    omega: tuple
+    rotors: tuple
+    nothing: None
+    empty: tuple
+    one: tuple
+
+
+def some(seed, attitude=True):
+    r = random.Random(seed)
+    vec = lambda n: tuple(r.uniform(-1, 1) for _ in range(n))  # noqa: E731
+    q = quaternion.normalise(Quaternion(*vec(4))) if attitude else vec(3)
+    return State(vec(3), q, vec(3), (r.random(), vec(2)), None, (), vec(1))
+
+
+X, U, V = some(1), some(2, attitude=False), some(3, attitude=False)
+
+
+def test_retract_adds_on_floats_and_turns_attitudes():
+    y = tree.retract(X, V)
+    assert y.position == tuple(a + b for a, b in zip(X.position, V.position, strict=True))
+    assert y.attitude == quaternion.retract(X.attitude, V.attitude)
+    assert y.rotors[1][1] == X.rotors[1][1] + V.rotors[1][1]
+    assert (y.nothing, y.empty, len(y.one)) == (None, (), 1)
+    assert type(y) is State
+    assert type(y.attitude) is Quaternion
+
+
+def test_embed_is_the_derivative_of_retract():
+    h = 1e-6
+    forward, backward = tree.retract(X, tree.scale(h, V)), tree.retract(X, tree.scale(-h, V))
+    difference = tree.scale(0.5 / h, tree.axpy(-1.0, backward, forward))
+    derivative = tree.embed(X, V)
+    assert difference.attitude == pytest.approx(derivative.attitude, abs=1e-9)
+    assert difference.rotors[1] == pytest.approx(derivative.rotors[1], abs=1e-9)
+
+
+def test_axpy_steps_over_stored_numbers_and_keeps_the_class():
+    y = tree.axpy(0.5, tree.embed(X, V), X)
+    assert type(y.attitude) is Quaternion
+    assert y.attitude.z == X.attitude.z + 0.5 * quaternion.embed(X.attitude, V.attitude)[3]
+    assert tree.axpy(2.0, U, V).attitude == tuple(v + 2.0 * u for u, v in zip(U.attitude, V.attitude, strict=True))
+
+
+def test_bracket_and_transport_do_nothing_on_floats():
+    assert tree.bracket(X, U, V).position == (0.0, 0.0, 0.0)
+    assert tree.bracket(X, U, V).attitude == quaternion.bracket(U.attitude, V.attitude)
+    assert tree.transport(X, U, V).position == V.position
+
+
+def test_flatten_and_unflatten_are_inverse():
+    flat = tree.flatten(X)
+    assert len(flat) == 3 + 4 + 3 + 3 + 1
+    assert flat[3:7] == tuple(X.attitude)
+    assert tree.unflatten(X, flat) == X
+
+
+@kernel
+def everything(x, u, v):
+    y = tree.normalise(tree.axpy(0.1, tree.embed(x, v), x))
+    return tree.retract(y, tree.transport(x, u, tree.bracket(x, u, tree.scale(2.0, v)))), tree.flatten(y)
+
+
+def test_compiled_and_uncompiled_give_the_same_bits():
+    assert everything(X, U, V) == everything.py_func(X, U, V)
+
+
+def test_a_state_of_something_else_is_refused():
+    with pytest.raises(numba.TypingError, match="floats, tuples and manifold leaves"):
+        tree.retract((1.0, "text"), (1.0, 1.0))

@@ -1,0 +1,45 @@
+"""Airframe files: what is refused, and how the message reads."""
+
+from pathlib import Path
+
+import pytest
+
+from dynamics.vehicles.airframe import load_airframe
+
+DRONE = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
+
+
+def test_the_delivery_drone_loads():
+    drone = load_airframe(DRONE)
+    assert drone.mass.total == pytest.approx(8.0 + 2.0 + 4 * 5.6e-3)
+    assert len(drone.rotors.position) == 4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("total = 10.0224", "total = -1.0", "mass.total: expected greater than 0, got -1.0"),
+        ("total = 10.0224", "weight = 1.0", "mass.total: field required"),
+        ("blades = 2 ", 'blades = "two" ', "propeller.blades"),
+        ("[0.27, 0.26, 0.42]", "[0.1, 0.1, 0.42]", "triangle"),
+        ("yaw_sign = [1.0, -1.0, 1.0, -1.0]", "yaw_sign = [1.0, -1.0, 0.5, -1.0]", "rotors: yaw_sign must hold"),
+        ("[motor]", "[engine]", "motor: field required"),
+        ("[motor]", "[motor", "not valid TOML"),
+    ],
+)
+def test_a_faulty_file_gets_one_line_that_names_file_and_key(tmp_path, old, new, expected):
+    text = DRONE.read_text()
+    assert old in text
+    path = tmp_path / "vehicle.toml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ValueError) as error:
+        load_airframe(path)
+    message = str(error.value)
+    assert "\n" not in message
+    assert message.startswith(str(path))
+    assert expected in message
+
+
+def test_a_missing_file(tmp_path):
+    with pytest.raises(ValueError, match=r"none.toml: cannot be read"):
+        load_airframe(tmp_path / "none.toml")

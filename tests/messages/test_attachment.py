@@ -1,0 +1,23 @@
+import pytest
+
+from messages.attachment import Attachment, pack, unpack
+
+GID = bytes(range(16))
+
+
+def test_layout_byte_by_byte():
+    assert pack(1, 2, GID) == b"\1" + bytes(7) + b"\2" + bytes(7) + b"\x10" + GID
+    assert len(pack(-1, 2**62, GID)) == 33
+
+
+def test_round_trip():
+    assert unpack(pack(7, 123456789012, GID)) == Attachment(7, 123456789012, GID)
+
+
+def test_faults_are_named():
+    with pytest.raises(ValueError, match="15 bytes, expected 16"):
+        pack(0, 0, GID[:15])
+    with pytest.raises(ValueError, match="32 bytes, expected 33"):
+        unpack(pack(0, 0, GID)[:-1])
+    with pytest.raises(ValueError, match="length 17, expected 16"):
+        unpack(bytes(16) + b"\x11" + GID)

@@ -1,0 +1,66 @@
+import pytest
+
+from messages.codec import make_class
+from messages.parse import Field, dependencies, parse, read_folder, schema_text
+
+TEXT = """
+# a comment
+int8 LOW=-1   # constant
+string WORD="two words"
+float64 x 1.5
+bool on true
+string name
+Inner[] items   # same package
+std_msgs/Header header
+float32[3] three
+"""
+
+
+def test_fields_constants_and_defaults():
+    definition = parse("a/msg/B", TEXT)
+    assert definition.constants == {"LOW": -1, "WORD": "two words"}
+    assert definition.fields == (
+        Field("float64", "x", None, 1.5),
+        Field("bool", "on", None, True),
+        Field("string", "name", None, ""),
+        Field("a/msg/Inner", "items", 0, None),
+        Field("std_msgs/msg/Header", "header", None, None),
+        Field("float32", "three", 3, None),
+    )
+
+
+@pytest.mark.parametrize("line", ["float64", "float64[<=3] x", "string<=5 x", "string[3] x", "float64 2x", "!"])
+def test_faulty_lines_are_named(line):
+    with pytest.raises(ValueError, match="a/msg/B, line 2: ") as caught:
+        parse("a/msg/B", "int8 a\n" + line)
+    assert "\n" not in str(caught.value)
+
+
+def write(folder, **texts):
+    (folder / "p").mkdir()
+    for name, text in texts.items():
+        (folder / "p" / f"{name}.msg").write_text(text)
+    return read_folder(folder)
+
+
+def test_contained_types_come_first_and_outer_ones_lead_the_schema(tmp_path):
+    found = write(tmp_path, A="B b\nC c\n", B="C c\n", C="int8 x\n")
+    assert list(found) == ["p/msg/C", "p/msg/B", "p/msg/A"]
+    assert dependencies("p/msg/A", found) == ["p/msg/B", "p/msg/C"]
+    bar = "=" * 80
+    assert schema_text("p/msg/A", found) == f"B b\nC c\n{bar}\nMSG: p/B\nC c\n{bar}\nMSG: p/C\nint8 x\n"
+
+
+def test_a_missing_type_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"p/msg/A: field b has type p/msg/B, which has no \.msg file"):
+        write(tmp_path, A="B b\n")
+
+
+def test_a_class_made_from_new_text_works(tmp_path):
+    found = write(tmp_path, A="int8 x\nint64 big\nB[] many\nuint16[] words\nint8 last\n", B="string s\nfloat64[] v\n")
+    classes: dict = {}
+    for name, definition in found.items():
+        classes[name] = make_class(definition, found, classes)
+    A, B = classes["p/msg/A"], classes["p/msg/B"]
+    message = A(1, -2, (B("one", (1.0,)), B("", ()), B("three", (1.0, 2.0, 3.0))), (1, 2, 3), -4)
+    assert A.decode(message.encode()) == message

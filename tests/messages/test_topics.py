@@ -1,0 +1,28 @@
+from messages import topics
+from messages.topics import CLOCK, GPS, TOPICS, WALL_TIME
+
+EXPECTED = {
+    "/clock", "/tf", "/wall_time",
+    *(f"/drone1/{name}" for name in (
+        "truth", "pose", "odom", "imu", "mag", "gps/fix", "baro", "sonar", "battery", "setpoint", "estimate",
+        "actuators", "status",
+    )),
+}  # fmt: skip
+
+
+def test_the_promised_topics_are_there():
+    assert {topic.key("drone1") for topic in TOPICS} >= EXPECTED
+    assert len({topic.name for topic in TOPICS}) == len(TOPICS)
+
+
+def test_keys():
+    assert GPS.key("drone1") == "/drone1/gps/fix"
+    assert GPS.zenoh_key("drone1", "lapwing/7") == "lapwing/7/drone1/gps/fix"
+    assert CLOCK.key() == "/clock"
+    assert CLOCK.zenoh_key("drone1", "lapwing") == "lapwing/clock"
+
+
+def test_every_topic_holds_a_message_class_and_only_wall_time_is_not_reproducible():
+    assert all(topic.message().encode() for topic in TOPICS)
+    assert [topic for topic in TOPICS if not topic.deterministic] == [WALL_TIME]
+    assert all(getattr(topics, name) in TOPICS for name in ("TRUTH", "IMU", "TF"))

@@ -1,0 +1,169 @@
+"""A minimal plant around the controller: rigid body, four rotors with a lag, wind on the centre of mass, a stand."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract, rotate, to_roll_pitch_yaw
+from dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
+from services.autopilot.attitude import wrap
+from services.autopilot.control import START, step
+from services.autopilot.gains import Airframe
+from services.autopilot.interface import Estimate, Four, Setpoint
+from services.autopilot.motor import RPM, Motor
+from services.autopilot.stage import LANDED
+from services.trajectory.mission import compile
+from services.trajectory.piece import evaluate
+
+ARM = 0.4974 / math.sqrt(2.0)
+MOTOR = Motor(thrust_coefficient=2.234e-4, belt_ratio=2.0 / 3.0, speed_constant=150.0, time_constant=0.02)
+AIRFRAME = Airframe(
+    mass=10.0224,
+    inertia_body=(0.27, 0.26, 0.42),
+    rotor_x=(ARM, -ARM, -ARM, ARM),
+    rotor_y=(ARM, ARM, -ARM, -ARM),
+    yaw_sign=(1.0, -1.0, 1.0, -1.0),
+    torque_per_thrust=0.0381,
+    motor=MOTOR,
+    voltage_max=44.4,
+    resting_height=0.35,
+)
+TICK, SUBSTEPS = 0.004, 4
+WIND_MEAN, WIND_SIGMA, WIND_TIME = (3.0, 1.0, 0.0), 1.0, 0.5  # [m/s], [m/s], [s]
+WIND_AREA = 0.5 * 0.06 * 1.22  # half C_s S rho [kg/m]
+
+
+def _phase(name, **channels):
+    return {"name": name, **channels}
+
+
+def _ramp(to, rate=1.0):
+    return {"kind": "ramp", "to": to, "rate": rate}
+
+
+MISSION = {
+    "phase": [
+        _phase("climb", z=_ramp(10.0)),
+        _phase("hover", duration=5.0),
+        _phase("forward", x=_ramp(10.0)),
+        _phase("stay", duration=5.0),
+        _phase("left", y=_ramp(10.0)),
+        _phase("stop", duration=5.0),
+        _phase("turn", yaw=_ramp(math.pi / 2, 0.3)),
+        _phase("wait", duration=5.0),
+        _phase("descend", z=_ramp(0.0)),
+        _phase("down", duration=1.0),
+    ]
+}
+
+
+class Plant(NamedTuple):
+    """The true vehicle, which may differ from the airframe that the controller believes in."""
+
+    mass: float
+    inertia: Vec3
+    torque_per_thrust: float
+    thrust_coefficient: float
+    delay: int  # whole ticks between command and effect: 0 or 1
+
+
+class Body(NamedTuple):
+    position_world: Vec3
+    attitude: Quaternion
+    velocity_world: Vec3
+    omega_body: Vec3
+    speed: Four  # of the propellers [rad/s]
+
+
+@kernel
+def move(plant, b, speed_command, wind_world, h):
+    """Half-explicit Euler step of h [s]."""
+    k = 1.0 - math.exp(-h / MOTOR.time_constant)
+    s0, s1, s2, s3 = b.speed
+    u0, u1, u2, u3 = speed_command
+    s0, s1, s2, s3 = s0 + k * (u0 - s0), s1 + k * (u1 - s1), s2 + k * (u2 - s2), s3 + k * (u3 - s3)
+    c = plant.thrust_coefficient
+    f0, f1, f2, f3 = c * s0 * s0, c * s1 * s1, c * s2 * s2, c * s3 * s3
+    torque = (
+        ARM * (f0 + f1 - f2 - f3),
+        ARM * (-f0 + f1 + f2 - f3),
+        plant.torque_per_thrust * (f0 - f1 + f2 - f3),
+    )
+    turn = divide(subtract(torque, cross(b.omega_body, multiply(plant.inertia, b.omega_body))), plant.inertia)
+    air = subtract(wind_world, b.velocity_world)
+    force = add(rotate(b.attitude, (0.0, 0.0, f0 + f1 + f2 + f3)), scale(WIND_AREA * norm(air), air))
+    v = add(b.velocity_world, scale(h, add(scale(1.0 / plant.mass, force), (0.0, 0.0, -AIRFRAME.gravity))))
+    w = add(b.omega_body, scale(h, turn))
+    x = add(b.position_world, scale(h, v))
+    q = normalise(retract(b.attitude, scale(h, w)))
+    if x[2] <= AIRFRAME.resting_height:  # the stand: no sinking, no sliding, no tipping
+        x, v, w = (
+            (b.position_world[0], b.position_world[1], AIRFRAME.resting_height),
+            (0.0, 0.0, max(v[2], 0.0)),
+            (0.0,) * 3,
+        )
+        q = b.attitude
+    return Body(x, q, v, w, (s0, s1, s2, s3))
+
+
+@kernel
+def fly(p, trajectory, plant, white, noise):
+    """Fly len(white) ticks; white: unit noise (ticks, 3 wind + 12 estimate); noise: sigma of position, velocity,
+    angle, rate of the estimate. Columns of the log: time, position, roll, pitch, yaw, references of these six, largest
+    thrust, stage."""
+    b = Body((0.0, 0.0, AIRFRAME.resting_height), NO_ROTATION, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+    s = START
+    log = np.zeros((len(white), 15))
+    gust = (0.0, 0.0, 0.0)
+    a = math.exp(-TICK / WIND_TIME)
+    n_gust = WIND_SIGMA * math.sqrt(1.0 - a * a)
+    old = (0.0, 0.0, 0.0, 0.0)
+    for i in range(len(white)):
+        e = white[i]
+        gust = (a * gust[0] + n_gust * e[0], a * gust[1] + n_gust * e[1], a * gust[2] + n_gust * e[2])
+        r = evaluate(trajectory, i * TICK)
+        setpoint = Setpoint(r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate)
+        estimate = Estimate(
+            add(b.position_world, (noise[0] * e[3], noise[0] * e[4], noise[0] * e[5])),
+            retract(b.attitude, (noise[2] * e[9], noise[2] * e[10], noise[2] * e[11])),
+            add(b.velocity_world, (noise[1] * e[6], noise[1] * e[7], noise[1] * e[8])),
+            add(b.omega_body, (noise[3] * e[12], noise[3] * e[13], noise[3] * e[14])),
+        )
+        s, u = step(p, s, TICK, estimate, setpoint)
+        angles = to_roll_pitch_yaw(b.attitude)
+        for k in range(3):
+            log[i, 1 + k] = b.position_world[k]
+            log[i, 4 + k] = angles[k]
+            log[i, 7 + k] = r.position_world[k]
+        log[i, 0], log[i, 10], log[i, 11], log[i, 12] = i * TICK, u.roll_reference, u.pitch_reference, u.yaw_reference
+        log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), s.stage.name
+        volts = u.motor_voltage
+        k = MOTOR.speed_constant * MOTOR.belt_ratio / RPM
+        new = (k * volts[0], k * volts[1], k * volts[2], k * volts[3])
+        applied = old if plant.delay == 1 else new
+        old = new
+        for _ in range(SUBSTEPS):
+            b = move(plant, b, applied, add(WIND_MEAN, gust), TICK / SUBSTEPS)
+    return log
+
+
+NOMINAL = Plant(AIRFRAME.mass, AIRFRAME.inertia_body, AIRFRAME.torque_per_thrust, MOTOR.thrust_coefficient, 0)
+TRUTH = (0.0, 0.0, 0.0, 0.0)
+
+
+def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):
+    """Log of a flight of the delivery mission (see `fly`)."""
+    trajectory = compile(spec, (0.0, 0.0, AIRFRAME.resting_height))
+    ticks = round(trajectory.duration / TICK)
+    white = np.random.default_rng(seed).standard_normal((ticks, 15))
+    return fly(parameters, trajectory.parameters, plant, white, noise)
+
+
+def rmse(log):
+    """RMSE of x, y, z [m], roll, pitch, yaw [rad] while the motors ran."""
+    flown = log[log[:, 14] != LANDED]
+    difference = flown[:, 7:13] - flown[:, 1:7]
+    difference[:, 5] = [wrap(d) for d in difference[:, 5]]
+    return np.sqrt(np.mean(difference**2, axis=0))

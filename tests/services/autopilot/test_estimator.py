@@ -1,0 +1,247 @@
+"""The filter against closed forms and independent linear algebra; accuracy and consistency over many flights."""
+
+import math
+
+import estimator_flight as ef
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from dynamics.geodesy import MAGNETIC_FIELD_WORLD
+from dynamics.lie.quaternion import NO_ROTATION, exp, from_roll_pitch_yaw, multiply, rotate_back, rotation_matrix
+from dynamics.vector import ZERO
+from services.autopilot import estimator
+from services.autopilot.estimator import doubt, fuse, state
+from services.autopilot.estimator.predict import _propagate_covariance
+
+P = estimator.PRESETS["rtk"]
+SEEDS = 100
+
+
+def at_rest(attitude=NO_ROTATION, p=P):
+    force = rotate_back(attitude, (0.0, 0.0, p.gravity))
+    return estimator.initial(p, ZERO, force, rotate_back(attitude, MAGNETIC_FIELD_WORLD))
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.1, -0.2, 2.5), (-0.4, 0.3, -1.0), (0.0, 0.0, math.pi / 2)])
+def test_levelled_attitude(angles):
+    attitude = from_roll_pitch_yaw(*angles)
+    levelled = at_rest(attitude).nominal.attitude
+    np.testing.assert_allclose(rotation_matrix(levelled), rotation_matrix(attitude), atol=1e-14)
+
+
+def test_prediction_follows_a_turning_climb():
+    """Constant acceleration in the world while turning at a constant rate: exact but for the trapezoidal rule."""
+    omega, acceleration = (0.0, 0.0, 0.8), (1.0, -0.5, 0.3)
+    s = at_rest()
+    for tick in range(501):
+        attitude = exp((0.0, 0.0, 0.8 * tick * P.interval))
+        force = rotate_back(attitude, (*acceleration[:2], acceleration[2] + P.gravity))
+        if tick:
+            s = estimator.predict(P, s, omega, force, 0.0, 0.0, True)
+        else:
+            s = s._replace(inertial=s.inertial._replace(tick=1, omega=omega, force=force))
+    t = 500 * P.interval
+    np.testing.assert_allclose(s.nominal.velocity_world, np.multiply(acceleration, t), atol=1e-9)
+    np.testing.assert_allclose(s.nominal.position_world, np.multiply(acceleration, t * t / 2), atol=1e-9)
+    np.testing.assert_allclose(s.nominal.attitude, exp((0.0, 0.0, 0.8 * t)), atol=1e-12)
+
+
+def random_covariance(rng):
+    a = rng.normal(size=(state.SIZE, state.SIZE))
+    return a @ a.T / state.SIZE
+
+
+def skew(v):
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+def test_covariance_propagation_against_dense_matrices():
+    """theory.md, eq. (3.22), written out as F P F^T."""
+    rng = np.random.default_rng(0)
+    covariance, f, dt = random_covariance(rng), rng.normal(size=3), 0.01
+    r = np.array(rotation_matrix(from_roll_pitch_yaw(0.3, -0.5, 2.0))).reshape(3, 3)
+    a = np.zeros((state.SIZE, state.SIZE))
+    a[0:3, 9:12] = -r
+    a[3:6, 0:3] = -skew(f)
+    a[3:6, 12:15] = -r
+    a[6:9, 3:6] = np.eye(3)
+    transition = np.eye(state.SIZE) + dt * a
+    ours = covariance.copy()
+    _propagate_covariance(ours, tuple(f), tuple(r.ravel()), dt)
+    np.testing.assert_allclose(ours, transition @ covariance @ transition.T, atol=1e-13)
+    np.testing.assert_array_equal(ours, ours.T)
+
+
+def test_scalar_updates_one_by_one_equal_the_joint_update():
+    """Three rows in turn against the textbook gain, and the sum of their ratios against the joint NIS."""
+    rng = np.random.default_rng(1)
+    m = at_rest().memory
+    m.covariance[:] = random_covariance(rng)
+    before = m.covariance.copy()
+    h, y, variance = rng.normal(size=(3, state.SIZE)), rng.normal(size=3), np.array([0.3, 0.5, 0.2])
+    nis = 0.0
+    for row, innovation, v in zip(h, y, variance, strict=True):
+        m.row[:] = row
+        nis += fuse.fuse(m, innovation, v)
+    s = h @ before @ h.T + np.diag(variance)
+    gain = before @ h.T @ np.linalg.inv(s)
+    np.testing.assert_allclose(m.correction, gain @ y, atol=1e-10)
+    np.testing.assert_allclose(m.covariance, before - gain @ s @ gain.T, atol=1e-10)
+    assert nis == pytest.approx(y @ np.linalg.solve(s, y))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_rows_of_acceleration_against_differences(axis):
+    """Turn the estimate by a small angle and shift the bias: the row tells how the true acceleration then differs."""
+    attitude, force = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([0.4, -0.3, 9.0])
+    m = at_rest().memory
+    r = np.array(rotation_matrix(attitude)).reshape(3, 3)
+    fuse.acceleration_row(m, tuple(r @ force), tuple(r.ravel()), axis, 1.0)
+    h = 1e-6
+    for i in range(3):
+        small = np.eye(3)[i] * h
+        turned = np.array(rotation_matrix(multiply(exp(tuple(small)), attitude))).reshape(3, 3)
+        assert m.row[state.THETA + i] == pytest.approx((turned @ force - r @ force)[axis] / h, abs=1e-5)
+        assert m.row[state.ACCELEROMETER + i] == pytest.approx((r @ (force - small) - r @ force)[axis] / h, abs=1e-5)
+
+
+def heading_innovation(attitude, iron):
+    """Innovation of the magnetometer when the truth is level north and the estimate is not."""
+    s = at_rest()
+    s = s._replace(nominal=s.nominal._replace(attitude=attitude, magnetometer_bias=iron))
+    s.memory.covariance[:] = np.eye(state.SIZE) * 1e-30
+    s = estimator.update_magnetometer(P._replace(gate=1e30), s, MAGNETIC_FIELD_WORLD, 1.0, True)
+    return s.memory
+
+
+def test_row_of_the_heading_against_differences():
+    h = 1e-6
+    row = heading_innovation(NO_ROTATION, ZERO).row.copy()
+    bx, by, _ = MAGNETIC_FIELD_WORLD
+
+    def innovation(attitude, iron):
+        f = np.array(rotation_matrix(attitude)).reshape(3, 3) @ np.subtract(MAGNETIC_FIELD_WORLD, iron)
+        return math.atan2(by, bx) - math.atan2(f[1], f[0])
+
+    for i in range(3):
+        small = np.eye(3)[i] * h
+        # An error theta of the estimate: the estimate is the truth turned back by it.
+        assert row[state.THETA + i] == pytest.approx(innovation(exp(tuple(-small)), ZERO) / h, abs=1e-5)
+        tesla = 1e-12
+        change = innovation(NO_ROTATION, tuple(-np.eye(3)[i] * tesla)) / tesla
+        assert row[state.IRON + i] == pytest.approx(change, rel=1e-4, abs=1.0)
+
+
+def ensemble(**arguments):
+    """Flights of 100 seeds, stacked along a first axis."""
+    flights = [ef.flight(seed=seed, **arguments) for seed in range(SEEDS)]
+    return ef.Flight(*(np.array(part) for part in zip(*flights, strict=True)))
+
+
+def rms(error):
+    return np.sqrt(np.mean(error**2, axis=(0, 1)))
+
+
+def test_position_is_good_to_three_centimetres_on_rtk():
+    error = ensemble().error[:, 50:, ef.P]
+    assert np.all(rms(error) < (0.015, 0.015, 0.01))
+    assert np.mean(np.linalg.norm(error, axis=2) < 0.03) > 0.97
+
+
+def test_same_bits_again():
+    for first, second in zip(ef.flight(seed=5, duration=8.0), ef.flight(seed=5, duration=8.0), strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def inside(values, degrees):
+    """Share of the instants at which the mean over the seeds lies within its 95 % bounds; whether their mean does."""
+    low, high = chi2.ppf([0.025, 0.975], degrees * len(values)) / len(values)
+    mean = values.mean(axis=0)
+    return np.mean((mean > low) & (mean < high)), low < mean.mean() < high
+
+
+def textbook():
+    """Sensors that have only the errors that the filter models, and a filter that is told their exact sizes."""
+    i, m = ef.DEFAULT[0], ef.DEFAULT[1]
+    exact = {"scale_error": 0.0, "misalignment_deg": 0.0}
+    instruments = ef.equipment(
+        imu=i._replace(
+            gyro=i.gyro._replace(temperature_dps_per_k=0.0, **exact),
+            accelerometer=i.accelerometer._replace(temperature_mg_per_k=0.0, **exact),
+            warm_up=0.0,
+        ),
+        magnetometer=m._replace(**exact),
+    )
+    p = P._replace(
+        gyro_scale_std=0.0,
+        gyro_bias_std=1.75e-3,
+        gyro_bias_walk=2.28e-6,
+        accelerometer_bias_std=0.0294,
+        accelerometer_bias_walk=3.6e-5,
+        magnetometer_bias_std=5.1e-8,
+        magnetometer_bias_walk=5.1e-10,
+        heading_std=1e-5,
+    )
+    return {"instruments": instruments, "p": p}
+
+
+def test_instruments_without_errors_give_an_estimate_without_errors():
+    """Zero variances are no trouble, and a vehicle at rest that repeats its readings is not taken for frozen."""
+    flight = ef.flight(instruments=ef.equipment(**{name: ef.sensors()[name].PRESETS["ideal"] for name in ef.NAMES}))
+    assert np.abs(flight.error[10:, ef.P]).max() < 5e-3
+    assert np.abs(flight.error[10:, ef.THETA]).max() < 1e-3
+    assert not flight.health.any()
+
+
+SETTLED = slice(60, None)  # the look at the standing vehicle is told to be less sure than it could be
+DEGREES = {state.GPS: 3, state.GPS_VELOCITY: 3, state.BARO: 1, state.SONAR: 1, state.MAG: 1}
+
+
+@pytest.mark.parametrize("agility", [1.0, 2.0])
+def test_consistent_in_a_world_as_modelled(agility):
+    """NEES of attitude, velocity and position, and NIS of every source, within their 95 % bounds over 100 seeds."""
+    flights = ensemble(agility=agility, **textbook())
+    share, mean_inside = inside(flights.nees[:, SETTLED], 9)
+    assert mean_inside
+    assert share > 0.75
+    for source, degrees in DEGREES.items():
+        share, mean_inside = inside(flights.nis[:, SETTLED, source], degrees)
+        assert mean_inside, source
+        assert source == state.SONAR or share > 0.9, source  # above 5 m no echo is used: the last NIS stays
+    assert np.mean(flights.rejected > 0) < 1e-4
+
+
+def test_consistent_on_the_presets():
+    """The same with every error of the real instruments, of which scale and alignment are no states of the filter."""
+    flights = ensemble()
+    _, mean_inside = inside(flights.nees[:, SETTLED], 9)
+    assert mean_inside
+    for source, degrees in DEGREES.items():
+        assert inside(flights.nis[:, SETTLED, source], degrees)[1], source
+    assert np.mean(np.abs(flights.error) < 3.0 * flights.std) > 0.99
+    assert np.mean(flights.rejected > 0) < 1e-4
+
+
+def test_an_ordinary_receiver_leaves_the_truth_within_three_sigma():
+    instruments = ef.equipment(gps=ef.gps.STANDARD)
+    flights = ensemble(instruments=instruments, p=estimator.PRESETS["standard"])
+    error = flights.error[:, 20:, ef.P]
+    assert np.mean(np.abs(error) < 3 * flights.std[:, 20:, ef.P]) > 0.99
+    assert np.all(rms(error) < 2.6)
+    assert np.mean(flights.rejected > 0) < 1e-4
+
+
+def test_position_alone_will_do():
+    assert np.all(rms(ensemble(velocity=False).error[:, 50:, ef.P]) < (0.015, 0.015, 0.01))
+
+
+def test_doubt_is_only_for_what_lasts():
+    s = at_rest()
+    before = s.memory.covariance.copy()
+    s.memory.since[state.MAG] = 100
+    doubt.doubt(P, s.memory, state.MAG)
+    np.testing.assert_array_equal(s.memory.covariance, before)
+    s.memory.since[state.MAG] = 2600  # 10.4 s
+    doubt.doubt(P, s.memory, state.MAG)
+    assert np.all(np.diag(s.memory.covariance)[state.IRON : state.IRON + 3] > np.diag(before)[state.IRON])

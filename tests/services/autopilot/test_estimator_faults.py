@@ -1,0 +1,78 @@
+"""Each fault on each sensor in flight: the right source is refused, the flight goes on, and afterwards all is well."""
+
+import estimator_flight as ef
+import numpy as np
+import pytest
+
+from services.autopilot import estimator
+from services.sensors import registry
+
+START, STOP = 16.0, 22.0  # [s]
+
+# sensor, fault, sources of which one must be refused (none: nothing to be seen), largest position error meanwhile [m]
+CASES = [
+    ("gps", {"kind": "dropout"}, {"gps"}, 0.5),
+    ("gps", {"kind": "freeze"}, {"gps"}, 0.5),
+    ("gps", {"kind": "bias", "channel": "position", "size": [5.0, 0.0, 0.0]}, {"gps"}, 0.1),
+    ("gps", {"kind": "bias", "channel": "velocity", "size": [1.0, 0.0, 0.0]}, {"gps_velocity"}, 0.1),
+    ("gps", {"kind": "spikes", "channel": "position", "size": 3.0, "probability": 0.3}, {"gps"}, 0.1),
+    ("gps", {"kind": "drift", "channel": "position", "size": 0.3}, {"gps"}, 0.1),
+    ("gps", {"kind": "scale", "channel": "position", "size": 1.5}, {"gps"}, 0.1),
+    ("gps", {"kind": "delay", "samples": 5}, {"gps", "gps_velocity"}, 5.0),
+    ("barometer", {"kind": "dropout"}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "freeze"}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "bias", "size": 100.0}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "spikes", "size": 200.0}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "drift", "size": 20.0}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "scale", "size": 1.01}, {"barometer"}, 0.05),
+    ("barometer", {"kind": "delay", "samples": 15}, set(), 0.05),
+    ("sonar", {"kind": "dropout"}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "freeze"}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "bias", "size": 0.5}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "spikes", "size": 1.0, "probability": 0.3}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "drift", "size": 0.1}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "scale", "size": 1.2}, {"sonar"}, 0.1),
+    ("sonar", {"kind": "delay", "samples": 5}, {"sonar"}, 0.1),
+    ("magnetometer", {"kind": "dropout"}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "freeze"}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "bias", "size": [2e-5, 0.0, 0.0]}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "spikes", "size": 2e-5}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "drift", "size": 2e-6}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "scale", "size": [1.5, 1.0, 1.0]}, {"magnetometer"}, 0.1),
+    ("magnetometer", {"kind": "delay", "samples": 15}, {"magnetometer"}, 0.1),
+    ("imu", {"kind": "dropout", "stop": START + 0.3}, {"imu"}, 0.2),
+    ("imu", {"kind": "freeze", "stop": START + 0.3}, {"imu"}, 0.2),
+    ("imu", {"kind": "bias", "channel": "gyro", "size": [0.02, 0.0, 0.0]}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "bias", "channel": "accelerometer", "size": [0.5, 0.0, 0.0]}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "spikes", "channel": "gyro", "size": 5.0, "probability": 0.02}, set(), 0.2),
+    ("imu", {"kind": "spikes", "channel": "accelerometer", "size": 50.0, "probability": 0.02}, {"imu"}, 0.2),
+    ("imu", {"kind": "drift", "channel": "gyro", "size": 0.01}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "scale", "channel": "gyro", "size": 1.1}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "scale", "channel": "accelerometer", "size": 1.05}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "delay", "samples": 5}, set(), 0.2),
+]
+
+
+@pytest.mark.parametrize(("sensor", "fault", "refused", "largest"), CASES)
+def test_fault(sensor, fault, refused, largest):
+    p = registry.parameters(sensor, {"faults": [{"start": START, "stop": STOP, **fault}]}, ef.INTERVAL)
+    flight = ef.flight(seed=3, instruments=ef.equipment(**{sensor: p}))
+    bits = np.bitwise_or.reduce(flight.rejected[round(START * 10) : round(STOP * 10) + 5])
+    named = {name for i, name in enumerate(estimator.SOURCES) if bits >> i & 1}
+    assert named >= refused
+    if sensor not in ("imu", "gps"):
+        assert named <= {sensor}
+    distance = np.linalg.norm(flight.error[:, ef.P], axis=1)
+    assert distance[100:].max() < largest
+    assert distance[-70:].max() < 0.05
+    assert np.linalg.norm(flight.error[-70:, ef.THETA], axis=1).max() < 0.03
+    assert flight.health[-1] == 0
+
+
+def test_the_health_says_what_is_lost_and_recovers():
+    p = registry.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
+    health = ef.flight(seed=3, instruments=ef.equipment(gps=p)).health
+    lost = 1 << estimator.SOURCES.index("gps") | 1 << estimator.SOURCES.index("gps_velocity")
+    assert np.all(health[165:215] == lost)
+    assert not health[100:158].any()
+    assert not health[240:].any()

@@ -1,0 +1,51 @@
+import pytest
+from closed_loop import AIRFRAME
+
+from services.autopilot.gains import FOLDER, build, load, names
+
+
+def test_the_paper_s_set_is_table_6():
+    gains = load("paper")
+    assert gains.lift == (28.0, 22.0, 18.0)
+    assert gains.yaw == (129.1, 181.2, 97.17)
+    assert gains.roll_inner == (-3.93, -0.09, -15.68)
+    assert gains.pitch_inner == (3.93, 0.089, 15.68)
+    assert gains.roll_outer == gains.pitch_outer == (0.52, 0.037, 0.74)
+    assert not gains.feed_forward
+
+
+def test_every_set_that_ships_builds_and_a_path_serves_as_well(tmp_path):
+    assert {"paper", "tuned"} <= set(names())
+    for name in names():
+        build(load(name), AIRFRAME)
+    own = tmp_path / "own.toml"
+    own.write_text((FOLDER / "tuned.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert load(str(own)) == load("tuned")
+
+
+def test_what_is_wrong_is_said_in_one_line(tmp_path):
+    text = (FOLDER / "paper.toml").read_text(encoding="utf-8")
+    cases = {
+        "missing.toml": (None, "cannot be read"),
+        "damaged.toml": ("lift = [", "not valid TOML"),
+        "unknown.toml": (text + "\nlfit = 1.0", "lfit"),
+        "short.toml": (text.replace("lift = [28.0, 22.0, 18.0]", "lift = [28.0]"), "lift"),
+        "upright.toml": (
+            text.replace("tilt_limit = 1.028", "tilt_limit = 1.6"),
+            "tilt_limit: Input should be less than 1.4",
+        ),
+    }
+    for name, (content, message) in cases.items():
+        if content is not None:
+            (tmp_path / name).write_text(content, encoding="utf-8")
+        with pytest.raises(ValueError, match=r"\A[^\n]+\Z") as error:
+            load(str(tmp_path / name))
+        assert name in str(error.value)
+        assert message in str(error.value)
+    with pytest.raises(ValueError, match="unknown gain set 'papr'; choose one of paper, tuned"):
+        load("papr")
+
+
+def test_a_vehicle_too_heavy_to_hover_is_refused():
+    with pytest.raises(ValueError, match=r"less than the 49.0 N that"):
+        build(load("paper"), AIRFRAME._replace(mass=20.0))

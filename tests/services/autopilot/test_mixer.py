@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+from closed_loop import AIRFRAME
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from services.autopilot.gains import build, load
+from services.autopilot.mixer import Quotas, mix, saturate
+
+SIGNS = build(load("paper"), AIRFRAME).signs
+TOP = 48.0
+ANY = st.floats(-100.0, 100.0)
+
+
+def wrench(thrust):
+    """Total force and torque of the rotors, each at its place, from the cross product."""
+    force, torque = np.zeros(3), np.zeros(3)
+    for f, x, y, turn in zip(thrust, AIRFRAME.rotor_x, AIRFRAME.rotor_y, AIRFRAME.yaw_sign, strict=True):
+        force += (0.0, 0.0, f)
+        torque += np.cross((x, y, 0.0), (0.0, 0.0, f))
+        torque[2] += turn * AIRFRAME.torque_per_thrust * f
+    return force, torque
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_each_quota_turns_about_its_own_axis_only(axis):
+    quotas = [0.0, 0.0, 0.0, 0.0]
+    quotas[1 + axis] = 2.0
+    force, torque = wrench(mix(SIGNS, Quotas(*quotas)))
+    arm = (AIRFRAME.rotor_y[0], AIRFRAME.rotor_x[0], AIRFRAME.torque_per_thrust)[axis]
+    assert force == pytest.approx(0.0, abs=1e-12)
+    assert torque == pytest.approx([8.0 * arm if k == axis else 0.0 for k in range(3)], abs=1e-12)
+
+
+def test_lift_turns_nothing():
+    force, torque = wrench(mix(SIGNS, Quotas(3.0, 0.0, 0.0, 0.0)))
+    assert force == pytest.approx((0.0, 0.0, 12.0))
+    assert torque == pytest.approx(0.0, abs=1e-12)
+
+
+@given(ANY, ANY, ANY, ANY)
+@settings(deadline=None)
+def test_saturated_thrusts_are_possible_and_possible_ones_stay(lift, roll, pitch, yaw):
+    wanted = Quotas(lift, roll, pitch, yaw)
+    given_ = saturate(SIGNS, wanted, TOP)
+    thrust = mix(SIGNS, given_)
+    assert min(thrust) >= -1e-9
+    assert max(thrust) <= TOP + 1e-9
+    free = mix(SIGNS, wanted)
+    if min(free) >= 0.0 and max(free) <= TOP:
+        assert given_ == pytest.approx(wanted, abs=1e-12)
+    assert all(abs(a) <= abs(b) + 1e-12 and a * b >= 0.0 for a, b in zip(given_[1:], wanted[1:], strict=True))
+
+
+@given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
+@settings(deadline=None)
+def test_yaw_gets_what_the_others_leave_and_no_less(lift, roll, pitch, yaw):
+    given_ = saturate(SIGNS, Quotas(lift, roll, pitch, yaw), TOP)
+    assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
+    bare = mix(SIGNS, given_._replace(yaw=0.0))
+    shares = [s[2] for s in SIGNS]
+    best = linprog(  # the most yaw towards what is wanted that keeps every thrust possible
+        [-np.sign(yaw) or -1.0],
+        A_ub=[[s] for s in shares] + [[-s] for s in shares],
+        b_ub=[max(TOP - b, 0.0) for b in bare] + [max(b, 0.0) for b in bare],
+        bounds=[(min(yaw, 0.0), max(yaw, 0.0))],
+    )
+    assert given_.yaw == pytest.approx(best.x[0], abs=1e-6)

@@ -1,0 +1,85 @@
+"""Long records of a sensor at rest, compiled, and their Allan deviation."""
+
+import numpy as np
+
+from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home, geodetic_to_enu
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import NO_ROTATION
+from dynamics.noise import stream_key
+from dynamics.vector import ZERO
+from services.sensors import barometer, gps, imu, magnetometer, sonar
+from services.sensors.truth import Truth
+
+HOME = Home()
+REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, HOME, 15.0, MAGNETIC_FIELD_WORLD)
+
+
+@kernel
+def record_imu(p, key, truth, out):
+    s = imu.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = imu.sample(p, s, key, k, truth)
+        out[k, 0], out[k, 1], out[k, 2] = r.omega_body
+        out[k, 3], out[k, 4], out[k, 5] = r.specific_force_body
+
+
+@kernel
+def record_magnetometer(p, key, truth, out):
+    s = magnetometer.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = magnetometer.sample(p, s, key, k, truth)
+        out[k, 0], out[k, 1], out[k, 2] = r.field_body
+
+
+@kernel
+def record_barometer(p, key, truth, out):
+    s = barometer.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = barometer.sample(p, s, key, k, truth)
+        out[k, 0] = r.pressure
+
+
+@kernel
+def record_sonar(p, key, truth, out):
+    s = sonar.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = sonar.sample(p, s, key, k, truth)
+        out[k, 0] = r.range
+
+
+@kernel
+def record_gps(p, key, truth, out):
+    s = gps.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = gps.sample(p, s, key, k, truth)
+        out[k, 0], out[k, 1], out[k, 2] = geodetic_to_enu(truth.home, r.latitude_deg, r.longitude_deg, r.height)
+        out[k, 3], out[k, 4], out[k, 5] = r.velocity_world
+
+
+RECORD = {
+    "imu": (record_imu, 6),
+    "magnetometer": (record_magnetometer, 3),
+    "barometer": (record_barometer, 1),
+    "sonar": (record_sonar, 1),
+    "gps": (record_gps, 6),
+}
+
+
+def record(sensor, p, samples, seed=1, vehicle="drone1", truth=REST):
+    """Readings (samples, channels) of a vehicle that does not move."""
+    function, width = RECORD[sensor]
+    out = np.empty((samples, width))
+    function(p, stream_key(seed, vehicle, sensor), truth, out)
+    return out
+
+
+def allan_deviation(x, m):
+    """Overlapping Allan deviation of each column over clusters of m samples (IEEE Std 952, annex C)."""
+    sums = np.cumsum(np.vstack([np.zeros(x.shape[1]), x - x.mean(axis=0)]), axis=0)
+    mean = (sums[m:] - sums[:-m]) / m
+    return np.sqrt(0.5 * np.mean((mean[m:] - mean[:-m]) ** 2, axis=0))
+
+
+def together(deviations):
+    """One figure for like axes."""
+    return float(np.sqrt(np.mean(np.square(deviations))))

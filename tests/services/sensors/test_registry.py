@@ -1,0 +1,48 @@
+"""Sensors are found, their presets hold together, and bad tables are refused in one line."""
+
+import pytest
+
+from services.sensors import registry
+
+
+def test_the_sensors_of_the_folder_are_found():
+    assert set(registry.sensors()) == {"barometer", "gps", "imu", "magnetometer", "sonar"}
+
+
+@pytest.mark.parametrize("sensor", registry.sensors())
+def test_every_preset_passes_its_own_validation(sensor):
+    for name, preset in registry.sensors()[sensor].PRESETS.items():
+        assert registry.parameters(sensor, {"preset": name}, 0.004) == preset
+
+
+def test_the_first_preset_is_the_default():
+    assert registry.parameters("gps", {}, 0.004) == registry.sensors()["gps"].PRESETS["rtk"]
+
+
+def test_a_table_changes_single_values():
+    p = registry.parameters("imu", {"preset": "bmi088", "rate": 500, "gyro": {"turn_on_dps": 1}}, 0.002)
+    assert (p.rate, p.gyro.turn_on_dps, p.gyro.noise_dps_per_sqrt_hz) == (500.0, 1.0, 0.016)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"preset": "mpu9999"}, ["preset", "mpu6000, bmi088, ideal"]),
+        ({"rate": -1}, ["rate", "greater than 0", "-1"]),
+        ({"gyro": {"noise_dps_per_sqrt_hz": -0.1}}, ["gyro.noise_dps_per_sqrt_hz", "greater than or equal to 0"]),
+        ({"gyro": {"noise": 1.0}}, ["gyro.noise", "unknown key", "noise_dps_per_sqrt_hz"]),
+        ({"ratio": 1.0}, ["ratio", "unknown key", "rate"]),
+        ({"rate": "fast"}, ["rate", "number", "'fast'"]),
+        ({"faults": 3}, ["faults", "list"]),
+    ],
+)
+def test_bad_tables_are_refused_in_one_line(table, words):
+    with pytest.raises(ValueError, match=words[0]) as error:
+        registry.parameters("imu", table, 0.004)
+    assert all(word in str(error.value) for word in words)
+    assert "\n" not in str(error.value)
+
+
+def test_an_unknown_sensor_lists_the_choices():
+    with pytest.raises(ValueError, match="barometer, gps, imu, magnetometer, sonar"):
+        registry.parameters("lidar", {}, 0.004)
