@@ -1,5 +1,6 @@
 """The tables of a scene that more than one service reads."""
 
+import importlib
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
@@ -8,7 +9,7 @@ from pydantic import ConfigDict, Field
 from dynamics import effects
 from dynamics.vehicles.airframe import Airframe, load_airframe
 from messages.topics import Topic
-from services.scene import Scene, SceneError, Section
+from services.scene import Scene, SceneError, Section, WrongKeyError, model_names, sections
 
 AIRFRAMES = "vehicles"  # the folder beside the scenes
 
@@ -55,18 +56,19 @@ class Exchange(Section):
 
 
 class Rates(Section):
-    """How often derived messages are published [Hz]; each divides exchange.rate."""
+    """How often derived messages are published [Hz], at the most once a tick; each divides exchange.rate."""
 
     TABLE: ClassVar[str] = "rates"
     pose: int = Field(default=50, gt=0)  # pose, odometry, transform and clock
     estimate: int = Field(default=50, gt=0)
     status: int = Field(default=10, gt=0)
     battery: int = Field(default=10, gt=0)
+    bodies: int = Field(default=50, gt=0)  # the single bodies of a vehicle that has several
 
     def check(self, scene: Scene) -> None:
         """Every rate divides the exchange rate."""
         for key in type(self).model_fields:
-            ticks(scene, getattr(self, key), key)
+            ticks(scene, min(getattr(self, key), scene[Exchange].rate), key)
 
 
 class Vehicle(Section):
@@ -75,11 +77,13 @@ class Vehicle(Section):
     TABLE: ClassVar[str] = "vehicle"
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
     airframe: str = "delivery_drone"  # a file of the folder vehicles/ beside the scene, or the path of a .toml file
-    model: Literal["reduced"] = "reduced"
+    model: str = "reduced"  # a module of services/plant/models
 
     def check(self, scene: Scene) -> None:
-        """The airframe's file is there and sound."""
-        airframe(scene)
+        """There is such a model, and the scene has what it needs and nothing that it cannot have."""
+        if self.model not in model_names():
+            raise ValueError(f"model: expected one of {', '.join(model_names())}, got {self.model!r}")
+        importlib.import_module(f"services.plant.models.{self.model}").check(scene)
 
 
 class Effects(Section):
@@ -116,6 +120,21 @@ class Published(Section):
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
 
 
+def needs(scene: Scene, *tables: str) -> None:
+    """WrongKeyError if a scene lacks one of these optional tables."""
+    for name in tables:
+        if not scene.has(sections()[name]):
+            raise WrongKeyError(name, f"missing; the model {scene[Vehicle].model} needs a table [{name}]")
+
+
+def can_have(scene: Scene, *tables: str) -> None:
+    """WrongKeyError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
+    for name in {"effects", "sensors", "autopilot", "trajectory"}.difference(tables):
+        section = sections()[name]
+        if scene.has(section) and (section.OPTIONAL or scene.tables(name)):
+            raise WrongKeyError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
+
+
 def ticks(scene: Scene, rate: float, key: str) -> int:
     """Ticks between messages of `rate` [Hz].
 
@@ -133,7 +152,9 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
 
 def period(scene: Scene, topic: Topic) -> int:
     """Ticks between two messages of a topic: its rate is the scene key that the topic table names."""
-    return 1 if topic.rate is None else ticks(scene, scene.lookup(topic.rate), topic.rate)
+    if topic.rate is None:
+        return 1
+    return ticks(scene, min(scene.lookup(topic.rate), scene[Exchange].rate), topic.rate)
 
 
 def airframe(scene: Scene) -> Airframe:
