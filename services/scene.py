@@ -19,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 import services
 
+OVERRIDE_MARK = "# --set "  # begins the lines at the end of a recorded scene
+
 
 class SceneError(ValueError):
     """A scene that cannot be flown; the text is one line for the user."""
@@ -134,6 +136,19 @@ def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
     return _validate(path, text, overrides, data)
 
 
+def recorded_data(text: str) -> dict[str, Any]:
+    """The tables of a scene as a log carries it, with the overrides of its run applied.
+
+    Raises:
+        ValueError: not valid TOML.
+    """
+    data = tomllib.loads(text)
+    for line in text.splitlines():
+        if line.startswith(OVERRIDE_MARK):
+            _override(data, line.removeprefix(OVERRIDE_MARK))
+    return data
+
+
 def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
@@ -207,7 +222,7 @@ def _validate(path: Path, text: str, overrides: list[str], data: dict[str, Any])
             # A misspelt key also leaves another one missing: name the misspelling.
             first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
             raise fail(*_explain(name, section, first)) from None
-    merged = text if not overrides else text + "".join(f"\n# --set {o}" for o in overrides) + "\n"
+    merged = text if not overrides else text + "".join(f"\n{OVERRIDE_MARK}{o}" for o in overrides) + "\n"
     scene = Scene(path, merged, tables)
     for section in tables:
         try:

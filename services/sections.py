@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -11,6 +11,7 @@ from dynamics.vehicles.airframe import Airframe, load_airframe
 from messages.topics import Topic
 from services.scene import Scene, SceneError, Section, WrongKeyError, model_names, sections
 
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
 AIRFRAMES = "vehicles"  # the folder beside the scenes
 
 
@@ -84,6 +85,21 @@ class Vehicle(Section):
         if self.model not in model_names():
             raise ValueError(f"model: expected one of {', '.join(model_names())}, got {self.model!r}")
         importlib.import_module(f"services.plant.models.{self.model}").check(scene)
+
+
+class CooperativeLoad(Section):
+    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); a tuple has an entry for each."""
+
+    TABLE: ClassVar[str] = "cooperative_load"
+    OPTIONAL: ClassVar[bool] = True
+    quad_mass: tuple[float, ...] = Field(min_length=2, strict=False)  # [kg]
+    quad_inertia: tuple[Triple, ...] = Field(min_length=2, strict=False)  # [kg m^2] principal moments
+    link_length: tuple[float, ...] = Field(min_length=2, strict=False)  # [m]
+    link_start: tuple[Triple, ...] = Field(min_length=2, strict=False)  # unit vectors from quadrotor to load
+    load_mass: float  # [kg]
+    load_start: Triple  # [m] world frame
+    load_velocity_start: Triple = (0.0, 0.0, 0.0)  # [m/s] world frame
+    gravity: float = 9.81  # [m/s^2]
 
 
 class Effects(Section):
@@ -179,7 +195,8 @@ def airframe(scene: Scene) -> Airframe:
 
 def active(scene: Scene) -> tuple:
     """Parameters of the scene's effects, sorted by name."""
-    return effects.from_scene(scene[Effects].tables, airframe(scene))
+    tables = scene[Effects].tables
+    return effects.from_scene(tables, airframe(scene)) if tables else ()
 
 
 def gravity(scene: Scene) -> float:

@@ -82,9 +82,7 @@ class Reduced:
         time_ns = tick * self._interval_ns
         yield TRUTH, outputs.truth(time_ns, self._name, motion, seen)
         if tick % self._pose_every == 0:
-            yield POSE, outputs.pose(time_ns, motion)
+            yield from outputs.whereabouts(time_ns, self._name, motion)
             yield ODOM, outputs.odometry(time_ns, self._name, motion)
-            yield TF, outputs.transform(time_ns, self._name, motion)
-            yield CLOCK, outputs.clock(time_ns)
         if tick % self._battery_every == 0:
             yield BATTERY, outputs.battery(time_ns, self._name, self._voltage, sum(seen.motor_current), self._cells)
