@@ -381,6 +381,24 @@ def performance(
 
 
 @app.command()
+def accuracy(
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (TOML)")],
+    goal: Annotated[
+        float | None, typer.Option("--target", metavar="ERROR", help="name the cheapest choice that meets it: 1e-6")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all points as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw error over time (PNG, SVG or PDF)")] = None,
+) -> None:
+    """Error against wall time of every integrator, on a system whose answer is known, or on a scene's plant."""
+    with user_errors():
+        from studies.accuracy import command
+
+        _check_writable(json)
+        _check_writable(plot)
+        command.run(target, goal, json, plot)
+
+
+@app.command()
 def replay(
     log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
     speed: Speed = "1",

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -146,6 +147,40 @@ def test_order_and_manifold(name, exact):
     for space, order in measured.items():
         declared = getattr(method, "FLAT_ORDER", method.ORDER) if space == "pendulum" else method.ORDER
         assert declared - 0.2 < order < declared + 0.7, f"{space}: measured {measured}"
+
+
+class CountingParameters(NamedTuple):
+    """A rate that counts how often it is asked."""
+
+    inertia: Vec3
+    count: np.ndarray
+
+
+@pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
+def test_evaluations_are_as_declared(name):
+    method, (body, start) = integrators.get(name), BODY
+    one_step, inside = method.step, RATES[type(body)]
+    x0 = start if hasattr(method, "REQUIRES") else (0.3,)
+
+    @numba.njit
+    def counting_body(p, t, x):
+        p.count[0] += 1
+        return inside(p, t, x)
+
+    @numba.njit
+    def counting_number(p, t, x):
+        p.count[0] += 1
+        return x
+
+    counting = counting_body if hasattr(method, "REQUIRES") else counting_number
+
+    @numba.njit
+    def once(p, x):
+        return one_step(counting, p, 0.0, x, 0.1)
+
+    p = CountingParameters(body.inertia, np.zeros(1, dtype=np.int64))
+    once(p, x0)
+    assert p.count[0] == method.EVALUATIONS
 
 
 def test_an_unknown_name_lists_the_choices():

@@ -1,0 +1,71 @@
+"""The study's points as a table and as JSON."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from studies.accuracy.measure import Point, telling
+from studies.accuracy.problem import Problem
+
+LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are shown
+
+
+def setting(point: Point, unit: str) -> str:
+    """The step or tolerance of a point as one reads it."""
+    return f"tol {point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.3g} {unit}"
+
+
+def sentence(point: Point, unit: str) -> str:
+    """One line about a point."""
+    what = "tolerance" if point.unit == "tol" else "step"
+    text = f"{point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.6g} {unit}"
+    return (
+        f"{point.way}, {what} {text}: error {point.error:.1e}, "
+        f"{1e3 * point.time:.3g} ms, {point.evaluations} evaluations"
+    )
+
+
+def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
+    """Print, of each method, its cheapest points at a few errors."""
+    console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("method (order)", no_wrap=True)
+    for name in ("step", "error", "time (ms)", "evaluations", *[f"drift of\n{n}" for n in _drifts(points)]):
+        table.add_column(name, justify="right", no_wrap=True)
+    before = None
+    for point in telling(points, LEVELS):
+        head = f"{point.way} ({point.order})" if point.way != before else ""
+        drifts = [f"{point.drift[n]:.0e}" for n in _drifts(points)]
+        table.add_row(
+            head, setting(point, problem.unit), f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
+            str(point.evaluations), *drifts,
+        )  # fmt: skip
+        before = point.way
+    console.print(table)
+    if chosen is not None:
+        console.print(f"cheapest: {sentence(chosen, problem.unit)}", highlight=False)
+
+
+def _drifts(points: list[Point]) -> list[str]:
+    return list(points[0].drift) if points else []
+
+
+def write_json(
+    path: Path, target: str, problem: Problem, points: list[Point], chosen: Point | None, more: dict[str, Any]
+) -> None:
+    """Write all points for other programs."""
+    data = {
+        "target": target,
+        "title": problem.title,
+        "duration": problem.duration,
+        "time_unit": problem.unit,
+        "reference": problem.source,
+        "points": [p._asdict() for p in points],
+        "cheapest": chosen._asdict() if chosen else None,
+        **more,
+    }
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
