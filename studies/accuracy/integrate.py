@@ -39,7 +39,7 @@ def applicable(x: Any) -> list[str]:
 
 
 def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
-    """A way for each integrator.
+    """A way for each integrator, the adaptive one by tolerances.
 
     Args:
         p: parameters of the system (its class is in `RATES`).
@@ -47,16 +47,18 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
         duration: of the run.
         coarsest: steps of the coarsest run; a multiple of SAMPLES.
     """
-    found = []
-    for name in applicable(x):
-        method = integrators.get(name)
-        make = _adaptive if name == ADAPTIVE else _fixed
-        found.append(make(name, method, p, x, duration, coarsest))
-    return found
+    fixed = fixed_ways(p, x, duration, coarsest)
+    return [_adaptive(p, x, duration) if way.name == ADAPTIVE else way for way in fixed]
 
 
-def _fixed(name: str, method: ModuleType, p: Any, x: Any, duration: float, coarsest: int) -> Way:
-    token, width = method.Method(), len(flatten(x))
+def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
+    """A way for each integrator, all by steps."""
+    return [_fixed(name, p, x, duration, coarsest) for name in applicable(x)]
+
+
+def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
+    method, width = integrators.get(name), len(flatten(x))
+    token = method.Method()
 
     def steps(h: float) -> int:
         return round(duration / h)
@@ -79,8 +81,8 @@ def _fixed(name: str, method: ModuleType, p: Any, x: Any, duration: float, coars
     return Way(name, method.ORDER, "s", settings, prepare, read, lambda: record(token, p, 0.0, x, duration, 1, start))
 
 
-def _adaptive(name: str, method: ModuleType, p: Any, x: Any, duration: float, coarsest: int) -> Way:
-    ends = np.array([0.0, duration])
+def _adaptive(p: Any, x: Any, duration: float) -> Way:
+    method, ends = integrators.get(ADAPTIVE), np.array([0.0, duration])
 
     def prepare(tolerance: float) -> Callable[[], Any]:
         out = np.empty((2, len(flatten(x))))
@@ -95,4 +97,4 @@ def _adaptive(name: str, method: ModuleType, p: Any, x: Any, duration: float, co
         return Outcome(ends, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     start = np.empty((1, len(flatten(x))))
-    return Way(name, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapt(p, x, ends[:1], 1.0, start))
+    return Way(ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapt(p, x, ends[:1], 1.0, start))

@@ -26,7 +26,7 @@ class Point(NamedTuple):
     setting: float
     error: float  # largest difference to the reference at the end, relative to 1 + size
     time: float  # [s] of wall time, median
-    evaluations: int
+    evaluations: int | None
     drift: dict[str, float]  # of each invariant, relative to its size; "manifold": how far the end is off it
 
 

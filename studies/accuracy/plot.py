@@ -1,10 +1,12 @@
 """The work-precision plot: error over wall time, a line for each method."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies.accuracy.apart import Part
 from studies.accuracy.measure import Point
 from studies.report.style import DPI, styled
 
@@ -14,14 +16,35 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 SMALLEST = 1e-14  # errors below are drawn there
 
 
-def draw(path: Path, title: str, points: list[Point]) -> None:
-    """Write the picture in the format of the file's ending."""
+def draw(path: Path, title: str, points: list[Point], parts: Sequence[Part] = ()) -> None:
+    """Write the picture in the format of the file's ending; beside it, of a scene, its three errors."""
     with styled():
-        figure = Figure(figsize=(8.6, 5.6), layout="constrained")
-        axes = figure.subplots()
-        on_axes(axes, points)
-        axes.set_title(title)
+        figure = Figure(figsize=(14.0 if parts else 8.6, 5.6), layout="constrained")
+        axes = figure.subplots(1, 2 if parts else 1, squeeze=False, width_ratios=(1.6, 1.0) if parts else None)[0]
+        on_axes(axes[0], points)
+        axes[0].set_title(title)
+        if parts:
+            three_errors(axes[1], parts)
         figure.savefig(path, dpi=DPI)
+
+
+def three_errors(axes: Axes, parts: Sequence[Part]) -> None:
+    """Draw what the flight loses to step, exchange interval and coupling, over their size."""
+    for index, source in enumerate(dict.fromkeys(p.source for p in parts)):
+        own = [p for p in parts if p.source == source]
+        axes.plot(
+            [1e3 * p.setting for p in own],
+            [max(p.position, SMALLEST) for p in own],
+            color=COLOURS[index],
+            marker=MARKERS[index],
+            label=source,
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_title("the flight: three errors apart")
+    axes.set_xlabel("step, or exchange interval [ms]")
+    axes.set_ylabel("difference of position, 9 ticks in 10 below [m]")
+    axes.legend()
 
 
 def on_axes(axes: Axes, points: list[Point]) -> None:

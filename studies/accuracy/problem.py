@@ -12,7 +12,7 @@ class Outcome(NamedTuple):
     times: np.ndarray  # of the samples, shape (k,), the first the start, the last the end
     samples: np.ndarray  # coordinates (studies/accuracy/coordinates.py) at these times, shape (k, n)
     defect: float  # how far the end is off its manifold
-    evaluations: int  # of the right-hand side
+    evaluations: int | None  # of the right-hand side; None where they are not known
 
 
 class Way(NamedTuple):

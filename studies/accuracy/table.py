@@ -2,12 +2,12 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from studies.accuracy.apart import Part
 from studies.accuracy.measure import Point, telling
 from studies.accuracy.problem import Problem
 
@@ -23,10 +23,8 @@ def sentence(point: Point, unit: str) -> str:
     """One line about a point."""
     what = "tolerance" if point.unit == "tol" else "step"
     text = f"{point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.6g} {unit}"
-    return (
-        f"{point.way}, {what} {text}: error {point.error:.1e}, "
-        f"{1e3 * point.time:.3g} ms, {point.evaluations} evaluations"
-    )
+    cost = "" if point.evaluations is None else f", {point.evaluations} evaluations"
+    return f"{point.way}, {what} {text}: error {point.error:.1e}, {1e3 * point.time:.3g} ms{cost}"
 
 
 def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
@@ -42,7 +40,7 @@ def show(console: Console, problem: Problem, points: list[Point], chosen: Point 
         drifts = [f"{point.drift[n]:.0e}" for n in _drifts(points)]
         table.add_row(
             head, setting(point, problem.unit), f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
-            str(point.evaluations), *drifts,
+            "" if point.evaluations is None else str(point.evaluations), *drifts,
         )  # fmt: skip
         before = point.way
     console.print(table)
@@ -54,10 +52,28 @@ def _drifts(points: list[Point]) -> list[str]:
     return list(points[0].drift) if points else []
 
 
+def show_parts(console: Console, parts: list[Part]) -> None:
+    """Print the three errors of a flight."""
+    console.print("What the flight loses to each, in closed loop without noise; nine ticks in ten are below:")
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("source", no_wrap=True)
+    table.add_column("setting", no_wrap=True)
+    table.add_column("position (m)", justify="right")
+    table.add_column("attitude (rad)", justify="right")
+    table.add_column("largest (m)", justify="right")
+    before = None
+    for part in parts:
+        source = part.source if part.source != before else ""
+        errors = (part.position, part.attitude, part.largest_position)
+        table.add_row(source, part.label, *(f"{error:.1e}" for error in errors))
+        before = part.source
+    console.print(table)
+
+
 def write_json(
-    path: Path, target: str, problem: Problem, points: list[Point], chosen: Point | None, more: dict[str, Any]
+    path: Path, target: str, problem: Problem, points: list[Point], chosen: Point | None, parts: list[Part]
 ) -> None:
-    """Write all points for other programs."""
+    """Write all points, and the three errors of a scene, for other programs."""
     data = {
         "target": target,
         "title": problem.title,
@@ -66,6 +82,6 @@ def write_json(
         "reference": problem.source,
         "points": [p._asdict() for p in points],
         "cheapest": chosen._asdict() if chosen else None,
-        **more,
+        "apart": [p._asdict() for p in parts],
     }
     path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")

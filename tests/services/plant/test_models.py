@@ -36,7 +36,7 @@ def test_a_scene_moves_as_the_library_does(path, model):
     scene = load(path)
     count, solver = 20, scene.lookup("solver")
     steps = round(1.0 / scene.lookup("exchange.rate") / solver.step)
-    p, start = model._system(scene)
+    p, start = model.system(scene)
     _, rows = simulate(get(solver.integrator), p, start, solver.step, count * steps, every=steps)
     for row, truth in zip(rows, ticks(scene, count + 1), strict=True):
         q = truth.pose.orientation

@@ -76,7 +76,7 @@ def test_a_misspelt_target_lists_the_choices():
 
 
 def test_json_and_picture(tmp_path):
-    table.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], {})
+    table.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], [])
     data = json.loads((tmp_path / "a.json").read_text())
     assert data["cheapest"]["way"] == "one"
     assert data["points"][2] == {
@@ -88,7 +88,7 @@ def test_json_and_picture(tmp_path):
 
 
 def test_the_command_prints_the_choice(capsys, tmp_path):
-    run("os4_experiment_1", 1e-3, tmp_path / "a.json", None)
+    run("os4_experiment_1", [], 1e-3, tmp_path / "a.json", None)
     printed = capsys.readouterr().out
     assert "OS4 quadrotor: experiment 1" in printed
     assert "cheapest: " in printed
