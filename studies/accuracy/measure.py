@@ -12,7 +12,7 @@ from studies.accuracy.coordinates import error
 from studies.accuracy.problem import Outcome, Problem, Way
 
 FINE_ENOUGH = 1e-11  # errors below are round-off, of the run or of the reference
-LONGEST = 0.1  # [s] of wall time of one run; a way that needs more is refined no further
+LONGEST = 0.1  # [s] of wall time of one run; what takes longer is not repeated, and not refined by default
 TIMED = 0.02  # [s] spent on timing a run
 REPEATS = (3, 500)  # fewest and most
 
@@ -30,17 +30,17 @@ class Point(NamedTuple):
     drift: dict[str, float]  # of each invariant, relative to its size; "manifold": how far the end is off it
 
 
-def measure(problem: Problem) -> list[Point]:
-    """All points of a problem, way by way, each from coarse to fine."""
+def measure(problem: Problem, longest: float = LONGEST) -> list[Point]:
+    """All points of a problem, way by way, each from coarse to fine until a run takes `longest` [s] of wall time."""
     exact = problem.reference()
     points = []
     for way in problem.ways:
         way.idle()  # compiles or loads
-        points += _refine(problem, way, exact)
+        points += _refine(problem, way, exact, longest)
     return points
 
 
-def _refine(problem: Problem, way: Way, exact: np.ndarray) -> list[Point]:
+def _refine(problem: Problem, way: Way, exact: np.ndarray, longest: float) -> list[Point]:
     points: list[Point] = []
     idle = clock(way.idle)[0]
     for setting in way.settings:
@@ -51,7 +51,7 @@ def _refine(problem: Problem, way: Way, exact: np.ndarray) -> list[Point]:
             net = max(seconds - idle, 1e-7)
             drifts = drift(problem, outcome)
             points.append(Point(way.name, way.order, way.unit, setting, off, net, outcome.evaluations, drifts))
-        if seconds > LONGEST or _exhausted([p.error for p in points]):
+        if seconds > longest or _exhausted([p.error for p in points]):
             break
     return points
 

@@ -91,6 +91,7 @@ SPACES = (
 BODY = (TwistedBodyParameters((1.0, 1.6, 2.1)), RigidBody(quaternion.exp((0.3, -0.5, 0.2)), (0.6, -0.9, 1.2)))
 SPAN = 1.6
 COUNTS = {1: (512, 1024, 2048), 2: (64, 128, 256), 3: (32, 64, 128), 4: (20, 40, 80), 5: (24, 40, 64), 6: (4, 6, 9)}
+COUNTS[8] = (7, 10, 13)
 
 
 def reference(p, x0):

@@ -1,4 +1,4 @@
-"""The gyrostat satellite in its four cases: rotors blocked, spinning, with friction, with friction and feedback."""
+"""The gyrostat satellite in its four cases, and one more with rotors that spin evenly, as free rotors do."""
 
 import numpy as np
 
@@ -29,15 +29,18 @@ FEEDBACK = GyrostatParameters(
 )
 FRICTION = FEEDBACK._replace(linear_gain=NONE, cubic_gain=NONE)
 SPINNING = FRICTION._replace(damping=0.0)
+STEADY = SPINNING._replace(forcing_amplitude=0.0, inertia=(500.0, 550.0, 1000.0))  # three different moments
 BLOCKED = SPINNING._replace(rotor_momentum=NONE)
 
 
 def problems() -> dict[str, Problem]:
     """One for each case."""
     momentum = {"momentum": lambda t, y: total_momentum(SPINNING, t, y)}
-    free = {"energy": energy, "momentum": lambda t, y: total_momentum(BLOCKED, t, y)}
+    steady = {"energy": lambda t, y: energy(STEADY, t, y), "momentum": lambda t, y: total_momentum(STEADY, t, y)}
+    free = {"energy": lambda t, y: energy(BLOCKED, t, y), "momentum": lambda t, y: total_momentum(BLOCKED, t, y)}
     cases = {
         "blocked": (BLOCKED, "rotors blocked", free),
+        "steady": (STEADY, "rotors spinning evenly", steady),
         "spinning": (SPINNING, "rotors spinning, the third unevenly", momentum),
         "friction": (FRICTION, "friction about the third axis", {}),
         "feedback": (FEEDBACK, "friction, and feedback of the rates", {}),
@@ -72,9 +75,9 @@ def right_hand_side(p: GyrostatParameters, t: float, y: np.ndarray) -> np.ndarra
     return np.concatenate([turning(y[:9], y[9:]), [du, dv, dw]])
 
 
-def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:
+def energy(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Kinetic energy of the platform, shape (k,)."""
-    return 0.5 * (y[:, 9:] ** 2 * FEEDBACK.inertia).sum(axis=1)
+    return 0.5 * (y[:, 9:] ** 2 * p.inertia).sum(axis=1)
 
 
 def total_momentum(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ def turned(angle):
 
 def test_difference_at_common_ticks():
     fine = Track(0.1, np.array([[0.1 * k, 0, 0] for k in range(7)]), np.array([turned(0.0)] * 7))
-    coarse = Track(0.2, fine.position[::2] + [0, 0.3, 0], np.array([turned(1e-9)] * 4))
+    coarse = Track(0.2, fine.position[::2] + np.array([0, 0.3, 0]), np.array([turned(1e-9)] * 4))
     for one, other in ((fine, coarse), (coarse, fine)):
         position, angle, largest = difference(one, other)
         assert (position, largest) == pytest.approx((0.3, 0.3))

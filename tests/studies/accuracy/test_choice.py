@@ -1,4 +1,4 @@
-"""An accuracy instead of a step: what is chosen meets it, is remembered, and is what the log says and all services fly."""
+"""An accuracy instead of a step: what is chosen meets it, is remembered, and is what all services fly."""
 
 import json
 from pathlib import Path
