@@ -135,7 +135,7 @@ WRONG = {
     "a link of no direction": (
         LOAD,
         "cooperative_load.link_start=[[0, 0, 0], [1, 0, 0]]",
-        "link.0 is no direction, all",
+        "no direction, all zero",
     ),
     "no number": (SATELLITE, "gyrostat.damping=nan", "gyrostat.damping: expected a finite number, got nan"),
     "a step below zero": (OS4, "solver.step=-0.001", "solver.step: expected a number above 0, got -0.001"),
