@@ -75,7 +75,7 @@ def check(scene: Scene) -> None:
     """The crate is described, and nothing asks of it what it cannot do."""
     needs(scene, "beer_carrier")
     can_have(scene)
-    check_marched(scene, *_system(scene))
+    check_marched(scene, *system(scene))
 
 
 def create(scene: Scene) -> "Unloading":
@@ -87,7 +87,8 @@ def _surface(friction: Pair) -> Surface:
     return (STIFFNESS, DAMPING, *friction)
 
 
-def _system(scene: Scene) -> tuple[BeerCarrierParameters, BeerCarrierState]:
+def system(scene: Scene) -> tuple[BeerCarrierParameters, BeerCarrierState]:
+    """(parameters, state at the start)."""
     c = scene[BeerCarrier]
     length, width, height = c.pack_size
     m = c.pack_mass / 12.0
@@ -113,7 +114,7 @@ class Unloading:
         exchange = scene[Exchange]
         self._name, self._interval, self._interval_ns = scene[Vehicle].name, exchange.interval, exchange.interval_ns
         self._pose_every, self._bodies_every = period(scene, POSE), period(scene, BODIES)
-        self._p, start = _system(scene)
+        self._p, start = system(scene)
         self._marched = Marched(scene, self._p, start)
         self._names = ("pack", "door", *[f"roller{i + 1}" for i in range(beer_carrier.ROLLERS)], "ground")
 
