@@ -18,7 +18,7 @@ from dynamics.effects._types import Motion
 from dynamics.integrators import get, rk4_renormalised
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.vehicles import multirotor, propellers
+from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
 
 HERE = Path(__file__).parent
@@ -84,10 +84,10 @@ def bare_rate(drive, t, m):
     )
     R, lift, k = rotation_matrix(m.attitude), total(f), p.body.inverse_mass
     acceleration = (k * (R[2] * lift), k * (R[5] * lift), k * (R[8] * lift - gravity.acceleration * p.body.mass))
-    spin = propellers.angular_acceleration(p.body, m.omega_body, torque)
+    spin = multirotor._angular_acceleration(p.body, m.omega_body, torque)
     a, r = layout.lag_rate, layout.speed_per_volt
     lag = (a * (r * v[0] - speed[0]), a * (r * v[1] - speed[1]), a * (r * v[2] - speed[2]), a * (r * v[3] - speed[3]))
-    return Motion(m.velocity_world, m.omega_body, acceleration, spin, lag, ())
+    return Motion(m.velocity_world, m.omega_body, acceleration, spin, lag)
 
 
 one_step = rk4_renormalised.step

@@ -16,7 +16,6 @@ class Motion(NamedTuple):
     velocity_world: Vec3  # [m/s]
     omega_body: Vec3  # [rad/s]
     rotor_speed: PerRotor  # [rad/s], not negative
-    rotor_angle: PerRotor = ()  # [rad] about body z, of propellers that are bodies of their own; else empty
 
 
 class MassProperties(NamedTuple):

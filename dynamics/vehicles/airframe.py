@@ -46,8 +46,6 @@ class RotorPlacement(Section):
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
     yaw_sign: tuple[float, ...]  # +1 or -1: sign of the torque on the body about z
     inertia: Positive  # [kg m^2] of one rotor about its axis
-    mass: Positive | None = None  # [kg] of one rotor; the vehicle's inertia is then that of the frame without rotors
-    transverse_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] of one rotor about and across its blade
 
     @model_validator(mode="after")
     def _one_sign_each(self):

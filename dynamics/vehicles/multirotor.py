@@ -14,9 +14,8 @@ from dynamics.effects._rotors import each, total
 from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
-from dynamics.vector import Vec3
+from dynamics.vector import Vec3, scale
 from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.propellers import Propellers, answer, response
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
@@ -42,7 +41,6 @@ class MultirotorParameters(NamedTuple):
     body: MassProperties
     layout: RotorLayout
     effects: tuple  # parameter NamedTuples of the active effects, sorted by name
-    propellers: Propellers | None  # bodies of their own; None: part of the one rigid body
 
 
 class MultirotorState(NamedTuple):
@@ -129,12 +127,25 @@ def evaluate(drive, t, motion):
 
 
 @leaf
+def _angular_acceleration(body, omega, torque):
+    """Euler's equations along principal axes."""
+    gyration, inverse = body.gyration, body.inverse_inertia
+    return (
+        gyration[0] * (omega[1] * omega[2]) + inverse[0] * torque[0],
+        gyration[1] * (omega[2] * omega[0]) + inverse[1] * torque[1],
+        gyration[2] * (omega[0] * omega[1]) + inverse[2] * torque[2],
+    )
+
+
+@leaf
 def rate(drive, t, motion):
     """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
-    p = drive.parameters
     s, rotors, force, torque = evaluate(drive, t, motion)
-    acceleration, turning, spin, angle_rate = response(p.propellers, p.layout, s, rotors, force, torque)
-    return Motion(motion.velocity_world, motion.omega_body, acceleration, turning, spin, angle_rate)
+    omega = motion.omega_body
+    acceleration = scale(s.body.inverse_mass, force)
+    return Motion(
+        motion.velocity_world, omega, acceleration, _angular_acceleration(s.body, omega, torque), rotors.acceleration
+    )
 
 
 def _step(method, drive, t, motion, h):
@@ -158,7 +169,7 @@ def _airborne(p, body, memory, voltage):
     """The drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
     kept = hooks.without_sleepers(p.effects, memory)
-    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.propellers), body, kept, voltage)
+    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects), body, kept, voltage)
 
 
 @kernel
@@ -213,13 +224,12 @@ def observe(p, tick, interval, state, command):
     body = hooks.all_body(p.effects, state.memory, p.body)
     drive = MultirotorDrive(p, body, state.memory, voltage)
     s, rotors, force, torque = evaluate(drive, tick * interval, motion)
-    acceleration, turning, spin, _ = response(p.propellers, layout, s, rotors, force, torque)
     return MultirotorObservation(
-        acceleration,
-        turning,
+        scale(s.body.inverse_mass, force),
+        _angular_acceleration(s.body, motion.omega_body, torque),
         rotors.thrust,
         rotors.torque,
-        spin,
+        rotors.acceleration,
         rotors.voltage,
         rotors.current,
         each(_product, 0.0, rotors.voltage, rotors.current),
@@ -230,23 +240,7 @@ def observe(p, tick, interval, state, command):
     )
 
 
-@kernel
-def hinges(parameters, tick, interval, cell, command):
-    """Loads from the chassis on each propeller at the start of exchange `tick`, under the voltages `command` [V].
-
-    Takes parameters and state in their cells. Returns (motion, forces [N], torques [N m]), the last two about the hubs
-    in body coordinates; the torques' z are those of the drives.
-    """
-    p, state = parameters.value, cell.value
-    layout, motion = p.layout, state.motion
-    voltage = each(_within, layout.max_voltage, command, command)
-    drive = MultirotorDrive(p, hooks.all_body(p.effects, state.memory, p.body), state.memory, voltage)
-    s, rotors, force, torque = evaluate(drive, tick * interval, motion)
-    found, _ = answer(p.propellers, layout, s, rotors, force, torque)
-    return motion, found.reaction_force_body, found.reaction_torque_body
-
-
-def parameters(airframe: Airframe, effects: tuple = (), propellers: Propellers | None = None) -> MultirotorParameters:
+def parameters(airframe: Airframe, effects: tuple = ()) -> MultirotorParameters:
     """The compiled plant's numbers for an airframe under effects (from `dynamics.effects.from_scene`)."""
     mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
     x_body, y_body, z_body = zip(*rotors.position, strict=True)
@@ -255,7 +249,7 @@ def parameters(airframe: Airframe, effects: tuple = (), propellers: Propellers |
         engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
         engine.max_voltage, engine.idle_current,
     )  # fmt: skip
-    return MultirotorParameters(body_of(mass.total, mass.inertia), layout, effects, propellers)
+    return MultirotorParameters(body_of(mass.total, mass.inertia), layout, effects)
 
 
 def initial_state(
@@ -266,7 +260,5 @@ def initial_state(
 ) -> MultirotorState:
     """At rest in the world, all rotors at the same speed [rad/s], the effects' memory fresh."""
     still = (0.0, 0.0, 0.0)
-    n = len(p.layout.x_body)
-    angle = () if p.propellers is None else (0.0,) * n
-    motion = Motion(position_world, attitude, still, still, (rotor_speed,) * n, angle)
+    motion = Motion(position_world, attitude, still, still, (rotor_speed,) * len(p.layout.x_body))
     return MultirotorState(motion, tuple(hooks.initial_memory(e) for e in p.effects))

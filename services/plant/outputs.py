@@ -86,23 +86,17 @@ def clock(time_ns: int) -> Any:
     return Clock(stamp(time_ns))
 
 
-def bodies(
-    time_ns: int,
-    names: Sequence[str],
-    motions: Sequence[Motion],
-    forces_world: Sequence[Vec3] = (),
-    torques_body: Sequence[Vec3] = (),
-) -> Any:
-    """Every body of a vehicle, with force [N] and torque [N m] of contacts or joints on each; none given: zero."""
-    nothing = [(0.0, 0.0, 0.0)] * len(names)
+def bodies(time_ns: int, names: Sequence[str], motions: Sequence[Motion], forces: Sequence[Vec3] = ()) -> Any:
+    """Every body of a vehicle, with the force [N] of contacts or joints on each in the world; none given: zero."""
+    nothing = (0.0, 0.0, 0.0)
     return BodyStates(
         header(time_ns, WORLD),
         tuple(names),
         tuple(pose_of(m) for m in motions),
         tuple(Vector3(*m.velocity_world) for m in motions),
         tuple(Vector3(*m.omega_body) for m in motions),
-        tuple(Vector3(*f) for f in forces_world or nothing),
-        tuple(Vector3(*t) for t in torques_body or nothing),
+        tuple(Vector3(*f) for f in forces or [nothing] * len(names)),
+        tuple(Vector3(*nothing) for _ in names),
     )
 
 

@@ -113,7 +113,7 @@ def bare_rate(p, t, m):
     a, r, v = layout.lag_rate, layout.speed_per_volt, HOVER
     lag = (a * (r * v[0] - w[0]), a * (r * v[1] - w[1]), a * (r * v[2] - w[2]), a * (r * v[3] - w[3]))
     acceleration = (k * (lift * R[2]), k * (lift * R[5]), k * (lift * R[8] - weight))
-    return Motion(m.velocity_world, o, acceleration, spin, lag, ())
+    return Motion(m.velocity_world, o, acceleration, spin, lag)
 
 
 one_step = rk4_renormalised.step

@@ -8,7 +8,7 @@ from dynamics.kernel import kernel
 from dynamics.noise import stream_key
 from dynamics.tree import finite
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import MultirotorParameters, advance, observe
+from dynamics.vehicles.multirotor import advance, observe
 from messages import Actuators, Status
 from messages.topics import ACTUATORS, BATTERY, CLOCK, ODOM, POSE, STATUS, TF, TRUTH, Topic
 from services.lockstep import Input
@@ -27,7 +27,7 @@ def check(scene: Scene) -> None:
 
 def create(scene: Scene) -> "Reduced":
     """The plant of a multirotor."""
-    return Reduced(scene, multirotor.parameters(airframe(scene), active(scene)))
+    return Reduced(scene)
 
 
 @kernel
@@ -44,9 +44,9 @@ def fly(method, p, s, key, tick, command, h, n, interval):
 class Reduced:
     """Integrates the vehicle from tick to tick under the newest command."""
 
-    outputs: tuple[Topic, ...] = (TRUTH, POSE, ODOM, TF, CLOCK, BATTERY)
+    outputs = (TRUTH, POSE, ODOM, TF, CLOCK, BATTERY)
 
-    def __init__(self, scene: Scene, parameters: MultirotorParameters):
+    def __init__(self, scene: Scene):
         exchange, vehicle, frame = scene[Exchange], scene[Vehicle], airframe(scene)
         delay = exchange.loop_delay
         self.inputs = (Input(ACTUATORS, delay), Input(STATUS, delay))
@@ -56,6 +56,7 @@ class Reduced:
         self._pose_every, self._battery_every = period(scene, POSE), period(scene, BATTERY)
         self._method, self._steps, self._step = method(scene)
         self._key = stream_key(scene[Run].seed, vehicle.name, "plant")
+        parameters = multirotor.parameters(frame, active(scene))
         start = multirotor.initial_state(parameters, (0.0, 0.0, start_height(scene)))
         self._parameters, self._state = Cell(parameters), Cell(start)
         self._off = (0.0,) * len(frame.rotors.position)
