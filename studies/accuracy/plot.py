@@ -29,7 +29,7 @@ def draw(path: Path, title: str, points: list[Point], parts: Sequence[Part] = ()
 
 
 def three_errors(axes: Axes, parts: Sequence[Part]) -> None:
-    """Draw what the flight loses to step, exchange interval and coupling, over their size; attitude if it only turns."""
+    """Draw what the flight loses to step, exchange interval and coupling: position, or attitude if it only turns."""
     moves = any(p.position > 0.0 for p in parts)
     for index, source in enumerate(dict.fromkeys(p.source for p in parts)):
         own = [p for p in parts if p.source == source]
