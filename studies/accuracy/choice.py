@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,7 +48,9 @@ def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
     say("measuring the integrators on this plant for solver.accuracy (first time only; minutes if they are compiled)")
     points = measure(scenes.problem(scene))
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
+    complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
+    complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
+    complete.replace(path)
     return points
 
 

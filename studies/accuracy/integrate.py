@@ -8,6 +8,7 @@ import numpy as np
 
 from dynamics import integrators
 from dynamics.integrators import adapt, rate, record
+from dynamics.kernel import kernel
 from dynamics.tree import flatten, unflatten
 from studies.accuracy.coordinates import coordinates, defect
 from studies.accuracy.problem import Outcome, Way
@@ -30,6 +31,19 @@ def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, row
     for t, row in zip(times, rows, strict=True):
         method.step.py_func(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
     return calls / len(times)
+
+
+# kernels of this file, so that their cache names no class but those of systems that every user of the study can import
+@kernel
+def sampled(method, p, x, h, every, out):
+    """`record` from time 0."""
+    return record(method, p, 0.0, x, h, every, out)
+
+
+@kernel
+def adapted(p, x, times, tolerance, out):
+    """`adapt`."""
+    return adapt(p, x, times, tolerance, out)
 
 
 def applicable(x: Any) -> list[str]:
@@ -65,7 +79,7 @@ def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
 
     def prepare(h: float) -> Callable[[], Any]:
         out, every = np.empty((SAMPLES + 1, width)), steps(h) // SAMPLES
-        return lambda: (record(token, p, 0.0, x, duration / steps(h), every, out), out)
+        return lambda: (sampled(token, p, x, duration / steps(h), every, out), out)
 
     def read(h: float, result: Any) -> Outcome | None:
         rows, out = result
@@ -78,7 +92,7 @@ def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
 
     settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]
     start = np.empty((1, width))
-    return Way(name, method.ORDER, "s", settings, prepare, read, lambda: record(token, p, 0.0, x, duration, 1, start))
+    return Way(name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start))
 
 
 def _adaptive(p: Any, x: Any, duration: float) -> Way:
@@ -86,7 +100,7 @@ def _adaptive(p: Any, x: Any, duration: float) -> Way:
 
     def prepare(tolerance: float) -> Callable[[], Any]:
         out = np.empty((2, len(flatten(x))))
-        return lambda: (adapt(p, x, ends, tolerance, out), out)
+        return lambda: (adapted(p, x, ends, tolerance, out), out)
 
     def read(tolerance: float, result: Any) -> Outcome | None:
         (status, _, _, steps, rejected), out = result
@@ -97,4 +111,4 @@ def _adaptive(p: Any, x: Any, duration: float) -> Way:
         return Outcome(ends, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     start = np.empty((1, len(flatten(x))))
-    return Way(ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapt(p, x, ends[:1], 1.0, start))
+    return Way(ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapted(p, x, ends[:1], 1.0, start))

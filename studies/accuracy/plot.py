@@ -29,21 +29,27 @@ def draw(path: Path, title: str, points: list[Point], parts: Sequence[Part] = ()
 
 
 def three_errors(axes: Axes, parts: Sequence[Part]) -> None:
-    """Draw what the flight loses to step, exchange interval and coupling, over their size."""
+    """Draw what the flight loses to step, exchange interval and coupling: position, or attitude if it only turns."""
+    moves = any(p.position > 0.0 for p in parts)
     for index, source in enumerate(dict.fromkeys(p.source for p in parts)):
         own = [p for p in parts if p.source == source]
         axes.plot(
             [1e3 * p.setting for p in own],
-            [max(p.position, SMALLEST) for p in own],
+            [max(p.position if moves else p.attitude, SMALLEST) for p in own],
             color=COLOURS[index],
             marker=MARKERS[index],
             label=source,
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    sizes = sorted({1e3 * p.setting for p in parts})
+    axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    axes.set_xticks([], minor=True)
     axes.set_title("the flight: three errors apart")
     axes.set_xlabel("step, or exchange interval [ms]")
-    axes.set_ylabel("difference of position, 9 ticks in 10 below [m]")
+    axes.set_ylabel(
+        f"difference of {'position' if moves else 'attitude'}, 9 ticks in 10 below [{'m' if moves else 'rad'}]"
+    )
     axes.legend()
 
 

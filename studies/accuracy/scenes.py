@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from dynamics.integrators import get, record
+from dynamics.integrators import get
 from dynamics.tree import flatten
 from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
 from services.scene import Scene
 from services.sections import Exchange, Run, Vehicle
 from studies.accuracy import plant
 from studies.accuracy.coordinates import coordinates
-from studies.accuracy.integrate import SAMPLES, fixed_ways
+from studies.accuracy.integrate import SAMPLES, fixed_ways, sampled
 from studies.accuracy.problem import Problem
 
 FINEST = 64  # steps in an exchange interval, of the reference
@@ -51,7 +51,7 @@ def _marched(scene: Scene, p: Any, x: Any) -> Problem:
 
     def reference() -> np.ndarray:
         out = np.empty((2, len(flatten(x))))
-        record(get("rkmk54").Method(), p, 0.0, x, interval / FINEST, FINEST * ticks, out)
+        sampled(get("rkmk54").Method(), p, x, interval / FINEST, FINEST * ticks, out)
         return coordinates(x, out)[-1]
 
     return Problem(

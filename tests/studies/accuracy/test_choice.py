@@ -7,7 +7,7 @@ import pytest
 
 from services.plant.config import Solver, method
 from services.scene import SceneError, load
-from studies.accuracy import choice, scenes
+from studies.accuracy import choice, integrate, scenes
 from studies.accuracy.measure import Point
 
 ROOT = Path(__file__).parents[3]
@@ -79,6 +79,7 @@ def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
 
 def test_measured_in_earnest_on_a_scene(monkeypatch, tmp_path):
     monkeypatch.setattr(choice, "CACHE", tmp_path)
+    monkeypatch.setattr(integrate, "applicable", lambda x: ["lie_euler", "erk4m", "rkmk4"])  # each is compiled
     path = scene(tmp_path, "accuracy = 1e-6")
     found = choice.overrides(load(path), lambda text: None)
     points = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
