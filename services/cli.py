@@ -116,7 +116,6 @@ def run(
     """Fly a scene, record it, and report."""
     from services import flight
     from services.launcher import WATCHER
-    from services.scene import load
     from services.table import RECORDER, lockstep_services
 
     with user_errors():
@@ -126,14 +125,14 @@ def run(
             raise ValueError("--mode single: has no network; leave out --peers and --open")
         if open_ is not None:
             flight.check_endpoint("--open", open_)
-        loaded = load(scene, set_ or [])
         pace = parse_speed(speed)
+        loaded, overrides = _decided(scene, set_ or [])
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]
         table = None if peers is None else flight.parse_peers(peers, needed)
         _check_distinct({"SCENE": scene, "--log": log, "--json": json})
         path = _log_path(loaded, log, exists=table is not None)
         _check_writable(json)
-        _fly(loaded, set_ or [], mode, speed, pace, path, space, table, json, open_)
+        _fly(loaded, overrides, mode, speed, pace, path, space, table, json, open_)
 
 
 def _fly(
@@ -191,6 +190,21 @@ def _fly(
     if json:
         summary.write_json(json, result)
     summary.show(console, scene, result)
+
+
+def _decided(path: Path, overrides: list[str]) -> tuple["Scene", list[str]]:
+    """The scene and its overrides, with integrator and step chosen where it asks for an accuracy instead."""
+    from services.plant.config import Solver
+    from services.scene import load
+
+    scene = load(path, overrides)
+    if not scene[Solver].undecided:
+        return scene, overrides
+    from studies.accuracy import choice
+
+    chosen = choice.overrides(scene, typer.echo)
+    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: chosen {', '.join(chosen)}")
+    return load(path, [*overrides, *chosen]), [*overrides, *chosen]
 
 
 def _log_path(scene: "Scene", given: Path | None, exists: bool) -> Path:
@@ -324,12 +338,11 @@ def scenes(folder: Annotated[Path, typer.Argument(help="where to look")] = Path(
 @app.command()
 def check(scene: SceneFile, set_: Overrides = None) -> None:
     """Validate a scene."""
-    from services.scene import load
     from services.sections import Exchange, Run, Vehicle
     from services.table import lockstep_services
 
     with user_errors():
-        loaded = load(scene, set_ or [])
+        loaded, _ = _decided(scene, set_ or [])
         vehicle, exchange = loaded[Vehicle], loaded[Exchange]
         typer.echo(f"{scene}: ok")
         for label, line in {
@@ -352,12 +365,11 @@ def warm(
     import time
 
     from services import flight
-    from services.scene import load
 
     with user_errors():
         for path in scenes or [Path("scenes/delivery_mission.toml")]:
             started = time.perf_counter()
-            flight.prepare(load(path), typer.echo)
+            flight.prepare(_decided(path, [])[0], typer.echo)
             typer.echo(f"{path}: ready after {time.perf_counter() - started:.1f} s")
 
 
@@ -387,6 +399,7 @@ def performance(
 
 
 @app.command()
+<<<<<<< HEAD
 def effects(
     scene: SceneFile,
     set_: Overrides = None,
@@ -414,6 +427,24 @@ def effects(
             show.write_json(json, found)
         if plot:
             show.plot(plot, found)
+=======
+def accuracy(
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (TOML)")],
+    set_: Overrides = None,
+    goal: Annotated[
+        float | None, typer.Option("--target", metavar="ERROR", help="name the cheapest choice that meets it: 1e-6")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all points as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw error over time (PNG, SVG or PDF)")] = None,
+) -> None:
+    """Error against wall time of every integrator, on a system whose answer is known, or on a scene's plant."""
+    with user_errors():
+        from studies.accuracy import command
+
+        _check_writable(json)
+        _check_writable(plot)
+        command.run(target, set_ or [], goal, json, plot)
+>>>>>>> accuracy
 
 
 @app.command()

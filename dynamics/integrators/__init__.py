@@ -2,18 +2,33 @@
 
 A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on the manifold to round-off?), a class
 `Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h, where
-`rate(p, t, x)` gives the tangent of the state tree x (see dynamics/tree.py) for parameters p. Two more if they apply:
-`FLAT_ORDER`, the order without curvature where that is higher, and `REQUIRES`, the fields that the state must have.
+`rate(p, t, x)` gives the tangent of the state tree x (see dynamics/tree.py) for parameters p. Three more if they apply:
+`EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
+higher, and `REQUIRES`, the fields that the state must have.
 """
 
 import importlib
 import pkgutil
 from types import ModuleType
 
-from dynamics.integrators._march import RATES, march, rate, step
+from dynamics.integrators._adaptive import adapt
+from dynamics.integrators._march import RATES, march, rate, record, step
 from dynamics.integrators._solve import check_start, not_finite, simulate, solve
 
-__all__ = ["RATES", "check_start", "get", "march", "names", "not_finite", "rate", "simulate", "solve", "step"]
+__all__ = [
+    "RATES",
+    "adapt",
+    "check_start",
+    "get",
+    "march",
+    "names",
+    "not_finite",
+    "rate",
+    "record",
+    "simulate",
+    "solve",
+    "step",
+]
 
 
 def names() -> list[str]:

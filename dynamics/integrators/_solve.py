@@ -7,6 +7,7 @@ import numpy as np
 
 from dynamics.integrators import _adaptive
 from dynamics.integrators._march import record
+from dynamics.lie.quaternion import Quaternion
 from dynamics.lie.so3 import Rotation, determinant
 from dynamics.tree import MANIFOLDS, flatten, normalise, unflatten
 
@@ -56,9 +57,12 @@ def check_start(p: Any, x0: Any) -> None:
     for name, found in _leaves(x0):
         if type(found) is Rotation and determinant(found) < 0.0:
             raise ValueError(f"{_system(p)}: initial {name} is no rotation: determinant {determinant(found):.3g}")
+        no = "no rotation, " if type(found) in (Quaternion, Rotation) else ""
+        if not np.isfinite(flatten(normalise(found))).all():
+            raise ValueError(f"{_system(p)}: initial {name} is {no or 'no direction, '}all zero")
         defect = max(abs(a - b) for a, b in zip(flatten(found), flatten(normalise(found)), strict=True))
         if not defect <= UNIT_DEFECT:
-            raise ValueError(f"{_system(p)}: initial {name} is off its manifold by {defect:.3g}: normalise it")
+            raise ValueError(f"{_system(p)}: initial {name} is {no}off its manifold by {defect:.3g}: normalise it")
     if hasattr(p, "check"):
         p.check(x0)
 

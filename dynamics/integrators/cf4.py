@@ -8,6 +8,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import axpy, retract, scale
 
 ORDER = 4
+EVALUATIONS = 4
 ON_MANIFOLD = True
 Method = token(__name__)
 

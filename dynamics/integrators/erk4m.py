@@ -10,6 +10,7 @@ from dynamics.tree import axpy, retract, scale, transport
 
 ORDER = 3
 FLAT_ORDER = 4
+EVALUATIONS = 4
 ON_MANIFOLD = True
 Method = token(__name__)
 

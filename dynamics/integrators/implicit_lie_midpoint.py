@@ -22,13 +22,13 @@ def step(rate, p, t, x, h):
     """
     middle = t + 0.5 * h
     u = scale(h, rate(p, t, x))
-    before = math.inf
+    before, rounding = math.inf, 1e-15 * largest(x)  # [of u] what large numbers that cancel in f leave
     for _ in range(ITERATIONS):
         after = scale(h, rate(p, middle, retract(x, scale(0.5, u))))
         change, size = largest(axpy(-1.0, u, after)), largest(after)
         u = after
         # the last digits may flicker: stop as well once the change, already small, shrinks no more
-        if change <= 2e-16 * size or (change <= 1e-13 * size and change >= before):
+        if change <= 2e-16 * size or (change <= 1e-13 * size + rounding and change >= before):
             return retract(x, u)
         before = change
     return retract(x, scale(math.nan, u))

@@ -8,6 +8,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import retract, scale
 
 ORDER = 1
+EVALUATIONS = 1
 ON_MANIFOLD = True
 Method = token(__name__)
 

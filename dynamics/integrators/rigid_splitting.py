@@ -15,6 +15,7 @@ from dynamics.tree import flatten, unflatten
 from dynamics.vector import add, cross, divide, multiply, scale
 
 ORDER = 6
+EVALUATIONS = 10
 ON_MANIFOLD = True
 REQUIRES = (
     "attitude",

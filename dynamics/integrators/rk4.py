@@ -5,6 +5,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import axpy, embed
 
 ORDER = 4
+EVALUATIONS = 4
 ON_MANIFOLD = False
 Method = token(__name__)
 

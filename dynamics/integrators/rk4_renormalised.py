@@ -6,6 +6,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import normalise
 
 ORDER = 4
+EVALUATIONS = 4
 ON_MANIFOLD = True
 Method = token(__name__)
 

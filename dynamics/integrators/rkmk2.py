@@ -5,6 +5,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import retract, scale
 
 ORDER = 2
+EVALUATIONS = 2
 ON_MANIFOLD = True
 Method = token(__name__)
 

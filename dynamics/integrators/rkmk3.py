@@ -5,6 +5,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import axpy, bracket, retract, scale
 
 ORDER = 3
+EVALUATIONS = 3
 ON_MANIFOLD = True
 Method = token(__name__)
 

@@ -8,6 +8,7 @@ from dynamics.kernel import leaf
 from dynamics.tree import axpy, bracket, retract, scale
 
 ORDER = 5
+EVALUATIONS = 7
 ON_MANIFOLD = True
 Method = token(__name__)
 

@@ -15,6 +15,7 @@ class Solver(Section):
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"
     step: float = Field(default=0.001, gt=0.0)  # [s], divides the exchange interval
+    accuracy: float | None = Field(default=None, gt=0.0)  # error that step, and integrator unless given, are chosen for
 
     @field_validator("integrator")
     @classmethod
@@ -22,12 +23,19 @@ class Solver(Section):
         integrators.get(name)
         return name
 
+    @property
+    def undecided(self) -> bool:
+        """Whether the step, and the integrator unless it is given, are still to be chosen for the accuracy."""
+        return self.accuracy is not None and "step" not in self.model_fields_set
+
     def steps(self, exchange: Exchange) -> int:
         """Steps in one exchange interval."""
         return round(exchange.interval / self.step)
 
     def check(self, scene: Scene) -> None:
         """The step divides the exchange interval."""
+        if self.undecided:
+            return
         interval = scene[Exchange].interval
         n = self.steps(scene[Exchange])
         if n < 1 or abs(n * self.step - interval) > 1e-9 * interval:
@@ -37,7 +45,16 @@ class Solver(Section):
 
 
 def method(scene: Scene) -> tuple[tuple, int, float]:
-    """The scene's integrator for compiled code, its steps in an exchange interval, and the length of one [s]."""
+    """The scene's integrator for compiled code, its steps in an exchange interval, and the length of one [s].
+
+    Raises:
+        ValueError: the scene says an accuracy, and nobody has chosen for it.
+    """
     solver, exchange = scene[Solver], scene[Exchange]
+    if solver.undecided:
+        raise ValueError(
+            f"{scene.path}: solver.accuracy: what `lapwing run` chooses for it is to be handed to every service: "
+            "--set solver.integrator=... --set solver.step=..."
+        )
     steps = solver.steps(exchange)
     return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

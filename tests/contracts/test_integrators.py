@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -90,6 +91,7 @@ SPACES = (
 BODY = (TwistedBodyParameters((1.0, 1.6, 2.1)), RigidBody(quaternion.exp((0.3, -0.5, 0.2)), (0.6, -0.9, 1.2)))
 SPAN = 1.6
 COUNTS = {1: (512, 1024, 2048), 2: (64, 128, 256), 3: (32, 64, 128), 4: (20, 40, 80), 5: (24, 40, 64), 6: (4, 6, 9)}
+COUNTS[8] = (7, 10, 13)
 
 
 def reference(p, x0):
@@ -146,6 +148,40 @@ def test_order_and_manifold(name, exact):
     for space, order in measured.items():
         declared = getattr(method, "FLAT_ORDER", method.ORDER) if space == "pendulum" else method.ORDER
         assert declared - 0.2 < order < declared + 0.7, f"{space}: measured {measured}"
+
+
+class CountingParameters(NamedTuple):
+    """A rate that counts how often it is asked."""
+
+    inertia: Vec3
+    count: np.ndarray
+
+
+@pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
+def test_evaluations_are_as_declared(name):
+    method, (body, start) = integrators.get(name), BODY
+    one_step, inside = method.step, RATES[type(body)]
+    x0 = start if hasattr(method, "REQUIRES") else (0.3,)
+
+    @numba.njit
+    def counting_body(p, t, x):
+        p.count[0] += 1
+        return inside(p, t, x)
+
+    @numba.njit
+    def counting_number(p, t, x):
+        p.count[0] += 1
+        return x
+
+    counting = counting_body if hasattr(method, "REQUIRES") else counting_number
+
+    @numba.njit
+    def once(p, x):
+        return one_step(counting, p, 0.0, x, 0.1)
+
+    p = CountingParameters(body.inertia, np.zeros(1, dtype=np.int64))
+    once(p, x0)
+    assert p.count[0] == method.EVALUATIONS
 
 
 def test_an_unknown_name_lists_the_choices():

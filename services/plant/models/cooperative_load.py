@@ -36,7 +36,7 @@ def check(scene: Scene) -> None:
     rate = scene[Exchange].rate
     if scene[Rates].bodies != rate:
         raise WrongKeyError("rates.bodies", f"expected exchange.rate = {rate} Hz, at which the control works")
-    check_marched(scene, *_system(scene))
+    check_marched(scene, *system(scene))
 
 
 def create(scene: Scene) -> "CarriedLoad":
@@ -44,7 +44,8 @@ def create(scene: Scene) -> "CarriedLoad":
     return CarriedLoad(scene)
 
 
-def _system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadState]:
+def system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadState]:
+    """(parameters with the rotors off, state at the start)."""
     c = scene[CooperativeLoad]
     n = len(c.link_length)
     off = LiftCommand((0.0,) * n, (NOTHING,) * n)
@@ -78,7 +79,7 @@ class CarriedLoad:
         self._end = Ending(scene)
         self._name, self._interval_ns = scene[Vehicle].name, scene[Exchange].interval_ns
         self._pose_every = period(scene, POSE)
-        p, start = _system(scene)
+        p, start = system(scene)
         self._names = (LOAD, *[f"quad{i + 1}" for i in range(len(p.link_length))])
         self._marched = Marched(scene, p, start)
 

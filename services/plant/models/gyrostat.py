@@ -48,7 +48,7 @@ def check(scene: Scene) -> None:
     """The satellite is described, with sound numbers, and nothing asks of it what it cannot do."""
     needs(scene, "gyrostat")
     can_have(scene)
-    check_marched(scene, *_system(scene))
+    check_marched(scene, *system(scene))
 
 
 def create(scene: Scene) -> "Satellite":
@@ -56,7 +56,8 @@ def create(scene: Scene) -> "Satellite":
     return Satellite(scene)
 
 
-def _system(scene: Scene) -> tuple[GyrostatParameters, RigidBody]:
+def system(scene: Scene) -> tuple[GyrostatParameters, RigidBody]:
+    """(parameters, state at the start)."""
     g = scene[Gyrostat]
     for axis, moment in zip("xyz", g.inertia, strict=True):
         if not moment > 0.0:
@@ -79,7 +80,7 @@ class Satellite:
         self._end = Ending(scene)
         self._name, self._interval_ns = scene[Vehicle].name, scene[Exchange].interval_ns
         self._pose_every = period(scene, POSE)
-        self._marched = Marched(scene, *_system(scene))
+        self._marched = Marched(scene, *system(scene))
 
     def prepare(self) -> None:
         """Compile or load the kernel."""

@@ -54,7 +54,7 @@ def check(scene: Scene) -> None:
     """The quadrotor is described, and nothing asks of it what it cannot do."""
     needs(scene, "os4")
     can_have(scene)
-    check_marched(scene, *_system(scene))
+    check_marched(scene, *system(scene))
 
 
 def create(scene: Scene) -> "OpenLoop":
@@ -62,7 +62,8 @@ def create(scene: Scene) -> "OpenLoop":
     return OpenLoop(scene)
 
 
-def _system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
+def system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
+    """(parameters, state at the start)."""
     q = scene[Os4]
     motors = Os4Motors(q.motors.voltage, q.motors.constant, q.motors.resistance) if q.motors else None
     p = Os4Parameters(
@@ -93,7 +94,7 @@ class OpenLoop:
         self._name, self._interval, self._interval_ns = scene[Vehicle].name, exchange.interval, exchange.interval_ns
         self._pose_every = period(scene, POSE)
         self._lift_constant, self._drag_constant = scene[Os4].lift_constant, scene[Os4].drag_constant
-        self._marched = Marched(scene, *_system(scene))
+        self._marched = Marched(scene, *system(scene))
 
     def prepare(self) -> None:
         """Compile or load the kernels."""

@@ -91,8 +91,10 @@ def test_bad_steps(step):
 
 
 def test_bad_start_tolerance_and_times():
-    with pytest.raises(ValueError, match=r"initial attitude is off its manifold by 1"):
+    with pytest.raises(ValueError, match=r"initial attitude is no rotation, off its manifold by 1: norm"):
         simulate(get("rk4"), TOP, RigidBody(Quaternion(2.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.1, 10)
+    with pytest.raises(ValueError, match=r"FreeBody: initial attitude is no rotation, all zero"):
+        simulate(get("rk4"), TOP, RigidBody(Quaternion(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.1, 10)
     with pytest.raises(ValueError, match=r"tolerance 1e-20 cannot be met: at least 1e-14"):
         solve(TOP, START, np.array([0.0, 1.0]), 1e-20)
     with pytest.raises(ValueError, match="output times must be two or more and increase"):

@@ -33,7 +33,7 @@ def test_a_scene_moves_as_the_library_does(path, model):
     scene = load(path)
     count, solver = 20, scene.lookup("solver")
     steps = round(1.0 / scene.lookup("exchange.rate") / solver.step)
-    p, start = model._system(scene)
+    p, start = model.system(scene)
     _, rows = simulate(get(solver.integrator), p, start, solver.step, count * steps, every=steps)
     for row, truth in zip(rows, ticks(scene, count + 1), strict=True):
         q = truth.pose.orientation
@@ -119,7 +119,7 @@ WRONG = {
     "no rotation": (
         SATELLITE,
         "gyrostat.initial_attitude=[1.0, 0.1, 0.0, 0.0]",
-        "attitude is off its manifold by 0.00",
+        "attitude is no rotation, off its manifold by 0.00",
     ),
     "no inertia": (SATELLITE, "gyrostat.inertia=[500.0, 0.0, 1000.0]", "above 0, got 0 about y"),
     "not for this state": (
@@ -129,6 +129,13 @@ WRONG = {
     ),
     "a link of no length": (LOAD, "cooperative_load.link_length=[0.6, 0.0]", "link_length[1] = 0: must be positive"),
     "a link that is no unit vector": (LOAD, "cooperative_load.link_start=[[0, 0, -2], [1, 0, 0]]", "off its manifold"),
+    "a link of no direction": (
+        LOAD,
+        "cooperative_load.link_start=[[0, 0, 0], [1, 0, 0]]",
+        "link.0 is no direction, all",
+    ),
+    "no number": (SATELLITE, "gyrostat.damping=nan", "gyrostat.damping: expected a finite number, got nan"),
+    "a step below zero": (OS4, "solver.step=-0.001", "solver.step: expected a number above 0, got -0.001"),
     "a direction of nothing": (
         LOAD,
         "formation.link_direction=[[0, 0, 0], [1, 0, 0]]",

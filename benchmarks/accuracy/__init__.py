@@ -1,0 +1,88 @@
+"""The same work in Lapwing and in others: wall time for every error, side by side (docs/accuracy.md)."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from benchmarks.accuracy import ten_hours
+from benchmarks.accuracy.peers import installed
+from studies.accuracy.measure import Point, measure
+from studies.accuracy.plot import COLOURS, MARKERS
+from studies.accuracy.systems import problems
+from studies.report.style import DPI, styled
+
+CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
+LEVELS = [10.0**-k for k in range(2, 11)]
+LONGEST = 1.0  # [s] of a peer's run
+PICTURE = Path(__file__).parents[2] / "docs/pictures/accuracy_peers.png"
+
+
+def best(points: list[Point], level: float) -> Point | None:
+    """The fastest point with this error or less."""
+    return min((p for p in points if p.error <= level), key=lambda p: p.time, default=None)
+
+
+def peer(point: Point) -> str:
+    """Whose a point is: ours, or the peer's name, with which its methods' names begin."""
+    return point.way.split()[0] if " " in point.way else "Lapwing"
+
+
+def table(title: str, points: list[Point]) -> None:
+    others = [name for name in dict.fromkeys(map(peer, points)) if name != "Lapwing"]
+    print(
+        f"\n{title}\n{'error':>6} {'Lapwing [ms]':>24} "
+        + "".join(f"{name + ' [ms]':>30} {'ratio':>6}" for name in others)
+    )
+    for level in LEVELS:
+        ours = best([p for p in points if peer(p) == "Lapwing"], level)
+        if ours is None:
+            continue
+        line = f"{level:6.0e} {ours.way + f' {1e3 * ours.time:.3g}':>24} "
+        for name in others:
+            other = best([p for p in points if peer(p) == name], level)
+            if other is None:
+                line += f"{'not reached':>30} {'':>6}"
+            else:
+                method = other.way.partition(" ")[2]
+                line += f"{method + f' {1e3 * other.time:.3g}':>30} {other.time / ours.time:6.1f}"
+        print(line)
+
+
+def draw(found: dict[str, list[Point]]) -> None:
+    """Of each, the fastest at every error."""
+    with styled():
+        figure = Figure(figsize=(13.0, 4.6), layout="constrained")
+        all_axes = figure.subplots(1, len(found), sharey=True)
+        names = list(dict.fromkeys(peer(p) for points in found.values() for p in points))
+        for axes, (title, points) in zip(all_axes, found.items(), strict=True):
+            for index, name in enumerate(names):
+                reached = [best([p for p in points if peer(p) == name], level) for level in LEVELS]
+                kept = [(level, p) for level, p in zip(LEVELS, reached, strict=True) if p]
+                axes.plot(
+                    [1e3 * p.time for _, p in kept], [level for level, _ in kept],
+                    color=COLOURS[index], marker=MARKERS[index], markersize=4.5, label=name,
+                )  # fmt: skip
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_title(title)
+            axes.set_xlabel("wall time [ms]")
+        all_axes[0].set_ylabel("error met, relative to 1 + size [-]")
+        figure.legend(*all_axes[0].get_legend_handles_labels(), loc="outside right center")
+        figure.savefig(PICTURE, dpi=DPI, metadata={"Software": None})
+
+
+def main() -> None:
+    from importlib.metadata import version
+
+    peers = installed()
+    print("versions: " + ", ".join(f"{p.NAME} {version(p.MODULE)}" for p in peers))
+    found: dict[str, list[Point]] = {}
+    for case in CASES:
+        problem = problems()[case]
+        points = measure(problem)
+        for module in peers:
+            points += measure(problem._replace(ways=module.ways(case), invariants={}), LONGEST)
+        found[problem.title] = points
+        table(f"{problem.title}, {problem.duration:g} {problem.unit}", points)
+    draw(found)
+    ten_hours.main()

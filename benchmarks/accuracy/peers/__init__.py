@@ -1,0 +1,40 @@
+"""Other programs that do the same work: one file each, found by scanning this folder.
+
+A file has `NAME`, `MODULE`, the package whose version is stated, and `ways(case)`, its methods on a problem of the
+accuracy study (none where it cannot express it). Where its package is not installed, importing it fails, and it is
+left out.
+"""
+
+import importlib
+import pkgutil
+from types import ModuleType
+
+import numpy as np
+
+from studies.accuracy.coordinates import matrices
+from studies.accuracy.problem import Outcome
+
+
+def installed() -> list[ModuleType]:
+    """The peers whose package is there; says which are not."""
+    found = []
+    for module in pkgutil.iter_modules(__path__):
+        try:
+            found.append(importlib.import_module(f"{__name__}.{module.name}"))
+        except ImportError as missing:
+            print(f"{module.name}: left out, {missing}")
+    return found
+
+
+def outcome(
+    duration: float, R_world_body: np.ndarray, omega_body: np.ndarray, evaluations: int | None = None
+) -> Outcome:
+    """The outcome of a run of which only the end is known."""
+    end = np.concatenate([np.ravel(R_world_body), omega_body])
+    return Outcome(np.array([0.0, duration]), np.array([end, end]), 0.0, evaluations)
+
+
+def matrix(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrix, shape (3, 3), of a quaternion wxyz."""
+    q = np.asarray(quaternion)
+    return matrices(q[None] / np.linalg.norm(q)).reshape(3, 3)

@@ -1,0 +1,84 @@
+"""Exudyn: explicit Lie-group integration of a rigid body in rotation vectors, fixed steps and adaptive."""
+
+from collections.abc import Callable
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn import utilities as build
+
+from benchmarks.accuracy.peers import matrix, outcome
+from studies.accuracy.problem import Way
+from studies.accuracy.systems import free_rigid_body, heavy_top
+
+NAME, MODULE = "Exudyn", "exudyn"
+HALVINGS = 15
+TOLERANCES = tuple(10.0**-k for k in range(3, 14))
+CASES = {"free_rigid_body": (free_rigid_body, 0.5), "heavy_top": (heavy_top, 0.02)}
+
+
+def system(case: str) -> tuple[Any, int]:
+    """(main system, body); the top's pivot is where its centre would be, with the weight at the end of its arm."""
+    module, _ = CASES[case]
+    R = matrix(np.array(module.START.attitude))
+    system = exu.SystemContainer().AddSystem()
+    made = system.CreateRigidBody(
+        inertia=build.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(module.INERTIA)),
+        referenceRotationMatrix=R,
+        initialAngularVelocity=list(R @ module.START.omega_body),
+        nodeType=exu.NodeType.RotationRotationVector,
+        returnDict=True,
+    )
+    if case == "heavy_top":
+        weight = heavy_top.MASS * heavy_top.GRAVITY
+        for place, force in ((heavy_top.ARM, -weight), (0.0, weight)):  # and what holds the pivot
+            marker = build.MarkerBodyPosition(bodyNumber=made["bodyNumber"], localPosition=[place, 0, 0])
+            load = build.LoadForceVector(markerNumber=system.AddMarker(marker), loadVector=[0, 0, force])
+            system.AddLoad(load)
+    system.Assemble()
+    return system, made["bodyNumber"]
+
+
+def ways(case: str) -> list[Way]:
+    if case not in CASES:
+        return []
+    module, coarsest = CASES[case]
+
+    def way(name: str, order: int, unit: str, values: list[float], adapt: Callable[[Any, float], None]) -> Way:
+        main, body = system(case)
+
+        def prepare(value: float) -> Callable[[], Any]:
+            s = exu.SimulationSettings()
+            s.timeIntegration.endTime = module.DURATION
+            s.solutionSettings.writeSolutionToFile = False
+            s.solutionSettings.sensorsWritePeriod = module.DURATION
+            s.timeIntegration.verboseMode = 0
+            adapt(s.timeIntegration, value)
+            solver = getattr(exu.DynamicSolverType, name)
+
+            def run() -> Any:
+                main.SolveDynamic(s, solverType=solver, storeSolver=False)
+                R = main.GetObjectOutputBody(body, exu.OutputVariableType.RotationMatrix, [0, 0, 0])
+                omega = main.GetObjectOutputBody(body, exu.OutputVariableType.AngularVelocityLocal, [0, 0, 0])
+                return np.array(R), np.array(omega)
+
+            return run
+
+        return Way(
+            f"Exudyn {name}", order, unit, values, prepare, lambda _, end: outcome(module.DURATION, *end), lambda: None
+        )
+
+    def fixed(s: Any, step: float) -> None:
+        s.numberOfSteps = round(module.DURATION / step)
+        s.automaticStepSize = False
+
+    def tolerance(s: Any, value: float) -> None:
+        s.numberOfSteps = 100
+        s.relativeTolerance = s.absoluteTolerance = value
+
+    steps = [coarsest / 2**k for k in range(HALVINGS)]
+    return [
+        way("RK44", 4, "s", steps, fixed),
+        way("RK67", 6, "s", steps, fixed),
+        way("DOPRI5", 5, "tol", list(TOLERANCES), tolerance),
+    ]

@@ -1,0 +1,44 @@
+"""Ten hours of gyrostat: the compiled time of 60 000 steps of RKMK4, of the cheapest runs, and their errors."""
+
+from studies.accuracy.coordinates import of_state
+from studies.accuracy.integrate import ways
+from studies.accuracy.measure import Point, measure
+from studies.accuracy.problem import Problem
+from studies.accuracy.reference import DOP853, dop853
+from studies.accuracy.systems import gyrostat
+
+DURATION = 600.0  # [min]
+SEED_STEPS = 60_000  # of 0.01 min
+LEVELS = (1e-2, 1e-4, 1e-6, 1e-8)
+CASES = {
+    "rotors blocked": gyrostat.BLOCKED,
+    "rotors spinning": gyrostat.SPINNING,
+    "friction": gyrostat.FRICTION,
+    "friction and feedback": gyrostat.FEEDBACK,
+}
+
+
+def problem(name: str) -> Problem:
+    p = CASES[name]
+    # of all the counts of steps, one is the seed's
+    return Problem(
+        f"gyrostat, {name}", "min", DURATION, ways(p, gyrostat.START, DURATION, SEED_STEPS // 32),
+        lambda: dop853(lambda t, y: gyrostat.right_hand_side(p, t, y), of_state(gyrostat.START), DURATION),
+        DOP853, {},
+    )  # fmt: skip
+
+
+def text(point: Point | None) -> str:
+    return f"{point.way} {1e3 * point.time:.2g} ({point.error:.0e})" if point else "-"
+
+
+def main() -> None:
+    print(f"\nten hours of gyrostat: method, ms of compiled time (error)\n{'case':24}{'60 000 steps':>32}"
+          + "".join(f"{level:>32.0e}" for level in LEVELS))  # fmt: skip
+    for name in CASES:
+        points = measure(problem(name))
+        of_seed = [p for p in points if p.way == "rkmk4" and abs(p.setting - DURATION / SEED_STEPS) < 1e-9]
+        cells: list[Point | None] = [*of_seed] or [None]  # none where fewer steps reach round-off
+        for level in LEVELS:
+            cells.append(min((p for p in points if p.error <= level), key=lambda p: p.time, default=None))
+        print(f"{name:24}" + "".join(f"{text(p):>32}" for p in cells))

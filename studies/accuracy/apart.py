@@ -1,0 +1,155 @@
+"""What distribution costs a flight: the errors of the plant's step, of the exchange interval, and of the coupling.
+
+The scene is flown in memory, closed loop, each time with one of the three changed. Sensors and random winds would hide
+what is looked for: the autopilot gets the true state, and winds their mean.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from messages.topics import TRUTH, Topic
+from services.scene import Scene, load, sections
+from services.sections import Exchange, Rates, Run, Vehicle
+from services.single import run_single
+from services.table import lockstep_services
+
+LONGEST = 20.0  # [s] of a flight that is flown so often
+MOST_TICKS = 5000  # of it, at the scene's own rate
+SOURCES = ("plant step", "exchange interval", "coupling delay")
+STEPS = (1, 2, 4, 8)  # in an exchange interval, of the scene's integrator
+FINEST_STEPS = 32  # in the scene's exchange interval, of rkmk4
+FINER = (1, 2, 4)  # times the scene's exchange rate
+MOST = 0.9  # of the ticks
+FINEST_RATE = 8  # times that rate, of what the others are compared with
+
+
+class Part(NamedTuple):
+    """One source of error at one setting: differences that nine ticks in ten of the flight stay below, and the largest.
+
+    The largest is often that of the one tick in which the vehicle touches down a moment sooner or later.
+    """
+
+    source: str
+    setting: float  # [s] step, or exchange interval
+    label: str
+    position: float  # [m]
+    attitude: float  # [rad]
+    largest_position: float  # [m]
+
+
+class Track(NamedTuple):
+    """A flight as its truth tells it, at every tick."""
+
+    interval: float  # [s]
+    position: np.ndarray  # [m], shape (n, 3)
+    attitude: np.ndarray  # quaternions x, y, z, w, shape (n, 4)
+
+
+def errors(scene: Scene, overrides: Iterable[str] = ()) -> list[Part]:
+    """The three errors of a scene, each at a few settings.
+
+    Args:
+        scene: what is flown, decided.
+        overrides: those that it was loaded with.
+    """
+    base = [*overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
+    rate, interval = scene[Exchange].rate, scene[Exchange].interval
+
+    def flown(factor: int, coupling: str, solver: list[str]) -> Track:
+        settings = [*base, *_exchange(scene, rate * factor), f"exchange.coupling={coupling}", *solver]
+        return fly(load(scene.path, settings))
+
+    def fine(factor: int) -> list[str]:
+        return ["solver.integrator=rkmk4", f"solver.step={interval / max(FINEST_STEPS, factor)!r}"]
+
+    coupling = scene[Exchange].coupling
+    parts = []
+    exact = flown(1, coupling, fine(1))
+    for n in STEPS:
+        step = interval / n
+        track = flown(1, coupling, [f"solver.step={step!r}"])
+        parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", track, exact))
+    sequential = {factor: flown(factor, "sequential", fine(factor)) for factor in (*FINER, FINEST_RATE)}
+    for factor in FINER:
+        label = f"{rate * factor} Hz"
+        parts.append(_part(SOURCES[1], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
+    for factor in FINER:
+        label = f"parallel at {rate * factor} Hz"
+        parallel = flown(factor, "parallel", fine(factor))
+        parts.append(_part(SOURCES[2], interval / factor, label, parallel, sequential[factor]))
+    return parts
+
+
+def scene_integrator(scene: Scene) -> str:
+    """The name of the scene's integrator."""
+    return str(scene.lookup("solver.integrator"))
+
+
+def _duration(scene: Scene) -> float:
+    interval = scene[Exchange].interval
+    return min(scene[Run].duration, max(min(LONGEST, MOST_TICKS * interval), 1000 * interval))
+
+
+def _clean(scene: Scene) -> list[str]:
+    """Overrides that take the noise out."""
+    found = ["autopilot.estimator=truth"] if scene.has(sections()["autopilot"]) else []
+    if "wind_random" in scene.tables("effects"):
+        found.append("effects.wind_random.sigma=0.0")
+    return found
+
+
+def _exchange(scene: Scene, rate: int) -> list[str]:
+    """Overrides for another exchange rate; what is due at every tick stays so."""
+    bodies = [f"rates.bodies={rate}"] if scene[Rates].bodies == scene[Exchange].rate else []
+    return [f"exchange.rate={rate}", *bodies]
+
+
+class _Truth:
+    """Takes the place of a log: keeps the true states."""
+
+    def __init__(self, key: str):
+        self._key = key
+        self.poses: list[Any] = []
+
+    def write(self, name: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
+        """A message of any topic."""
+        if name == self._key:
+            self.poses.append(message.decode(payload).pose)
+
+
+def fly(scene: Scene) -> Track:
+    """Fly a scene in memory, as fast as it goes."""
+    kept = _Truth(TRUTH.key(scene[Vehicle].name))
+    services = lockstep_services(scene)
+
+    def go_on(time_ns: int, newest: dict[Topic, bytes]) -> bool:
+        return False
+
+    run_single(scene, services, kept, None, go_on)  # type: ignore[arg-type]
+    position = np.array([p.position for p in kept.poses])
+    attitude = np.array([p.orientation for p in kept.poses])
+    return Track(scene[Exchange].interval, position, attitude)
+
+
+def _part(source: str, setting: float, label: str, track: Track, exact: Track) -> Part:
+    return Part(source, setting, label, *difference(track, exact))
+
+
+def difference(one: Track, other: Track) -> tuple[float, float, float]:
+    """Distance [m] and angle [rad] between two flights that nine ticks in ten stay below, and the largest distance.
+
+    Compared at the ticks of the one with fewer.
+    """
+    coarse, fine = (one, other) if one.interval >= other.interval else (other, one)
+    every = round(coarse.interval / fine.interval)
+    n = min(len(coarse.position), -(-len(fine.position) // every))
+    p, q = coarse.position[:n], coarse.attitude[:n]
+    r, s = fine.position[::every][:n], fine.attitude[::every][:n]
+    # twice the arc sine of half the chord: exact for small angles, where the arc cosine is not
+    chord = np.minimum(np.linalg.norm(q - s, axis=1), np.linalg.norm(q + s, axis=1))
+    angle = 4.0 * np.arcsin(np.minimum(0.5 * chord, math.sqrt(0.5)))
+    distance = np.linalg.norm(p - r, axis=1)
+    return float(np.quantile(distance, MOST)), float(np.quantile(angle, MOST)), float(distance.max())

@@ -1,0 +1,109 @@
+"""The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dynamics import integrators
+from dynamics.effects._rotors import each
+from dynamics.integrators import rkmk54
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import exp
+from dynamics.noise import stream_key
+from dynamics.tree import flatten
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe
+from services.scene import Scene
+from services.sections import Exchange, Run, Vehicle, active, airframe
+from studies.accuracy.coordinates import coordinates, defect
+from studies.accuracy.integrate import SAMPLES, applicable
+from studies.accuracy.problem import Outcome, Problem, Way
+
+DURATION = 2.0  # [s], about
+HEIGHT = 20.0  # [m] clear of the ground
+FINEST = 64  # steps in an exchange interval, of the reference; the runs that are compared have half as many at most
+TICK = 1000  # of the first exchange, so that random effects have begun
+
+
+@leaf
+def _wave(t, volts, phase):
+    return volts * (1.0 + 0.02 * math.sin(3.0 * t + phase))
+
+
+@kernel
+def flight(method, p, key, state, volts, phase, h, n, every, out):
+    """Fly exchanges of n steps of h [s] under waving voltages; a row of `out` for each `every` of them."""
+    tick = TICK
+    for row in range(out.shape[0]):
+        if row > 0:
+            for _ in range(every):
+                state = advance(method, p, key, tick, state, each(_wave, tick * n * h, volts, phase), h, n)
+                tick += 1
+        numbers = flatten(state.motion)
+        for i in range(len(numbers)):
+            out[row, i] = numbers[i]
+
+
+def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
+    """(parameters, start) of a scene whose model is the reduced one: in the air, moving and turning."""
+    p = multirotor.parameters(airframe(scene), active(scene))
+    state = multirotor.initial_state(p, (0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p))
+    motion = state.motion._replace(velocity_world=(3.0, 1.0, -0.5), omega_body=(0.4, -0.6, 0.3))
+    return p, state._replace(motion=motion)
+
+
+def problem(scene: Scene) -> Problem:
+    """The plant of such a scene, and the ways to integrate it."""
+    exchange = scene[Exchange]
+    p, state = physics(scene)
+    volts = tuple(speed / p.layout.speed_per_volt for speed in state.motion.rotor_speed)
+    phase = tuple(2.4 * i for i in range(len(volts)))
+    every = max(1, round(DURATION * exchange.rate / SAMPLES))
+    duration = SAMPLES * every * exchange.interval
+    key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
+
+    def flown(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+        out = np.empty((rows, len(flatten(state.motion))))
+        token, h = method.Method(), exchange.interval / steps
+        return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
+
+    def way(name: str) -> Way:
+        method = integrators.get(name)
+
+        def read(step: float, out: np.ndarray) -> Outcome | None:
+            if not np.isfinite(out).all():
+                return None
+            each_step = getattr(method, "EVALUATIONS", None)
+            evaluations = each_step and SAMPLES * every * round(exchange.interval / step) * each_step
+            times = np.linspace(0.0, duration, SAMPLES + 1)
+            return Outcome(times, coordinates(state.motion, out), defect(state.motion, out[-1]), evaluations)
+
+        settings = [exchange.interval / 2**k for k in range(6)]
+        return Way(
+            name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
+            flown(method, 1, rows=1),
+        )  # fmt: skip
+
+    return Problem(
+        f"{scene.name}: its multirotor in the air under prescribed voltages",
+        "s",
+        duration,
+        [way(name) for name in applicable(state.motion)],
+        lambda: coordinates(state.motion, flown(rkmk54, FINEST)())[-1],
+        f"rkmk54 with {FINEST} steps in an exchange interval",
+        {},
+    )
+
+
+def hover_speed(p: MultirotorParameters) -> float:
+    """Speed of all rotors [rad/s] that carries the weight."""
+    low, high = 0.0, p.layout.speed_per_volt * p.layout.max_voltage
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        state = multirotor.initial_state(p, (0.0, 0.0, HEIGHT), rotor_speed=middle)
+        volts = (middle / p.layout.speed_per_volt,) * len(p.layout.x_body)
+        rises = observe(p, TICK, 1e-3, state, volts).acceleration_world[2] > 0.0
+        low, high = (low, middle) if rises else (middle, high)
+    return 0.5 * (low + high)

@@ -1,0 +1,65 @@
+"""The bare delivery drone, tumbling: gravity, thrust and the lag of its rotors, at steady uneven voltages."""
+
+from pathlib import Path
+
+import numpy as np
+
+from dynamics import effects
+from dynamics.effects._types import Motion
+from dynamics.integrators import RATES
+from dynamics.lie.quaternion import exp
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor import STANDARD_DENSITY, MultirotorDrive
+from studies.accuracy.coordinates import of_state
+from studies.accuracy.integrate import ways
+from studies.accuracy.problem import Problem
+from studies.accuracy.reference import DOP853, dop853, turning
+
+AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
+DURATION = 2.0  # [s]
+VOLTAGE = (31.0, 32.5, 30.0, 33.0)  # [V] around hover
+START = Motion(
+    (0.0, 0.0, 50.0), exp((0.2, -0.4, 0.1)), (1.0, 0.5, -0.3), (2.0, -1.5, 1.0), (330.0, 340.0, 320.0, 335.0)
+)
+
+RATES[MultirotorDrive] = multirotor.rate
+
+
+def problems() -> dict[str, Problem]:
+    """One."""
+    drive = bare_drive()
+    problem = Problem(
+        "delivery drone, bare and tumbling",
+        "s",
+        DURATION,
+        ways(drive, START, DURATION, 16),
+        lambda: dop853(lambda t, y: right_hand_side(drive, y), of_state(START), DURATION),
+        DOP853,
+        {},
+    )
+    return {"multirotor": problem}
+
+
+def bare_drive() -> MultirotorDrive:
+    """The drone under gravity and thrust, with its voltages."""
+    frame = load_airframe(AIRFRAME)
+    p = multirotor.parameters(frame, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, frame))
+    return MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
+
+
+def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
+    """Newton, Euler and a first-order lag for (position, R in row order, velocity, omega, rotor speeds)."""
+    layout, body = drive.parameters.layout, drive.parameters.body
+    gravity, rotor = drive.parameters.effects
+    R, o, speed = y[3:12].reshape(3, 3), y[15:18], y[18:22]
+    thrust = rotor.thrust_constant * STANDARD_DENSITY * speed**2
+    drag = rotor.torque_constant * STANDARD_DENSITY * speed**2
+    place = np.column_stack([layout.x_body, layout.y_body, layout.z_body])
+    torque = np.cross(place, np.outer(thrust, (0.0, 0.0, 1.0))).sum(axis=0)
+    torque[2] += np.dot(layout.yaw_sign, drag)
+    inertia = np.array(body.inertia)
+    omega_rate = (torque - np.cross(o, inertia * o)) / inertia
+    acceleration = R[:, 2] * thrust.sum() / body.mass - [0.0, 0.0, gravity.acceleration]
+    lag = layout.lag_rate * (np.array(drive.voltage) * layout.speed_per_volt - speed)
+    return np.concatenate([y[12:15], turning(y[3:12], o), acceleration, omega_rate, lag])

@@ -1,0 +1,36 @@
+"""The fixed-point iteration ends where rounding, not the step, is what is left."""
+
+from typing import NamedTuple
+
+import pytest
+
+from dynamics.integrators import RATES, get, march
+from dynamics.kernel import leaf
+
+
+class LagParameters(NamedTuple):
+    target: float
+    rate: float
+
+
+class LagState(NamedTuple):
+    speed: float
+    distance: float
+
+
+@leaf
+def lag_rate(p, t, x):
+    return LagState(p.rate * (p.target - x.speed), 1e-3)
+
+
+RATES[LagParameters] = lag_rate
+
+
+@pytest.mark.parametrize("speed", [1.0, 330.0, 1e6])
+def test_large_numbers_that_cancel(speed):
+    # a rotor close to its speed: the difference of large numbers is all rounding
+    p, h, n = LagParameters(speed, 20.3), 4e-3, 500
+    end = march(get("implicit_lie_midpoint").Method(), p, 0.0, LagState(speed * 1.001, 0.0), h, n)
+    factor = (1 - 0.5 * h * p.rate) / (1 + 0.5 * h * p.rate)
+    assert end.speed == pytest.approx(speed + 1e-3 * speed * factor**n, rel=1e-14)
+    assert end.distance == pytest.approx(2e-3, rel=1e-11)

@@ -1,0 +1,97 @@
+"""The study on a problem of one number with known errors and times, and the command around it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.accuracy import table
+from studies.accuracy.command import run
+from studies.accuracy.measure import Point, cheapest, check_target, measure, telling
+from studies.accuracy.plot import draw
+from studies.accuracy.problem import Outcome, Problem, Way
+from studies.accuracy.targets import find
+
+
+def decay():
+    """x' = -x to t = 1 by Euler's method in Python; and a way that always fails."""
+
+    def euler(h):
+        x = 1.0
+        for _ in range(round(1.0 / h)):
+            x -= h * x
+        return x
+
+    def read(h, x):
+        return Outcome(np.array([0.0, 1.0]), np.array([[1.0], [x]]), 0.0, round(1.0 / h))
+
+    steps = [0.1 / 2**k for k in range(5)]
+    ways = [
+        Way("euler", 1, "s", steps, lambda h: lambda: euler(h), read, lambda: None),
+        Way("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
+    ]
+    value = {"value": lambda t, y: y[:, 0]}
+    return Problem("decay", "s", 1.0, ways, lambda: np.array([np.exp(-1.0)]), "closed form", value)
+
+
+def test_measured_errors_are_those_of_the_method():
+    points = measure(decay())
+    assert [p.way for p in points] == ["euler"] * 5
+    for p in points:
+        exact = np.exp(-1.0)
+        assert p.error == pytest.approx(abs((1 - p.setting) ** (1 / p.setting) - exact) / (1 + exact), rel=1e-9)
+        assert p.evaluations == round(1.0 / p.setting)
+        assert p.drift["value"] == pytest.approx(1 - (1 - p.setting) ** (1 / p.setting))
+        assert p.time > 0.0
+
+
+def points():
+    drift = {"manifold": 0.0}
+    return [
+        Point("one", 4, "s", 0.1, 1e-3, 1e-5, 40, drift),
+        Point("one", 4, "s", 0.05, 6e-5, 2e-5, 80, drift),
+        Point("two", 5, "tol", 1e-6, 5e-7, 3e-5, 90, drift),
+        Point("two", 5, "tol", 1e-3, 5e-4, 2.5e-5, 50, drift),
+    ]
+
+
+def test_the_cheapest_that_meets_a_target_is_named():
+    assert cheapest(points(), 1e-3).setting == 0.1
+    assert cheapest(points(), 2e-4).setting == 0.05
+    assert cheapest(points(), 1e-6).way == "two"
+    with pytest.raises(ValueError, match=r"--target 1e-09: no method meets this error; the smallest .* 5e-07, by two"):
+        cheapest(points(), 1e-9)
+    assert [p.setting for p in telling(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
+
+
+@pytest.mark.parametrize("goal", [0.0, -1e-3, float("nan"), float("inf")])
+def test_a_goal_that_is_no_error_is_refused(goal):
+    with pytest.raises(ValueError, match=r"--target .*: expected an error above 0"):
+        check_target(goal)
+
+
+def test_a_misspelt_target_lists_the_choices():
+    with pytest.raises(ValueError, match=r"unknown target gyrostat_bloked: did you mean gyrostat_blocked\? .*free"):
+        find("gyrostat_bloked")
+
+
+def test_json_and_picture(tmp_path):
+    table.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], [])
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert data["cheapest"]["way"] == "one"
+    assert data["points"][2] == {
+        "way": "two", "order": 5, "unit": "tol", "setting": 1e-6, "error": 5e-7, "time": 3e-5, "evaluations": 90,
+        "drift": {"manifold": 0.0},
+    }  # fmt: skip
+    draw(tmp_path / "a.png", "decay", points())
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_command_prints_the_choice(capsys, tmp_path):
+    run("os4_experiment_1", [], 1e-3, tmp_path / "a.json", None)
+    printed = capsys.readouterr().out
+    assert "OS4 quadrotor: experiment 1" in printed
+    assert "cheapest: " in printed
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["cheapest"]["error"] <= 1e-3
+    assert {"rkmk54", "lie_euler", "erk4m"} <= {p["way"] for p in found["points"]}

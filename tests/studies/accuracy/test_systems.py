@@ -1,0 +1,49 @@
+"""Every system of the study: its independent reference and our integrators agree, and its invariants are kept."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from studies.accuracy.coordinates import error, matrices, of_state
+from studies.accuracy.measure import drift
+from studies.accuracy.reference import turning
+from studies.accuracy.systems import free_rigid_body, problems
+
+
+@pytest.mark.parametrize("name", list(problems()))
+def test_the_reference_is_met(name):
+    problem = problems()[name]
+    way = next(w for w in problem.ways if w.name == "rkmk54")
+    coarse, fine = (way.read(t, way.prepare(t)()) for t in (1e-5, 1e-12))
+    exact = problem.reference()
+    assert error(fine.samples[-1], exact) < 3e-9
+    assert error(coarse.samples[-1], exact) > 3 * error(fine.samples[-1], exact)
+    assert max(drift(problem, fine).values()) < 1e-9
+
+
+def test_an_invariant_of_a_wrong_motion_drifts():
+    problem = problems()["free_rigid_body"]
+    way = next(w for w in problem.ways if w.name == "rkmk54")
+    outcome = way.read(1e-8, way.prepare(1e-8)())
+    outcome.samples[-1, 9:12] *= 1.01
+    found = drift(problem, outcome)
+    assert found["energy"] == pytest.approx(0.0201, rel=1e-3)
+    assert found["momentum"] > 5e-3
+
+
+@pytest.mark.parametrize("t", [0.3, 7.0, 25.0])
+def test_the_closed_form_solves_eulers_equations(t):
+    inertia, start = free_rigid_body.INERTIA, free_rigid_body.START
+
+    def rate(_, y):
+        o = y[9:]
+        return np.concatenate([turning(y[:9], o), np.cross(inertia * o, o) / inertia])
+
+    other = solve_ivp(rate, (0.0, t), of_state(start), method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert free_rigid_body.closed_form(inertia, start, t) == pytest.approx(other, abs=1e-10)
+
+
+def test_matrices_are_those_of_the_library():
+    q = np.array([[0.5, -0.5, 0.5, 0.5], [0.8, 0.0, 0.6, 0.0]])
+    assert matrices(q)[0] == pytest.approx([0, -1, 0, 0, 0, 1, -1, 0, 0], abs=1e-15)
+    assert matrices(q)[1] == pytest.approx([0.28, 0, 0.96, 0, 1, 0, -0.96, 0, 0.28], abs=1e-15)
