@@ -399,7 +399,6 @@ def performance(
 
 
 @app.command()
-<<<<<<< HEAD
 def effects(
     scene: SceneFile,
     set_: Overrides = None,
@@ -427,7 +426,9 @@ def effects(
             show.write_json(json, found)
         if plot:
             show.plot(plot, found)
-=======
+
+
+@app.command()
 def accuracy(
     target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (TOML)")],
     set_: Overrides = None,
@@ -444,7 +445,6 @@ def accuracy(
         _check_writable(json)
         _check_writable(plot)
         command.run(target, set_ or [], goal, json, plot)
->>>>>>> accuracy
 
 
 @app.command()

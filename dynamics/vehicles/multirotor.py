@@ -2,7 +2,7 @@
 
 Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
 every force is an effect (dynamics/effects). All functions are pure. What stands for the motion in the state is a form
-(`FORMS`): here one rigid body; `multirotor_multibody` adds five bodies, under the same effects, `advance` and `observe`.
+(`FORMS`): here one rigid body; `multirotor_multibody` adds five, under the same effects, `advance` and `observe`.
 """
 
 import sys

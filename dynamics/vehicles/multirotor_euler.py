@@ -1,4 +1,4 @@
-"""The multirotor's five bodies in XYZ Euler angles on the general engine: every constraint row, factorised at every call.
+"""The multirotor's five bodies in XYZ Euler angles on the general engine, which factorises every constraint row.
 
 A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a chassis
 that pitches through 90 degrees: there its rates are NaN.
