@@ -87,7 +87,7 @@ def bodies(p, s, tick, command, interval):
 class FiveBodyPlant(reduced.Reduced):
     """Tells of single bodies as well: forces and torques of the hinges, a drive's torque along its propeller's axis."""
 
-    outputs = (*reduced.Reduced.outputs, BODIES)
+    outputs = (*reduced.Reduced.outputs, BODIES)  # type: ignore[assignment]
 
     def __init__(self, scene: Scene):
         super().__init__(scene)
@@ -116,7 +116,7 @@ class FiveBodyPlant(reduced.Reduced):
         if tick % self._bodies_every == 0:
             command = actuators.motor_voltage if actuators else self._off
             x, joints = bodies(self._parameters, self._state, tick, command, self._interval)
-            parts = (x.chassis, *x.propellers)
+            parts: list[Any] = [x.chassis, *x.propellers]
             motions = [Motion(*part, ()) for part in parts]
             forces, torques = zip(*joints, strict=True)
             yield BODIES, outputs.bodies(tick * self._interval_ns, NAMES, motions, forces, torques)
