@@ -117,6 +117,6 @@ class FiveBodyPlant(reduced.Reduced):
             command = actuators.motor_voltage if actuators else self._off
             x, joints = bodies(self._parameters, self._state, tick, command, self._interval)
             parts: list[Any] = [x.chassis, *x.propellers]
-            motions = [Motion(*part, ()) for part in parts]
+            motions = [Motion(b.position_world, b.attitude, b.velocity_world, b.omega_body, ()) for b in parts]
             forces, torques = zip(*joints, strict=True)
             yield BODIES, outputs.bodies(tick * self._interval_ns, NAMES, motions, forces, torques)

@@ -1,5 +1,6 @@
 """Five bodies under the effects of a scene: with symmetric propellers they are the reduced model, else they wobble."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ from dynamics import effects
 from dynamics.effects._types import body_of
 from dynamics.integrators import get
 from dynamics.kernel import kernel
-from dynamics.lie.quaternion import exp, rotation_matrix
+from dynamics.lie.quaternion import NO_ROTATION, exp, rotation_matrix
 from dynamics.noise import stream_key
 from dynamics.vehicles import multirotor, multirotor_multibody
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor import MultirotorDrive
 
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
