@@ -15,6 +15,7 @@ The stages of one evaluation, in order, each a hook:
     wrench    (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
     wrench_body  the same with the force in body coordinates
     torque    (e, memory, s, rotors) -> torque_body [N m], where there is no force
+    field     (e, memory) -> acceleration of gravity, world [m/s^2]: of what wrench, for each of several bodies
 
 and between evaluations:
 
@@ -64,6 +65,7 @@ motor = _hook("motor")
 wrench = _hook("wrench")
 wrench_body = _hook("wrench_body")
 torque = _hook("torque")
+field = _hook("field")
 sample = _hook("sample")
 settle = _hook("settle")
 substeps = _hook("substeps")
@@ -146,6 +148,13 @@ all_wrenches = _written_out(
     "s, rotors, force, torque",
     "w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
     "(force, torque)",
+)
+all_fields = _written_out(
+    "all_fields",
+    "field",
+    "value",
+    "value = add(value, f{i}(effects[{i}], memory[{i}]))",
+    "value",
 )
 all_motors = _written_out(
     "all_motors",

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from dynamics.effects._hooks import wrench
+from dynamics.effects._hooks import field, wrench
 from dynamics.vector import ZERO
 
 KIND = "gravity"
@@ -18,6 +18,12 @@ class Gravity(NamedTuple):
     """
 
     acceleration: Annotated[float, Ge(0), Le(30)] = 9.80665  # [m/s^2]
+
+
+@field(Gravity)
+def gravity_field(e, memory):
+    """Acceleration [m/s^2] in world."""
+    return (-0.0, -0.0, -e.acceleration)
 
 
 @wrench(Gravity)

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from dynamics.effects._hooks import sample, wrench
+from dynamics.effects._hooks import field, sample, wrench
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
 
@@ -37,6 +37,12 @@ def _at(e, height):
 def weigh(e, memory, s, rotors, key, tick, interval):
     """The acceleration [m/s^2] for the next interval: it changes by 3e-7 of itself a metre."""
     return (_at(e, s.motion.position_world[2]),)
+
+
+@field(GravityAltitude)
+def gravity_altitude_field(e, memory):
+    """Acceleration [m/s^2] in world."""
+    return (-0.0, -0.0, -memory[0])
 
 
 @wrench(GravityAltitude)

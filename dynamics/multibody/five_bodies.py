@@ -65,6 +65,7 @@ class Machine(NamedTuple):
     gravity: Vec3  # [m/s^2], world
     wrench: Wrench  # on the chassis
     rotors: tuple[Rotor, ...]
+    feedback: float  # Baumgarte's rate of critically damped feedback [1/s], eq. (8.30); 0: none
 
 
 @leaf
@@ -82,8 +83,27 @@ def free_turn(R0, axis, gamma_1, gamma_2):
 
 
 @leaf
-def _leaf(r, x, t, R0, w, w_world, gravity):
-    """What `arrow` must know of rotor r in state x, in world axes; w, w_world: angular velocity of the chassis."""
+def _fed_back(rate, r, x, chassis, R0, offset, own, speed):
+    """(drift, turn) of Baumgarte's feedback at `rate` [1/s] of what is missing at a hinge (theory.md, eq. (8.30))."""
+    axis, w_world = column(quaternion.rotation_matrix(x.attitude), 2), apply(R0, chassis.omega_body)
+    gap = subtract(subtract(x.position_world, chassis.position_world), offset)
+    slip = subtract(subtract(x.velocity_world, chassis.velocity_world), cross(w_world, offset))
+    drift = add(scale(-2.0 * rate, slip), scale(-rate * rate, gap))
+    a = apply_transposed(R0, axis)
+    relative = subtract(own, w_world)
+    swing = apply_transposed(R0, cross(relative, axis))
+    back = rate * rate
+    if r.spins > 0.0:
+        both = (-2.0 * rate * swing[0] - back * a[0], -2.0 * rate * swing[1] - back * a[1])
+        return drift, free_turn(R0, a, both[0], both[1])
+    late = subtract(relative, scale(speed, column(R0, 2)))
+    return drift, add(scale(-2.0 * rate, late), free_turn(R0, a, -back * a[0], -back * a[1]))
+
+
+@leaf
+def _leaf(r, x, t, chassis, R0, w_world, gravity, feedback):
+    """What `arrow` must know of rotor r in state x, in world axes; w_world: angular velocity of the chassis."""
+    w = chassis.omega_body
     R = quaternion.rotation_matrix(x.attitude)
     own = apply(R, x.omega_body)
     axis = column(R, 2)
@@ -95,10 +115,14 @@ def _leaf(r, x, t, R0, w, w_world, gravity):
         twice = 2.0 * wa - x.omega_body[2]
         gamma_1 = a[0] * square - w[0] * wa + o[0] * twice
         gamma_2 = a[1] * square - w[1] * wa + o[1] * twice
-        turn, torque = free_turn(R0, a, gamma_1, gamma_2), r.drive
+        speed, turn, torque = 0.0, free_turn(R0, a, gamma_1, gamma_2), r.drive
     else:
         speed = r.speed + r.drive * t
         turn, torque = apply(R0, (w[1] * speed, -w[0] * speed, r.drive)), 0.0
+    drift = cross(w_world, cross(w_world, offset))
+    if feedback > 0.0:
+        more, swing = _fed_back(feedback, r, x, chassis, R0, offset, own, speed)
+        drift, turn = add(drift, more), add(turn, swing)
     return Leaf(
         r.mass,
         felt(R, r.inertia, r.spins),
@@ -107,7 +131,7 @@ def _leaf(r, x, t, R0, w, w_world, gravity):
         r.inertia[2],
         r.spins,
         torque,
-        cross(w_world, cross(w_world, offset)),
+        drift,
         turn,
         add(scale(r.mass, gravity), r.wrench.force_world),
         apply(R, subtract(r.wrench.torque_body, cross(x.omega_body, multiply(r.inertia, x.omega_body)))),
@@ -128,10 +152,10 @@ def solve(p, t, x):
     )
     r, b = p.rotors, x.propellers
     leaves = (
-        _leaf(r[0], b[0], t, R0, w, w_world, p.gravity),
-        _leaf(r[1], b[1], t, R0, w, w_world, p.gravity),
-        _leaf(r[2], b[2], t, R0, w, w_world, p.gravity),
-        _leaf(r[3], b[3], t, R0, w, w_world, p.gravity),
+        _leaf(r[0], b[0], t, x.chassis, R0, w_world, p.gravity, p.feedback),
+        _leaf(r[1], b[1], t, x.chassis, R0, w_world, p.gravity, p.feedback),
+        _leaf(r[2], b[2], t, x.chassis, R0, w_world, p.gravity, p.feedback),
+        _leaf(r[3], b[3], t, x.chassis, R0, w_world, p.gravity, p.feedback),
     )
     return eliminate(core, leaves)
 
@@ -162,7 +186,12 @@ RATES[Machine] = rate
 
 
 def machine(
-    drone, gravity, drive=(0.0, 0.0, 0.0, 0.0), speeds=(0.0, 0.0, 0.0, 0.0), wrenches=(NO_WRENCH,) * 5
+    drone,
+    gravity,
+    drive=(0.0, 0.0, 0.0, 0.0),
+    speeds=(0.0, 0.0, 0.0, 0.0),
+    wrenches=(NO_WRENCH,) * 5,
+    feedback=0.0,
 ) -> Machine:
     """The five bodies of a `delivery_drone.Drone`; `wrenches`: chassis first."""
     rotors = tuple(
@@ -172,7 +201,7 @@ def machine(
         )
         for k in range(4)
     )  # fmt: skip
-    return Machine(drone.mass, drone.inertia, gravity, wrenches[0], rotors)
+    return Machine(drone.mass, drone.inertia, gravity, wrenches[0], rotors, feedback)
 
 
 def arrays(x: FiveBodies) -> tuple[np.ndarray, np.ndarray]:

@@ -46,6 +46,8 @@ class RotorPlacement(Section):
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
     yaw_sign: tuple[float, ...]  # +1 or -1: sign of the torque on the body about z
     inertia: Positive  # [kg m^2] of one rotor about its axis
+    mass: Positive | None = None  # [kg] of one rotor, part of the total; for models that give it a body of its own
+    blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
 
     @model_validator(mode="after")
     def _one_sign_each(self):

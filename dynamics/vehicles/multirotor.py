@@ -1,11 +1,13 @@
 """The plant: one rigid body with rotors, driven by motor voltages, under the effects that its scene names.
 
 Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
-every force is an effect (dynamics/effects). All functions are pure.
+every force is an effect (dynamics/effects). All functions are pure. What stands for the motion in the state is a form
+(`FORMS`): here one rigid body; `multirotor_multibody` adds five, under the same effects, `advance` and `observe`.
 """
 
 import sys
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from numba.extending import overload
 
@@ -33,6 +35,7 @@ class RotorLayout(NamedTuple):
     lag_rate: float  # [1/s]
     max_voltage: float  # [V]
     idle_current: float  # [A]
+    bodies: Any = ()  # what a form with several bodies needs to know of them
 
 
 class MultirotorParameters(NamedTuple):
@@ -46,8 +49,20 @@ class MultirotorParameters(NamedTuple):
 class MultirotorState(NamedTuple):
     """All that the plant remembers from one exchange to the next."""
 
-    motion: Motion
+    motion: Any  # of a class in FORMS: Motion, or several bodies
     memory: tuple  # one tuple for each effect
+
+
+class Form(NamedTuple):
+    """The compiled functions of a class that stands for the motion in the state."""
+
+    seen: Callable  # (layout, x) -> Motion that effects look at
+    rate: Callable  # (drive, t, x) -> tangent of x
+    held: Callable  # (drive, x) -> x after a step, brought back onto its constraints
+    accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
+
+
+FORMS: dict[type, Form] = {}
 
 
 class MultirotorDrive(NamedTuple):
@@ -148,15 +163,53 @@ def rate(drive, t, motion):
     )
 
 
-def _step(method, drive, t, motion, h):
+@leaf
+def _itself(_, motion):
+    return motion
+
+
+@leaf
+def accelerations(drive, t, motion):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
+    s, _, force, torque = evaluate(drive, t, motion)
+    return scale(s.body.inverse_mass, force), _angular_acceleration(s.body, motion.omega_body, torque)
+
+
+FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
+
+
+def seen(layout, x):
+    """The vehicle's Motion, whatever form its state has."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(seen, jit_options={"forceinline": True})
+def _seen(layout, x):
+    found = FORMS[x.instance_class].seen
+    return lambda layout, x: found(layout, x)
+
+
+def _accelerations(drive, t, x):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_accelerations, jit_options={"forceinline": True})
+def _accelerations_of_form(drive, t, x):
+    found = FORMS[x.instance_class].accelerations
+    return lambda drive, t, x: found(drive, t, x)
+
+
+def _step(method, drive, t, x, h):
     raise NotImplementedError("compiled code only")
 
 
 @overload(_step, jit_options={"forceinline": True})
-def _step_inlined(method, drive, t, motion, h):
+def _step_inlined(method, drive, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
+    form = FORMS[x.instance_class]
+    its_rate, held = form.rate, form.held
     # inlined into `advance`, so that what a whole interval has in common is computed once
-    return lambda method, drive, t, motion, h: one_step(rate, drive, t, motion, h)
+    return lambda method, drive, t, x, h: held(drive, one_step(its_rate, drive, t, x, h))
 
 
 @leaf
@@ -173,15 +226,15 @@ def _airborne(p, body, memory, voltage):
 
 
 @kernel
-def _awake_step(method, drive, t, motion, h):
-    """(motion, memory) a step later with every effect taking part, in as many parts as they ask for."""
+def _awake_step(method, drive, t, x, h):
+    """(state's form, memory) a step later with every effect taking part, in as many parts as they ask for."""
     p, body, memory, voltage = drive
-    parts = hooks.all_substeps(p.effects, memory, motion, h)
+    parts = hooks.all_substeps(p.effects, memory, seen(p.layout, x), h)
     part = h / parts
     for j in range(parts):
-        motion = _step(method, MultirotorDrive(p, body, memory, voltage), t + j * part, motion, part)
-        memory = hooks.all_settled(p.effects, memory, motion, part)
-    return motion, memory
+        x = _step(method, MultirotorDrive(p, body, memory, voltage), t + j * part, x, part)
+        memory = hooks.all_settled(p.effects, memory, seen(p.layout, x), part)
+    return x, memory
 
 
 @kernel
@@ -200,33 +253,34 @@ def advance(method, p, key, tick, state, command, h, n):
     """
     layout = p.layout
     voltage = each(_within, layout.max_voltage, command, command)
-    motion, memory = state
+    x, memory = state
     interval = n * h
     start = tick * interval
     before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
-    s, rotors, _, _ = evaluate(before, start, motion)
+    s, rotors, _, _ = evaluate(before, start, seen(layout, x))
     memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
     body = hooks.all_body(p.effects, memory, p.body)
     airborne = _airborne(p, body, memory, voltage)
     for i in range(n):
-        if hooks.all_asleep(p.effects, memory, motion, h):
-            motion = _step(method, airborne, start + i * h, motion, h)
+        if hooks.all_asleep(p.effects, memory, seen(layout, x), h):
+            x = _step(method, airborne, start + i * h, x, h)
         else:
-            motion, memory = _awake_step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, motion, h)
-    return MultirotorState(motion, memory)
+            x, memory = _awake_step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+    return MultirotorState(x, memory)
 
 
 @kernel
 def observe(p, tick, interval, state, command):
     """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
-    layout, motion = p.layout, state.motion
+    layout = p.layout
     voltage = each(_within, layout.max_voltage, command, command)
     body = hooks.all_body(p.effects, state.memory, p.body)
     drive = MultirotorDrive(p, body, state.memory, voltage)
-    s, rotors, force, torque = evaluate(drive, tick * interval, motion)
+    s, rotors, _, _ = evaluate(drive, tick * interval, seen(layout, state.motion))
+    linear, angular = _accelerations(drive, tick * interval, state.motion)
     return MultirotorObservation(
-        scale(s.body.inverse_mass, force),
-        _angular_acceleration(s.body, motion.omega_body, torque),
+        linear,
+        angular,
         rotors.thrust,
         rotors.torque,
         rotors.acceleration,

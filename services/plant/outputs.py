@@ -86,8 +86,17 @@ def clock(time_ns: int) -> Any:
     return Clock(stamp(time_ns))
 
 
-def bodies(time_ns: int, names: Sequence[str], motions: Sequence[Motion], forces: Sequence[Vec3] = ()) -> Any:
-    """Every body of a vehicle, with the force [N] of contacts or joints on each in the world; none given: zero."""
+def bodies(
+    time_ns: int,
+    names: Sequence[str],
+    motions: Sequence[Motion],
+    forces: Sequence[Vec3] = (),
+    torques: Sequence[Vec3] = (),
+) -> Any:
+    """Every body of a vehicle, with the contacts' or joints' force [N] in the world and torque [N m] in the body.
+
+    None given: zero.
+    """
     nothing = (0.0, 0.0, 0.0)
     return BodyStates(
         header(time_ns, WORLD),
@@ -96,7 +105,7 @@ def bodies(time_ns: int, names: Sequence[str], motions: Sequence[Motion], forces
         tuple(Vector3(*m.velocity_world) for m in motions),
         tuple(Vector3(*m.omega_body) for m in motions),
         tuple(Vector3(*f) for f in forces or [nothing] * len(names)),
-        tuple(Vector3(*nothing) for _ in names),
+        tuple(Vector3(*f) for f in torques or [nothing] * len(names)),
     )
 
 

@@ -8,7 +8,7 @@ from dynamics.kernel import kernel
 from dynamics.noise import stream_key
 from dynamics.tree import finite
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import advance, observe
+from dynamics.vehicles.multirotor import advance, observe, seen
 from messages import Actuators, Status
 from messages.topics import ACTUATORS, BATTERY, CLOCK, ODOM, POSE, STATUS, TF, TRUTH, Topic
 from services.lockstep import Input
@@ -38,7 +38,8 @@ def fly(method, p, s, key, tick, command, h, n, interval):
     """
     if n > 0:
         s.value = advance(method, p.value, key, tick - 1, s.value, command, h, n)
-    return s.value.motion, observe(p.value, tick, interval, s.value, command), finite(s.value.motion)
+    motion = seen(p.value.layout, s.value.motion)
+    return motion, observe(p.value, tick, interval, s.value, command), finite(s.value.motion)
 
 
 class Reduced:
@@ -56,12 +57,16 @@ class Reduced:
         self._pose_every, self._battery_every = period(scene, POSE), period(scene, BATTERY)
         self._method, self._steps, self._step = method(scene)
         self._key = stream_key(scene[Run].seed, vehicle.name, "plant")
-        parameters = multirotor.parameters(frame, active(scene))
-        start = multirotor.initial_state(parameters, (0.0, 0.0, start_height(scene)))
+        parameters, start = self._vehicle(scene)
         self._parameters, self._state = Cell(parameters), Cell(start)
         self._off = (0.0,) * len(frame.rotors.position)
         self._cells = frame.battery.cells if frame.battery else 0
         self._voltage = frame.motor.max_voltage
+
+    def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
+        """(parameters, state at the start)."""
+        p = multirotor.parameters(airframe(scene), active(scene))
+        return p, multirotor.initial_state(p, (0.0, 0.0, start_height(scene)))
 
     def prepare(self) -> None:
         """Compile or load the kernel."""

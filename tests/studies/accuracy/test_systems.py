@@ -10,7 +10,7 @@ from studies.accuracy.reference import turning
 from studies.accuracy.systems import free_rigid_body, problems
 
 
-@pytest.mark.parametrize("name", list(problems()))
+@pytest.mark.parametrize("name", [n for n, p in problems().items() if any(w.name == "rkmk54" for w in p.ways)])
 def test_the_reference_is_met(name):
     problem = problems()[name]
     way = next(w for w in problem.ways if w.name == "rkmk54")

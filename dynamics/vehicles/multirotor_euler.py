@@ -1,0 +1,194 @@
+"""The multirotor's five bodies in XYZ Euler angles on the general engine, which factorises every constraint row.
+
+A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a chassis
+that pitches through 90 degrees: there its rates are NaN.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dynamics.kernel import kernel
+from dynamics.lie import quaternion
+from dynamics.multibody import euler, hold, stabilisation
+from dynamics.multibody.augmented import RANK_TOLERANCE, solve
+from dynamics.multibody.five_bodies import BodyState, FiveBodies
+from dynamics.multibody.mechanisms import drone_system
+from dynamics.multibody.system import Arrays
+from dynamics.vector import Vec3, apply
+from dynamics.vehicles import multirotor_multibody as on_se3
+from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState
+
+HELD, DRIVEN = 20, 24  # ranks of the rows of four hinges, and of these and four drives
+
+
+class EulerBody(NamedTuple):
+    """One body: its coordinates and their rates."""
+
+    position_world: Vec3  # [m] of the centre of mass
+    angles: Vec3  # roll, pitch, yaw [rad]
+    velocity_world: Vec3  # [m/s]
+    angle_rates: Vec3  # [rad/s]
+
+
+class FiveEulerBodies(NamedTuple):
+    """Chassis and propellers."""
+
+    body: tuple[EulerBody, EulerBody, EulerBody, EulerBody, EulerBody]
+
+
+@kernel
+def _body(b):
+    omega = apply(euler.rate_matrix(b.angles), b.angle_rates)
+    attitude = quaternion.from_matrix(euler.rotation(b.angles))
+    return BodyState(b.position_world, attitude, b.velocity_world, omega)
+
+
+@kernel
+def five(x):
+    """The same state on SE(3)."""
+    b = x.body
+    return FiveBodies(_body(b[0]), (_body(b[1]), _body(b[2]), _body(b[3]), _body(b[4])))
+
+
+@kernel
+def _euler_body(b):
+    angles = euler.angles_of(quaternion.rotation_matrix(b.attitude))
+    return EulerBody(b.position_world, angles, b.velocity_world, euler.rates_of(angles, b.omega_body))
+
+
+@kernel
+def of_five(x):
+    """The same state in Euler angles."""
+    p = x.propellers
+    return FiveEulerBodies(
+        (_euler_body(x.chassis), _euler_body(p[0]), _euler_body(p[1]), _euler_body(p[2]), _euler_body(p[3]))
+    )
+
+
+@kernel
+def _arrays(x):
+    """Configuration and velocity for the general engine, shapes (5, 6)."""
+    q, v = np.empty((5, 6)), np.empty((5, 6))
+    for i in range(5):
+        b = x.body[i]
+        for k in range(3):
+            q[i, k], q[i, 3 + k] = b.position_world[k], b.angles[k]
+            v[i, k], v[i, 3 + k] = b.velocity_world[k], b.angle_rates[k]
+    return q, v
+
+
+@kernel
+def _one(q, v, i):
+    return EulerBody(
+        (q[i, 0], q[i, 1], q[i, 2]),
+        (q[i, 3], q[i, 4], q[i, 5]),
+        (v[i, 0], v[i, 1], v[i, 2]),
+        (v[i, 3], v[i, 4], v[i, 5]),
+    )
+
+
+@kernel
+def _tree(q, v):
+    return FiveEulerBodies((_one(q, v, 0), _one(q, v, 1), _one(q, v, 2), _one(q, v, 3), _one(q, v, 4)))
+
+
+@kernel
+def _system(a, p):
+    """The arrays with what the effects can change in them."""
+    mass, inertia, gravity = a.mass.copy(), a.inertia.copy(), a.gravity.copy()
+    mass[0] = p.mass
+    for k in range(3):
+        inertia[0, k, k] = p.inertia[k]
+        gravity[k] = p.gravity[k]
+    return Arrays(mass, inertia, a.joint_bodies, a.joint_points, a.joint_triads, a.drive_bodies, a.drive_axes, gravity)
+
+
+@kernel
+def _imposed(a, p):
+    """Speed and acceleration of each drive, shape (4 or 0, 2)."""
+    out = np.empty((len(a.drive_bodies), 2))
+    for k in range(len(out)):
+        out[k, 0], out[k, 1] = p.rotors[k].speed, p.rotors[k].drive
+    return out
+
+
+@kernel
+def _wrenches(p):
+    """Forces and torques on the bodies, shape (5, 6); a motor acts on propeller and chassis."""
+    out = np.empty((5, 6))
+    for k in range(3):
+        out[0, k], out[0, 3 + k] = p.wrench.force_world[k], p.wrench.torque_body[k]
+    for i in range(4):
+        r = p.rotors[i]
+        for k in range(3):
+            out[i + 1, k], out[i + 1, 3 + k] = r.wrench.force_world[k], r.wrench.torque_body[k]
+        out[i + 1, 5] += r.spins * r.drive
+        out[0, 5] -= r.spins * r.drive
+    return out
+
+
+@kernel
+def seen(layout, x):
+    """The Motion of the chassis with the speeds of the rotors."""
+    return on_se3.seen(layout, five(x))
+
+
+@kernel
+def rate(drive, t, x):
+    """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)); NaN where the angles are singular."""
+    p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
+    given = drive.parameters.layout.bodies
+    a = _system(given.arrays, p)
+    q, v = _arrays(x)
+    most = DRIVEN if len(a.drive_bodies) > 0 else HELD
+    f = given.feedback
+    s, singular = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, most)
+    acceleration = s.acceleration
+    if singular >= 0:
+        acceleration = acceleration * np.nan
+    return _tree(v, acceleration)
+
+
+@kernel
+def held(drive, x):
+    """The bodies brought together again, as the assembly says."""
+    given = drive.parameters.layout.bodies
+    if given.hold == hold.NONE:
+        return x
+    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    a = _system(given.arrays, p)
+    q, v = _arrays(x)
+    ranks = (HELD, DRIVEN if len(a.drive_bodies) > 0 else HELD)
+    if given.hold == hold.PROJECTION:
+        q, v = stabilisation.project(a, q, v, _imposed(a, p), ranks)
+    else:
+        q, v = stabilisation.partition(a, q, v, _imposed(a, p), ranks)
+    return _tree(q, v)
+
+
+@kernel
+def accelerations(drive, t, x):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    b, tangent = x.body[0], rate(drive, t, x).body[0]
+    G, change = euler.rate_matrix(b.angles), euler.rate_matrix_derivative(b.angles, b.angle_rates)
+    from_rates, from_angles = apply(G, tangent.angle_rates), apply(change, b.angle_rates)
+    angular = (from_rates[0] + from_angles[0], from_rates[1] + from_angles[1], from_rates[2] + from_angles[2])
+    return tangent.velocity_world, angular
+
+
+FORMS[FiveEulerBodies] = Form(seen, rate, held, accelerations)
+
+
+def parameters(*given, **named) -> MultirotorParameters:
+    """As `multirotor_multibody.parameters`."""
+    p = on_se3.parameters(*given, **named)
+    bodies = p.layout.bodies
+    arrays = drone_system(bodies.drone, tuple(spins == 0.0 for spins in bodies.drone.spins)).arrays
+    return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=arrays)))
+
+
+def initial_state(*given, **named) -> MultirotorState:
+    """As `multirotor_multibody.initial_state`."""
+    state = on_se3.initial_state(*given, **named)
+    return state._replace(motion=of_five(state.motion))

@@ -1,0 +1,244 @@
+"""The multirotor as five bodies: chassis and four propellers that turn on hinges, under the effects of its scene.
+
+A form of `multirotor`'s state: each body has its own pose on SE(3), the arrow structure is eliminated (theory.md, eqs.
+(8.40)-(8.46)). What `rotor_gyro` and mass properties averaged over a turn stand for in the reduced model follows here
+from the bodies themselves.
+"""
+
+from typing import Any, NamedTuple
+
+from dynamics.effects import _hooks as hooks
+from dynamics.effects._rotors import each, total, total_wrench
+from dynamics.effects._types import Motion
+from dynamics.effects.rotor_gyro import RotorGyro
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate_back
+from dynamics.multibody import five_bodies, hold
+from dynamics.multibody.delivery_drone import Drone
+from dynamics.multibody.five_bodies import NO_WRENCH, BodyState, FiveBodies, Machine, Rotor, Wrench
+from dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
+
+FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation
+STABILISATIONS = {
+    "none": hold.NONE, "partitioning": hold.PARTITION, "projection": hold.PROJECTION, "baumgarte": hold.NONE,
+}  # fmt: skip
+
+
+class Assembly(NamedTuple):
+    """The bodies, how they are driven and held together."""
+
+    drone: Drone
+    hold: int  # of dynamics.multibody.hold, after every step
+    feedback: float  # [1/s]
+    arrays: Any  # system.Arrays of the general engine; () on the fast path
+
+
+class Acting(NamedTuple):
+    """What acts on the bodies, each where it acts."""
+
+    gravity_world: Vec3  # [m/s^2]
+    force_world: Vec3  # [N] on the chassis, weight and thrust not included
+    torque_body: Vec3  # [N m] on the chassis
+    rotor: tuple  # (thrust [N], torque [N m], acceleration [rad/s^2]) of each rotor, as the reduced model has them
+
+
+@leaf
+def _rotor_speed(chassis_rate, sign, propeller):
+    # a rotor that pushes the body to +z turns about -z itself
+    return sign * (chassis_rate - propeller.omega_body[2])
+
+
+@leaf
+def seen(layout, x):
+    """The Motion of the chassis with the speeds of the rotors."""
+    c = x.chassis
+    speed = each(_rotor_speed, c.omega_body[2], layout.yaw_sign, x.propellers)
+    return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@leaf
+def _triple(accelerations, load, k):
+    return load[0], load[1], accelerations[k]
+
+
+@leaf
+def _pair(_, a, b):
+    return a, b
+
+
+@leaf
+def acting(drive, t, motion):
+    """(situation, Acting): the effects of `multirotor.evaluate`, taken apart by body."""
+    s, rotors, force, torque = evaluate(drive, t, motion)
+    R, layout = s.R_world_body, s.layout
+    field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
+    known = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
+    arms = (
+        total(each(_product, 0.0, layout.y_body, rotors.thrust)),
+        -total(each(_product, 0.0, layout.x_body, rotors.thrust)),
+        total(each(_product, 0.0, layout.yaw_sign, rotors.torque)),
+    )
+    loads = each(_pair, 0.0, rotors.thrust, rotors.torque)
+    parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
+    return s, Acting(field, subtract(force, known), subtract(torque, arms), parts)
+
+
+@leaf
+def _rotor(k, layout, R, motion, part):
+    d, sign = layout.bodies.drone, -layout.yaw_sign[k]
+    thrust, torque, acceleration = part
+    spins, axial = d.spins[k], d.propeller_inertia[k][2]
+    drive = sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
+    wrench = Wrench(scale(thrust, (R[2], R[5], R[8])), (0.0, 0.0, -sign * torque))
+    speed = sign * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench)
+
+
+@leaf
+def machine(drive, t, motion):
+    """`five_bodies.Machine` at an instant, its imposed speeds those of the state."""
+    s, a = acting(drive, t, motion)
+    layout, R, part = s.layout, s.R_world_body, a.rotor
+    rotors = (
+        _rotor(0, layout, R, motion, part[0]),
+        _rotor(1, layout, R, motion, part[1]),
+        _rotor(2, layout, R, motion, part[2]),
+        _rotor(3, layout, R, motion, part[3]),
+    )
+    mass = s.body.mass - total(layout.bodies.drone.propeller_mass)
+    wrench = Wrench(a.force_world, a.torque_body)
+    return Machine(mass, s.body.inertia, a.gravity_world, wrench, rotors, layout.bodies.feedback)
+
+
+@leaf
+def _still(k, d, motion, sign):
+    speed = -sign[k] * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH)
+
+
+@leaf
+def unloaded(drive, motion):
+    """The machine without loads: all that projection looks at."""
+    d, sign = drive.parameters.layout.bodies.drone, drive.parameters.layout.yaw_sign
+    rotors = (
+        _still(0, d, motion, sign),
+        _still(1, d, motion, sign),
+        _still(2, d, motion, sign),
+        _still(3, d, motion, sign),
+    )
+    mass = drive.body.mass - total(d.propeller_mass)
+    return Machine(mass, drive.body.inertia, ZERO, NO_WRENCH, rotors, 0.0)
+
+
+@kernel
+def rate(drive, t, x):
+    """Tangent of the five bodies."""
+    return five_bodies.rate(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+
+
+@kernel
+def held(drive, x):
+    """The bodies brought together again, as the assembly says."""
+    how = drive.parameters.layout.bodies.hold
+    if how == hold.NONE:
+        return x
+    p = unloaded(drive, seen(drive.parameters.layout, x))
+    return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
+
+
+@kernel
+def accelerations(drive, t, x):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    tangent = rate(drive, t, x)
+    return tangent.chassis.velocity_world, tangent.chassis.omega_body
+
+
+FORMS[FiveBodies] = Form(seen, rate, held, accelerations)
+
+
+@leaf
+def _on_propeller(x, reaction):
+    return reaction.reaction_force, rotate_back(x.attitude, reaction.reaction_torque)
+
+
+@leaf
+def _on_chassis(chassis, x, reaction):
+    arm = subtract(x.position_world, chassis.position_world)
+    torque = add(reaction.reaction_torque, cross(arm, reaction.reaction_force))
+    return scale(-1.0, reaction.reaction_force), scale(-1.0, rotate_back(chassis.attitude, torque))
+
+
+@kernel
+def joints(drive, t, x):
+    """(force [N] in the world, torque about the centre of mass [N m] in the body) of the hinges on each body, chassis
+    first; z of a propeller's torque is what its drive gives."""
+    l = five_bodies.solve(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x).leaves  # noqa: E741
+    b, c = x.propellers, x.chassis
+    chassis = total_wrench(
+        (_on_chassis(c, b[0], l[0]), _on_chassis(c, b[1], l[1]), _on_chassis(c, b[2], l[2]), _on_chassis(c, b[3], l[3]))
+    )
+    return (
+        chassis,
+        _on_propeller(b[0], l[0]),
+        _on_propeller(b[1], l[1]),
+        _on_propeller(b[2], l[2]),
+        _on_propeller(b[3], l[3]),
+    )
+
+
+def drone_of(airframe: Airframe, drive: str = "torque") -> Drone:
+    """The five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
+
+    Raises:
+        ValueError: "key: message"; not four rotors, or nothing said of a single one.
+    """
+    rotors = airframe.rotors
+    if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
+        raise ValueError("rotors: the five bodies need four rotors with mass and blade_inertia")
+    spins = 1.0 if drive == "torque" else 0.0
+    mass = airframe.mass.total - 4.0 * rotors.mass
+    blade = (*rotors.blade_inertia, rotors.inertia)
+    return Drone(mass, airframe.mass.inertia, rotors.position, (rotors.mass,) * 4, (blade,) * 4, (spins,) * 4)
+
+
+def parameters(
+    airframe: Airframe, effects: tuple = (), drive: str = "torque", stabilisation: str = "projection"
+) -> MultirotorParameters:
+    """The compiled plant's numbers, as `multirotor.parameters`.
+
+    Args:
+        airframe: with four rotors and what is to be known of one.
+        effects: from `dynamics.effects.from_scene`; the bodies need no `rotor_gyro`, it is left out.
+        drive: "torque" (the motors' torque turns the propellers) or "speed" (their acceleration is imposed).
+        stabilisation: one of STABILISATIONS.
+
+    Raises:
+        ValueError: as `drone_of`.
+    """
+    feedback = FEEDBACK if stabilisation == "baumgarte" else 0.0
+    assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, ())
+    p = multirotor.parameters(airframe, tuple(e for e in effects if not isinstance(e, RotorGyro)))
+    return p._replace(layout=p.layout._replace(bodies=assembly))
+
+
+def initial_state(
+    p: MultirotorParameters,
+    position_world: Vec3 = ZERO,
+    attitude: Quaternion = NO_ROTATION,
+    rotor_speed: float = 0.0,
+) -> MultirotorState:
+    """At rest in the world, all rotors at the same speed [rad/s], blades along x, the effects' memory fresh."""
+    plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
+    d = p.layout.bodies.drone
+    chassis = BodyState(position_world, attitude, ZERO, ZERO)
+    speeds = tuple(-sign * rotor_speed for sign in p.layout.yaw_sign)
+    x = hold.together(five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds)
+    return plain._replace(motion=x)

@@ -1,0 +1,135 @@
+"""Five bodies under the effects of a scene: with symmetric propellers they are the reduced model, else they wobble."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics import effects
+from dynamics.effects._types import body_of
+from dynamics.integrators import get
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import NO_ROTATION, exp, rotation_matrix
+from dynamics.noise import stream_key
+from dynamics.vehicles import multirotor, multirotor_multibody
+from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor import MultirotorDrive
+
+DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+RK4 = get("rk4_renormalised").Method()
+KEY = stream_key(1, "drone1", "effects")
+ACTIVE = effects.from_scene({"gravity": {}, "rotor_thrust": {}, "rotor_gyro": {}, "body_drag": {}}, DRONE)
+VOLTS = (31.0, 33.0, 30.0, 34.0)
+SPEED = 320.0
+
+
+def with_blades(along, across):
+    return DRONE.model_copy(update={"rotors": DRONE.rotors.model_copy(update={"blade_inertia": (along, across)})})
+
+
+SYMMETRIC = with_blades(4.349e-4, 4.349e-4)
+
+
+def reduced():
+    """One rigid body with the mean inertia of all five."""
+    p = multirotor.parameters(SYMMETRIC, ACTIVE)
+    rotors, inertia = DRONE.rotors, np.array(DRONE.mass.inertia)
+    for hub in np.array(rotors.position):
+        inertia += rotors.mass * (hub @ hub - hub * hub) + [4.349e-4, 4.349e-4, rotors.inertia]
+    # the rotor's axial inertia turns with the body too; the spin is `rotor_gyro`'s
+    return p._replace(body=body_of(DRONE.mass.total, tuple(inertia.tolist())))
+
+
+def thrown(state, omega):
+    """Turning at omega, each form in its own way."""
+    if hasattr(state.motion, "omega_body"):
+        return state._replace(motion=state.motion._replace(omega_body=omega))
+    chassis = state.motion.chassis
+    w = np.array(omega)
+    R = np.array(rotation_matrix(chassis.attitude)).reshape(3, 3)
+    propellers = []
+    for body in state.motion.propellers:
+        arm = R.T @ (np.array(body.position_world) - chassis.position_world)
+        velocity = R @ np.cross(w, arm)
+        spin = tuple((w + body.omega_body).tolist())  # blades along x: the frames agree
+        propellers.append(body._replace(velocity_world=tuple(velocity.tolist()), omega_body=spin))
+    return state._replace(
+        motion=state.motion._replace(chassis=chassis._replace(omega_body=omega), propellers=tuple(propellers))
+    )
+
+
+@kernel
+def looked(p, x):
+    return multirotor.seen(p.layout, x)
+
+
+def fly(p, state, seconds, h):
+    return multirotor.advance(RK4, p, KEY, 0, state, VOLTS, h, round(seconds / h))
+
+
+OMEGA = (0.6, -0.4, 0.3)
+ATTITUDE = exp((0.1, -0.2, 0.3))
+
+
+@pytest.fixture(scope="module")
+def reference():
+    p = reduced()
+    return fly(p, thrown(multirotor.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED), OMEGA), 0.2, 2.5e-4).motion
+
+
+@pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
+def test_symmetric_propellers_at_imposed_speed_are_the_reduced_model(reference, stabilisation):
+    p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)
+    start = thrown(multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED), OMEGA)
+    ours = looked(p, fly(p, start, 0.2, 2.5e-4).motion)
+    for name in reference._fields:
+        np.testing.assert_allclose(getattr(ours, name), getattr(reference, name), rtol=1e-7, atol=2e-8, err_msg=name)
+
+
+def hovering(blades, drive, omega=(0.0, 0.0, 0.0)):
+    """(parameters, state turning at omega, voltages that keep the rotors at SPEED)."""
+    p = multirotor_multibody.parameters(blades, ACTIVE, drive)
+    state = thrown(multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), NO_ROTATION, SPEED), omega)
+    return p, state, (SPEED * DRONE.motor.rotor_constant,) * 4
+
+
+def test_uneven_propellers_wobble_at_twice_their_speed():
+    """Turning about x only, the momentum about x is kept: w (I + 4 half cos 2 phi) = constant (eq. (8.50))."""
+    p, state, volts = hovering(DRONE, "speed", (0.5, 0.0, 0.0))
+    along, across = DRONE.rotors.blade_inertia
+    hubs = np.array(DRONE.rotors.position)
+    mean = DRONE.mass.inertia[0] + 2.0 * (along + across) + DRONE.rotors.mass * (hubs[:, 1] ** 2).sum()
+    swing = 2.0 * (along - across)
+    h, n = 2.5e-4, 4
+    for i in range(1, 40):
+        state = multirotor.advance(RK4, p, KEY, i - 1, state, volts, h, n)
+        expected = 0.5 * (mean + swing) / (mean + swing * math.cos(2.0 * SPEED * i * n * h))
+        assert looked(p, state.motion).omega_body == pytest.approx((expected, 0.0, 0.0), abs=1e-6)
+    assert abs(2.0 * swing / mean) > 5e-3  # what the reduced model does not have, relative to its rate
+
+
+@kernel
+def hinges(p, state, volts):
+    return multirotor_multibody.joints(MultirotorDrive(p, p.body, state.memory, volts), 0.0, state.motion)
+
+
+@pytest.mark.parametrize("drive", ["torque", "speed"])
+def test_hinges_carry_thrust_and_drives_hold_the_drag(drive):
+    p, state, volts = hovering(DRONE, drive)
+    seen = multirotor.observe(p, 0, 0.004, state, volts)
+    up = sum(seen.thrust) / DRONE.mass.total - 9.80665
+    assert seen.acceleration_world == pytest.approx((0.0, 0.0, up), abs=1e-11)
+    chassis, *propellers = hinges(p, state, volts)
+    for k, (force, torque) in enumerate(propellers):
+        carried = DRONE.rotors.mass * (9.80665 + up) - seen.thrust[k]
+        assert force == pytest.approx((0.0, 0.0, carried), abs=1e-11)
+        assert torque == pytest.approx((0.0, 0.0, -DRONE.rotors.yaw_sign[k] * seen.torque[k]), abs=1e-11)
+    assert chassis[0][2] == pytest.approx(-sum(force[2] for force, _ in propellers))
+    assert chassis[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-10)
+
+
+def test_a_single_rotor_must_be_described():
+    bare = DRONE.model_copy(update={"rotors": DRONE.rotors.model_copy(update={"mass": None})})
+    with pytest.raises(ValueError, match="rotors: the five bodies need four rotors with mass and blade_inertia"):
+        multirotor_multibody.parameters(bare)

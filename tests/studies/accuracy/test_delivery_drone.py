@@ -1,0 +1,39 @@
+"""One and five bodies against the kept momentum: five converge on it, the reduced model stays what it leaves out."""
+
+import pytest
+
+from studies.accuracy.coordinates import error
+from studies.accuracy.systems.delivery_drone import problems
+
+STEP = 2.0 / 2048
+
+
+@pytest.fixture(scope="module")
+def found():
+    problem = problems()["delivery_drone"]
+    exact = problem.reference()
+    outcomes = {way.name: [way.read(h, way.prepare(h)()) for h in (2 * STEP, STEP)] for way in problem.ways}
+    return {name: [(error(o.samples[-1], exact), o.defect) for o in two] for name, two in outcomes.items()}
+
+
+def test_five_bodies_converge_in_every_description(found):
+    for name, ((coarse, _), (fine, _)) in found.items():
+        if not name.startswith("reduced"):
+            assert fine < 2e-5, name
+            assert coarse > 6.0 * fine, name
+
+
+def test_both_coordinates_tell_the_same(found):
+    for held in ("partitioning", "projection"):
+        for coordinates in ("SE(3)", "Euler"):
+            assert found[f"{coordinates}, {held}"][1][1] < 1e-10
+
+
+def test_without_stabilisation_hinges_come_apart(found):
+    assert found["SE(3), none"][1][1] > 1e2 * found["SE(3), projection"][1][1]
+
+
+def test_the_reduced_model_stays_wrong_by_what_it_leaves_out(found):
+    frame, mean = found["reduced, frame only"], found["reduced, mean"]
+    assert mean[1][0] == pytest.approx(mean[0][0], rel=0.05)
+    assert 1e-4 < mean[1][0] < 0.2 * frame[1][0]
