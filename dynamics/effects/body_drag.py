@@ -2,15 +2,15 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import wrench_body
 from dynamics.effects._scene import cannot, checked
 from dynamics.vector import ZERO, Vec3, apply_transposed, multiply, norm, scale, subtract
 from dynamics.vehicles.airframe import Airframe
 
-NotNegative = Annotated[float, Ge(0)]
-Triple = tuple[NotNegative, NotNegative, NotNegative]
+Coefficient = Annotated[float, Ge(0), Le(100)]
+Triple = tuple[Coefficient, Coefficient, Coefficient]
 
 
 class Settings(NamedTuple):
