@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import sample, wrench
 from dynamics.noise import normal3
-from dynamics.vector import ZERO, add, norm, scale, subtract
+from dynamics.vector import NOTHING, ZERO, add, norm, scale, subtract
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
@@ -44,4 +44,4 @@ def draw(e, memory, s, rotors, key, tick, interval):
 @wrench(WindRandom)
 def wind_random(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
-    return memory, ZERO
+    return memory, NOTHING
