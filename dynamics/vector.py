@@ -11,6 +11,7 @@ Vec3 = tuple[float, float, float]
 Mat3 = tuple[float, float, float, float, float, float, float, float, float]
 
 ZERO: Vec3 = (0.0, 0.0, 0.0)
+NOTHING: Vec3 = (-0.0, -0.0, -0.0)  # adding it changes no number, not even the sign of 0.0: the compiler drops it
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 

@@ -2,15 +2,15 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import wrench_body
 from dynamics.effects._scene import cannot, checked
-from dynamics.vector import ZERO, Vec3, apply_transposed, multiply, norm, scale, subtract
+from dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 from dynamics.vehicles.airframe import Airframe
 
-NotNegative = Annotated[float, Ge(0)]
-Triple = tuple[NotNegative, NotNegative, NotNegative]
+Coefficient = Annotated[float, Ge(0), Le(100)]
+Triple = tuple[Coefficient, Coefficient, Coefficient]
 
 
 class Settings(NamedTuple):
@@ -51,4 +51,4 @@ def body_drag(e, memory, s, rotors):
         e.linear[1] + pressure * e.half_area[1],
         e.linear[2] + pressure * e.half_area[2],
     )
-    return scale(-1.0, multiply(coefficient, v_body)), ZERO
+    return scale(-1.0, multiply(coefficient, v_body)), NOTHING

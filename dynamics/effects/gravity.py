@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import field, wrench
-from dynamics.vector import ZERO
+from dynamics.vector import NOTHING
 
 KIND = "gravity"
 
@@ -29,4 +29,4 @@ def gravity_field(e, memory):
 @wrench(Gravity)
 def gravity(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
-    return (-0.0, -0.0, -e.acceleration * s.body.mass), ZERO
+    return (-0.0, -0.0, -e.acceleration * s.body.mass), NOTHING

@@ -6,7 +6,7 @@ from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import field, sample, wrench
 from dynamics.kernel import leaf
-from dynamics.vector import ZERO
+from dynamics.vector import NOTHING
 
 KIND = "gravity"
 EARTH_RADIUS = 6_356_766.0  # [m] the U.S. Standard Atmosphere's
@@ -48,4 +48,4 @@ def gravity_altitude_field(e, memory):
 @wrench(GravityAltitude)
 def gravity_altitude(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
-    return (-0.0, -0.0, -memory[0] * s.body.mass), ZERO
+    return (-0.0, -0.0, -memory[0] * s.body.mass), NOTHING

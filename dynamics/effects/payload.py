@@ -2,12 +2,14 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import body, sample
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import MassProperties, body_of
 from dynamics.vehicles.airframe import Airframe
+
+Length = Annotated[float, Gt(0), Le(10)]
 
 
 class Settings(NamedTuple):
@@ -15,7 +17,7 @@ class Settings(NamedTuple):
 
     release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
     mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
-    size: tuple[Annotated[float, Gt(0)], Annotated[float, Gt(0)], Annotated[float, Gt(0)]] = (0.20, 0.13, 0.23)  # [m]
+    size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m]
 
 
 class Payload(NamedTuple):

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import wrench_body
 from dynamics.effects._rotors import each, total
@@ -16,7 +16,7 @@ from dynamics.vehicles.propeller import drag_coefficients
 class Settings(NamedTuple):
     """What a scene says."""
 
-    coefficient: Annotated[float, Ge(0)] | None = None  # [m^3/rad]; from the propeller if left out
+    coefficient: Annotated[float, Ge(0), Le(1)] | None = None  # [m^3/rad]; from the propeller if left out
 
 
 class RotorDrag(NamedTuple):

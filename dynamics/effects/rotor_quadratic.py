@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Gt
+from annotated_types import Gt, Le
 
 from dynamics.effects._hooks import loads
 from dynamics.effects._rotors import each
@@ -19,8 +19,8 @@ class RotorQuadratic(NamedTuple):
     the altitude at which the constants were measured.
     """
 
-    thrust_constant: Annotated[float, Gt(0)]  # [N s^2/rad^2]
-    torque_constant: Annotated[float, Gt(0)]  # [N m s^2/rad^2]
+    thrust_constant: Annotated[float, Gt(0), Le(1)]  # [N s^2/rad^2]
+    torque_constant: Annotated[float, Gt(0), Le(1)]  # [N m s^2/rad^2]
 
 
 @leaf

@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import sample, wrench
 from dynamics.noise import normal3
-from dynamics.vector import ZERO, add, norm, scale, subtract
+from dynamics.vector import NOTHING, ZERO, add, norm, scale, subtract
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
@@ -24,9 +24,9 @@ class WindRandom(NamedTuple):
 
     mean: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)  # [m/s] world
     sigma: Annotated[float, Ge(0), Le(30)] = 1.0  # [m/s] of each axis
-    area: Annotated[float, Gt(0)] = 0.06  # [m^2]
-    density: Annotated[float, Gt(0)] = 1.22  # [kg/m^3]
-    shape_coefficient: Annotated[float, Gt(0)] = 1.0
+    area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2]
+    density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3]
+    shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0
 
     def initial_memory(self):
         """No force before the first exchange."""
@@ -44,4 +44,4 @@ def draw(e, memory, s, rotors, key, tick, interval):
 @wrench(WindRandom)
 def wind_random(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
-    return memory, ZERO
+    return memory, NOTHING

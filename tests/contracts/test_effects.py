@@ -3,6 +3,7 @@
 import math
 import re
 from pathlib import Path
+from typing import get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -61,6 +62,40 @@ def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
 def test_names_the_key_that_is_missing(name):
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: field required"):
         effects.from_scene({name: {}}, DRONE)
+
+
+def numbers(name):
+    """(key, how many numbers it holds) of an effect's table."""
+    settings = getattr(effects.get(name), "Settings", effects.parameter_class(name))
+    for key, hint in get_type_hints(settings).items():
+        kinds = [hint, *get_args(hint)]
+        triple = next((len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple), 0)
+        if triple or float in kinds:
+            yield key, triple
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "count"), [(name, *entry) for name in effects.names() for entry in numbers(name)]
+)
+@pytest.mark.parametrize("value", [-1e12, 1e12])
+def test_names_the_key_that_is_out_of_range(name, key, count, value):
+    if value > 0.0 and key in ("release_time", "start", "duration", "time"):
+        pytest.skip("a time may be as late as one likes")
+    table = {**NEEDED.get(name, {}), key: [value] * count if count else value}
+    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{key}\b.*(expected|must)"):
+        effects.from_scene({name: table}, DRONE)
+
+
+def test_says_the_whole_range_whatever_is_wrong_with_a_number():
+    for charge, wrong in (
+        (1.5, "expected less than or equal to 1, got 1.5"),
+        (-1.0, "expected greater than 0, got -1.0"),
+    ):
+        with pytest.raises(ValueError) as error:
+            effects.from_scene({"battery": {"charge": charge}}, DRONE)
+        assert str(error.value) == f"effects.battery.charge: {wrong} (range: above 0, at most 1)"
+    with pytest.raises(ValueError, match=r"start: field required .*\(range: at least 0\)"):
+        effects.from_scene({"wind_gust": {"peak": [1.0, 0.0, 0.0]}}, DRONE)
 
 
 def test_unknown_effect_lists_the_choices():

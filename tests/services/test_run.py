@@ -143,6 +143,20 @@ def test_another_seed_gives_other_bits(tmp_path):
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
 
 
+IDLE = [
+    "effects.payload={}",  # kept
+    "effects.rotor_damage={rotor=1,time=100.0}",  # after the end
+    "effects.wind_gust={peak=[9.0,0.0,0.0],start=100.0,duration=1.0}",
+]
+
+
+def test_effects_that_have_nothing_to_do_leave_every_recorded_bit(tmp_path):
+    """The same log as if they had never been named, the random wind of another effect included."""
+    windy = single(tmp_path, "effects.wind_random={}")
+    assert single(tmp_path, "effects.wind_random={}", *IDLE) == windy
+    assert single(tmp_path) != windy
+
+
 def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
     parallel = single(tmp_path, "exchange.coupling=parallel")
     assert processes(tmp_path, "test-parallel", "exchange.coupling=parallel")["digest"] == parallel
