@@ -2,6 +2,8 @@
 
 from numba.extending import overload
 
+from dynamics.vector import add
+
 INLINE = {"forceinline": True}
 
 
@@ -32,3 +34,17 @@ def _total(a):
     names: dict = {}
     exec(f"def total(a):\n    return {pairs([f'a[{i}]' for i in range(len(a))])}\n", names)
     return names["total"]
+
+
+def total_wrench(a):
+    """Sum of a tuple of (force, torque)."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(total_wrench, jit_options=INLINE)
+def _total_wrench(a):
+    lines = ["def total_wrench(a):", "    force, torque = a[0]"]
+    lines += [f"    force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
+    names: dict = {"add": add}
+    exec("\n".join([*lines, "    return force, torque"]), names)
+    return names["total_wrench"]
