@@ -35,7 +35,7 @@ class RotorLayout(NamedTuple):
     lag_rate: float  # [1/s]
     max_voltage: float  # [V]
     idle_current: float  # [A]
-    bodies: tuple = ()  # what a form with several bodies needs to know of them
+    bodies: Any = ()  # what a form with several bodies needs to know of them
 
 
 class MultirotorParameters(NamedTuple):
