@@ -34,6 +34,8 @@ def test_without_stabilisation_hinges_come_apart(found):
 
 
 def test_the_reduced_model_stays_wrong_by_what_it_leaves_out(found):
-    frame, mean = found["reduced, frame only"], found["reduced, mean"]
-    assert mean[1][0] == pytest.approx(mean[0][0], rel=0.05)
-    assert 1e-4 < mean[1][0] < 0.2 * frame[1][0]
+    """By about the 0.6 % that the blades, all along x at the start, add to the mean (theory.md, eq. (8.51))."""
+    for name in ("reduced, frame only", "reduced, mean"):
+        (coarse, _), (fine, _) = found[name]
+        assert fine == pytest.approx(coarse, rel=1e-3)
+        assert 1e-3 < fine < 2e-2
