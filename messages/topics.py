@@ -5,14 +5,18 @@ from typing import Any
 
 from messages.types import (
     Actuators,
+    Answers,
     BatteryState,
+    BodyStates,
     Clock,
     Estimate,
     FluidPressure,
     Imu,
+    LiftCommand,
     MagneticField,
     NavSatFix,
     Odometry,
+    OperatorInput,
     PoseStamped,
     Range,
     Setpoint,
@@ -48,6 +52,7 @@ TF = Topic("tf", TFMessage, rate="rates.pose")
 WALL_TIME = Topic("wall_time", WallTime, rate="rates.status", deterministic=False)
 
 TRUTH = Topic("{vehicle}/truth", VehicleState)
+BODIES = Topic("{vehicle}/bodies", BodyStates, rate="rates.bodies")
 POSE = Topic("{vehicle}/pose", PoseStamped, rate="rates.pose")
 ODOM = Topic("{vehicle}/odom", Odometry, rate="rates.pose")
 IMU = Topic("{vehicle}/imu", Imu, rate="sensors.imu.rate")
@@ -59,7 +64,10 @@ SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
+LIFT = Topic("{vehicle}/lift", LiftCommand)
 ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
+OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
+ANSWERS = Topic("{vehicle}/answers", Answers, rate="rates.operator")
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

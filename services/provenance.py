@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from services.scene import Scene, sections
-from services.sections import Exchange, Run
+from services.sections import Exchange, Run, Vehicle
 
 
 def metadata(scene: Scene, mode: str) -> dict[str, str]:
@@ -16,6 +16,7 @@ def metadata(scene: Scene, mode: str) -> dict[str, str]:
         "scene": scene.name,
         "seed": str(scene[Run].seed),
         "mode": mode,
+        "model": scene[Vehicle].model,
         "version": package_version(),
         "commit": _commit(),
         "exchange_rate": str(scene[Exchange].rate),

@@ -19,9 +19,19 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 import services
 
+OVERRIDE_MARK = "# --set "  # begins the lines at the end of a recorded scene
+
 
 class SceneError(ValueError):
     """A scene that cannot be flown; the text is one line for the user."""
+
+
+class WrongKeyError(ValueError):
+    """What a check finds wrong with a key of another table than its own."""
+
+    def __init__(self, dotted: str, message: str):
+        super().__init__(f"{dotted}: {message}")
+        self.dotted, self.message = dotted, message
 
 
 class Section(BaseModel):
@@ -32,6 +42,7 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     TABLE: ClassVar[str]
+    OPTIONAL: ClassVar[bool] = False  # whether a scene may do without it; `scene.has` says if it does
 
     def lookup(self, keys: list[str]) -> Any:
         """The value of a key of this table, or of a table within it."""
@@ -62,6 +73,10 @@ class Scene:
     def __getitem__(self, section: type[S]) -> S:
         return self._tables[section]  # type: ignore[return-value]
 
+    def has(self, section: type[Section]) -> bool:
+        """Whether there is this table: always, unless it is optional."""
+        return section in self._tables
+
     @property
     def name(self) -> str:
         """The file's name without its ending."""
@@ -78,14 +93,21 @@ class Scene:
 
 
 @cache
+def model_names() -> list[str]:
+    """The plant models that `vehicle.model` may name: the modules of the folder services/plant/models."""
+    folder = Path(__file__).parent / "plant" / "models"
+    return sorted(m.name for m in pkgutil.iter_modules([str(folder)]) if not m.name.startswith("_"))
+
+
+@cache
 def sections() -> dict[str, type[Section]]:
-    """Every table that a scene may have, found in `sections` and in the `config` modules of the services' folders."""
-    modules = ["services.sections"]
-    modules += [f"services.{p.name}.config" for p in pkgutil.iter_modules(services.__path__) if p.ispkg]
+    """Every table that a scene may have, found in `sections`, in the services' `config` and in the plant's `models`."""
+    packages = [f"services.{p.name}" for p in pkgutil.iter_modules(services.__path__) if p.ispkg]
+    wanted = ["services.sections", *[f"{package}.config" for package in packages]]
+    modules = [name for name in wanted if importlib.util.find_spec(name)]
+    modules += [f"services.plant.models.{name}" for name in model_names()]
     found: dict[str, type[Section]] = {}
     for name in modules:
-        if importlib.util.find_spec(name) is None:
-            continue
         for value in vars(importlib.import_module(name)).values():
             if isinstance(value, type) and issubclass(value, Section) and hasattr(value, "TABLE"):
                 found[value.TABLE] = value
@@ -112,6 +134,19 @@ def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
     for override in overrides:
         _override(data, override)
     return _validate(path, text, overrides, data)
+
+
+def recorded_data(text: str) -> dict[str, Any]:
+    """The tables of a scene as a log carries it, with the overrides of its run applied.
+
+    Raises:
+        ValueError: not valid TOML.
+    """
+    data = tomllib.loads(text)
+    for line in text.splitlines():
+        if line.startswith(OVERRIDE_MARK):
+            _override(data, line.removeprefix(OVERRIDE_MARK))
+    return data
 
 
 def _read(path: Path) -> str:
@@ -176,6 +211,8 @@ def _validate(path: Path, text: str, overrides: list[str], data: dict[str, Any])
             raise fail(name, _unknown("table", name, known))
     tables: dict[type[Section], Section] = {}
     for name, section in known.items():
+        if section.OPTIONAL and name not in data:
+            continue
         raw = data.get(name, {})
         if not isinstance(raw, dict):
             raise fail(name, f"expected a table [{name}], got {raw!r}")
@@ -185,11 +222,13 @@ def _validate(path: Path, text: str, overrides: list[str], data: dict[str, Any])
             # A misspelt key also leaves another one missing: name the misspelling.
             first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
             raise fail(*_explain(name, section, first)) from None
-    merged = text if not overrides else text + "".join(f"\n# --set {o}" for o in overrides) + "\n"
+    merged = text if not overrides else text + "".join(f"\n{OVERRIDE_MARK}{o}" for o in overrides) + "\n"
     scene = Scene(path, merged, tables)
-    for section in known.values():
+    for section in tables:
         try:
             scene[section].check(scene)
+        except WrongKeyError as error:
+            raise fail(error.dotted, error.message) from None
         except SceneError:
             raise
         except ValueError as error:

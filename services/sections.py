@@ -1,15 +1,17 @@
 """The tables of a scene that more than one service reads."""
 
+import importlib
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
 from dynamics import effects
 from dynamics.vehicles.airframe import Airframe, load_airframe
 from messages.topics import Topic
-from services.scene import Scene, SceneError, Section
+from services.scene import Scene, SceneError, Section, WrongKeyError, model_names, sections
 
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
 AIRFRAMES = "vehicles"  # the folder beside the scenes
 
 
@@ -55,18 +57,20 @@ class Exchange(Section):
 
 
 class Rates(Section):
-    """How often derived messages are published [Hz]; each divides exchange.rate."""
+    """How often derived messages are published [Hz], at the most once a tick; each divides exchange.rate."""
 
     TABLE: ClassVar[str] = "rates"
     pose: int = Field(default=50, gt=0)  # pose, odometry, transform and clock
     estimate: int = Field(default=50, gt=0)
     status: int = Field(default=10, gt=0)
     battery: int = Field(default=10, gt=0)
+    bodies: int = Field(default=50, gt=0)  # the single bodies of a vehicle that has several
+    operator: int = Field(default=50, gt=0)  # what comes from outside, and the answers
 
     def check(self, scene: Scene) -> None:
         """Every rate divides the exchange rate."""
         for key in type(self).model_fields:
-            ticks(scene, getattr(self, key), key)
+            ticks(scene, min(getattr(self, key), scene[Exchange].rate), key)
 
 
 class Vehicle(Section):
@@ -75,11 +79,28 @@ class Vehicle(Section):
     TABLE: ClassVar[str] = "vehicle"
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
     airframe: str = "delivery_drone"  # a file of the folder vehicles/ beside the scene, or the path of a .toml file
-    model: Literal["reduced"] = "reduced"
+    model: str = "reduced"  # a module of services/plant/models
 
     def check(self, scene: Scene) -> None:
-        """The airframe's file is there and sound."""
-        airframe(scene)
+        """There is such a model, and the scene has what it needs and nothing that it cannot have."""
+        if self.model not in model_names():
+            raise ValueError(f"model: expected one of {', '.join(model_names())}, got {self.model!r}")
+        importlib.import_module(f"services.plant.models.{self.model}").check(scene)
+
+
+class CooperativeLoad(Section):
+    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); a tuple has an entry for each."""
+
+    TABLE: ClassVar[str] = "cooperative_load"
+    OPTIONAL: ClassVar[bool] = True
+    quad_mass: tuple[float, ...] = Field(min_length=2, strict=False)  # [kg]
+    quad_inertia: tuple[Triple, ...] = Field(min_length=2, strict=False)  # [kg m^2] principal moments
+    link_length: tuple[float, ...] = Field(min_length=2, strict=False)  # [m]
+    link_start: tuple[Triple, ...] = Field(min_length=2, strict=False)  # unit vectors from quadrotor to load
+    load_mass: float  # [kg]
+    load_start: Triple  # [m] world frame
+    load_velocity_start: Triple = (0.0, 0.0, 0.0)  # [m/s] world frame
+    gravity: float = 9.81  # [m/s^2]
 
 
 class Effects(Section):
@@ -116,6 +137,21 @@ class Published(Section):
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
 
 
+def needs(scene: Scene, *tables: str) -> None:
+    """WrongKeyError if a scene lacks one of these optional tables."""
+    for name in tables:
+        if not scene.has(sections()[name]):
+            raise WrongKeyError(name, f"missing; the model {scene[Vehicle].model} needs a table [{name}]")
+
+
+def can_have(scene: Scene, *tables: str) -> None:
+    """WrongKeyError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
+    for name in {"effects", "sensors", "autopilot", "trajectory"}.difference(tables):
+        section = sections()[name]
+        if scene.has(section) and (section.OPTIONAL or scene.tables(name)):
+            raise WrongKeyError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
+
+
 def ticks(scene: Scene, rate: float, key: str) -> int:
     """Ticks between messages of `rate` [Hz].
 
@@ -133,7 +169,9 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
 
 def period(scene: Scene, topic: Topic) -> int:
     """Ticks between two messages of a topic: its rate is the scene key that the topic table names."""
-    return 1 if topic.rate is None else ticks(scene, scene.lookup(topic.rate), topic.rate)
+    if topic.rate is None:
+        return 1
+    return ticks(scene, min(scene.lookup(topic.rate), scene[Exchange].rate), topic.rate)
 
 
 def airframe(scene: Scene) -> Airframe:
@@ -158,7 +196,8 @@ def airframe(scene: Scene) -> Airframe:
 
 def active(scene: Scene) -> tuple:
     """Parameters of the scene's effects, sorted by name."""
-    return effects.from_scene(scene[Effects].tables, airframe(scene))
+    tables = scene[Effects].tables
+    return effects.from_scene(tables, airframe(scene)) if tables else ()
 
 
 def gravity(scene: Scene) -> float:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from messages import message_class, stamp_ns
 from services.log import LogReader
+from services.scene import recorded_data
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 
@@ -54,6 +55,18 @@ class Flown:
     def digest(self) -> str:
         """Digest over the deterministic messages, as the log states it."""
         return self.metadata.get("digest", "")
+
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """The tables of the scene that the log carries; empty if it carries none.
+
+        Raises:
+            ValueError: they are not valid TOML.
+        """
+        try:
+            return recorded_data(self.attachments.get("scene.toml", b"").decode("utf-8"))
+        except ValueError as fault:
+            raise ValueError(f"{self.path}: its attachment scene.toml is not valid TOML: {fault}") from None
 
     @cached_property
     def attitude(self) -> np.ndarray:

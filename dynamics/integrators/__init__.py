@@ -11,9 +11,9 @@ import pkgutil
 from types import ModuleType
 
 from dynamics.integrators._march import RATES, march, rate, step
-from dynamics.integrators._solve import simulate, solve
+from dynamics.integrators._solve import check_start, not_finite, simulate, solve
 
-__all__ = ["RATES", "get", "march", "names", "rate", "simulate", "solve", "step"]
+__all__ = ["RATES", "check_start", "get", "march", "names", "not_finite", "rate", "simulate", "solve", "step"]
 
 
 def names() -> list[str]:

@@ -39,7 +39,8 @@ def _system(p: Any) -> str:
     return type(p).__name__.removesuffix("Parameters")
 
 
-def _first_not_finite(x: Any) -> str:
+def not_finite(x: Any) -> str:
+    """Name and value of the first number of a state that is NaN or infinite."""
     return next((f"{name} = {value}" for name, value in named_numbers(x) if not np.isfinite(value)), "its rate")
 
 
@@ -75,7 +76,7 @@ def simulate(method: Any, p: Any, x0: Any, h: float, steps: int, every: int = 1)
     rows = record(method.Method(), p, 0.0, x0, h, every, out)
     times = h * every * np.arange(len(out))
     if rows < len(out):
-        bad = _first_not_finite(unflatten(x0, tuple(map(float, out[rows]))))
+        bad = not_finite(unflatten(x0, tuple(map(float, out[rows]))))
         raise ValueError(
             f"{_system(p)}: not finite by t = {times[rows]:g} s with step {h:g}: {bad}; take a smaller step"
         )
@@ -100,5 +101,5 @@ def solve(p: Any, x0: Any, times: np.ndarray, tolerance: float) -> tuple[np.ndar
         where = ", ".join(f"{name} = {value:.6g}" for name, value in named_numbers(x))
         raise ValueError(f"{_system(p)}: tolerance {tolerance:g} cannot be met at t = {t:.9g} s, state {where}")
     if status == _adaptive.NOT_FINITE:
-        raise ValueError(f"{_system(p)}: not finite at t = {t:.9g} s: {_first_not_finite(x)}")
+        raise ValueError(f"{_system(p)}: not finite at t = {t:.9g} s: {not_finite(x)}")
     return out, {"steps": steps, "rejected": rejected}

@@ -13,6 +13,7 @@ class Autopilot(Section):
     """How the vehicle is flown."""
 
     TABLE: ClassVar[str] = "autopilot"
+    OPTIONAL: ClassVar[bool] = True
     gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
     estimator: Literal["sensors", "truth"] = "sensors"
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one

@@ -18,9 +18,9 @@ from services.scene import Scene
 from services.sections import Exchange, Rates, airframe, gravity, start_height, ticks
 
 
-def create(scene: Scene) -> "Autopilot":
-    """The autopilot of the scene."""
-    return Autopilot(scene)
+def create(scene: Scene) -> "Autopilot | None":
+    """The autopilot of the scene's `[autopilot]`; None where there is none."""
+    return Autopilot(scene) if scene.has(Config) else None
 
 
 @kernel

@@ -34,3 +34,10 @@ class Solver(Section):
             raise ValueError(
                 f"step: expected a step that divides the exchange interval of {interval:g} s, got {self.step:g} s"
             )
+
+
+def method(scene: Scene) -> tuple[tuple, int, float]:
+    """The scene's integrator for compiled code, its steps in an exchange interval, and the length of one [s]."""
+    solver, exchange = scene[Solver], scene[Exchange]
+    steps = solver.steps(exchange)
+    return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

@@ -1,13 +1,16 @@
 """The plant's state as messages."""
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dynamics.effects._types import Motion
 from dynamics.lie.quaternion import rotate_back
+from dynamics.vector import Vec3
 from dynamics.vehicles.multirotor import MultirotorObservation
 from messages import (
     BatteryState,
+    BodyStates,
     Clock,
     Odometry,
     Point,
@@ -25,11 +28,13 @@ from messages import (
     header,
     stamp,
 )
+from messages.topics import CLOCK, POSE, TF, Topic
 
 WORLD = "world"
 
 
-def _pose(motion: Motion) -> Any:
+def pose_of(motion: Motion) -> Any:
+    """Place and attitude of a body in the world."""
     q = motion.attitude
     return Pose(Point(*motion.position_world), Quaternion(q.x, q.y, q.z, q.w))
 
@@ -38,7 +43,7 @@ def truth(time_ns: int, vehicle: str, motion: Motion, seen: MultirotorObservatio
     """The whole true state."""
     return VehicleState(
         header(time_ns, WORLD),
-        _pose(motion),
+        pose_of(motion),
         Vector3(*motion.velocity_world),
         Vector3(*motion.omega_body),
         Vector3(*seen.acceleration_world),
@@ -56,7 +61,7 @@ def truth(time_ns: int, vehicle: str, motion: Motion, seen: MultirotorObservatio
 
 def pose(time_ns: int, motion: Motion) -> Any:
     """Pose of the body in the world."""
-    return PoseStamped(header(time_ns, WORLD), _pose(motion))
+    return PoseStamped(header(time_ns, WORLD), pose_of(motion))
 
 
 def odometry(time_ns: int, vehicle: str, motion: Motion) -> Any:
@@ -65,7 +70,7 @@ def odometry(time_ns: int, vehicle: str, motion: Motion) -> Any:
     twist = Twist(Vector3(*velocity_body), Vector3(*motion.omega_body))
     exact = (0.0,) * 36
     return Odometry(
-        header(time_ns, WORLD), vehicle, PoseWithCovariance(_pose(motion), exact), TwistWithCovariance(twist, exact)
+        header(time_ns, WORLD), vehicle, PoseWithCovariance(pose_of(motion), exact), TwistWithCovariance(twist, exact)
     )
 
 
@@ -79,6 +84,27 @@ def transform(time_ns: int, vehicle: str, motion: Motion) -> Any:
 def clock(time_ns: int) -> Any:
     """Simulation time."""
     return Clock(stamp(time_ns))
+
+
+def bodies(time_ns: int, names: Sequence[str], motions: Sequence[Motion], forces: Sequence[Vec3] = ()) -> Any:
+    """Every body of a vehicle, with the force [N] of contacts or joints on each in the world; none given: zero."""
+    nothing = (0.0, 0.0, 0.0)
+    return BodyStates(
+        header(time_ns, WORLD),
+        tuple(names),
+        tuple(pose_of(m) for m in motions),
+        tuple(Vector3(*m.velocity_world) for m in motions),
+        tuple(Vector3(*m.omega_body) for m in motions),
+        tuple(Vector3(*f) for f in forces or [nothing] * len(names)),
+        tuple(Vector3(*nothing) for _ in names),
+    )
+
+
+def whereabouts(time_ns: int, vehicle: str, motion: Motion) -> Iterator[tuple[Topic, Any]]:
+    """What every vehicle says of itself at the rate of poses, odometry aside."""
+    yield POSE, pose(time_ns, motion)
+    yield TF, transform(time_ns, vehicle, motion)
+    yield CLOCK, clock(time_ns)
 
 
 def battery(time_ns: int, vehicle: str, voltage: float, current: float, cells: int) -> Any:

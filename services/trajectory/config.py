@@ -49,6 +49,7 @@ class Trajectory(Section):
     """What the vehicle is asked to fly."""
 
     TABLE: ClassVar[str] = "trajectory"
+    OPTIONAL: ClassVar[bool] = True
 
     phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]
 

@@ -15,9 +15,9 @@ from services.trajectory.piece import evaluate
 LEAD = 0.1  # [s] the setpoints are ahead of the clock at the most
 
 
-def create(scene: Scene) -> "Trajectory":
-    """The signal builder of the scene's `[trajectory]`."""
-    return Trajectory(scene)
+def create(scene: Scene) -> "Trajectory | None":
+    """The signal builder of the scene's `[trajectory]`; None where there is none."""
+    return Trajectory(scene) if scene.has(Spec) else None
 
 
 class Trajectory:

@@ -2,7 +2,6 @@
 
 import base64
 import io
-import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,7 +42,7 @@ def write(log: Path) -> Path:
     """
     log = Path(log)
     flown = Flown(log)
-    scene = _scene(flown)
+    scene = flown.scene
     published = scene.get("published", {})
     page = Template(
         _TEMPLATE.read_text(encoding="utf-8"), autoescape=True, trim_blocks=True, lstrip_blocks=True
@@ -90,8 +89,9 @@ def accuracy(flown: Flown, published: dict[str, float]) -> list[Accuracy]:
 
 
 def sections(flown: Flown) -> list[Section]:
-    """Every plot that the log has the topics for, and a line for each of the others."""
-    return [_section(module, flown) for module in plots.modules()]
+    """Every plot of the vehicle's model that the log has the topics for, and a line for each of the others."""
+    model = flown.metadata.get("model", "reduced")
+    return [_section(module, flown) for module in plots.modules() if model in getattr(module, "MODELS", (model,))]
 
 
 def _section(module, flown: Flown) -> Section:
@@ -113,12 +113,3 @@ def _png(figure: Figure) -> str:
     # Compression level 3 is faster than the usual 6; the file is a tenth larger.
     figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return base64.b64encode(file.getvalue()).decode("ascii")
-
-
-def _scene(flown: Flown) -> dict:
-    """The scene that the log carries; empty if it carries none."""
-    text = flown.attachments.get("scene.toml", b"")
-    try:
-        return tomllib.loads(text.decode("utf-8"))
-    except ValueError as fault:
-        raise ValueError(f"{flown.path}: its attachment scene.toml is not valid TOML: {fault}") from None

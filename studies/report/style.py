@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from studies.flown import Flown
 
+STEERED = ("reduced", "multibody")  # the models of vehicles that an autopilot flies
+
 WIDTH = 10.0  # [inch] of every figure; the page shows 100 pixels an inch
 DPI = 125
 LEFT, RIGHT, TOP, BOTTOM = 0.9, 0.1, 0.28, 0.5  # [inch] beside the plots; fixed, since finding them doubles the time

@@ -2,6 +2,7 @@
 
 A plot file has `ORDER` (its place on the page), `TITLE`, `NEEDS` (the vehicle's topics that it cannot do without), and
 `draw(flown)`, which returns the figure and its caption, or raises NotRecordedError with what is missing in the log.
+A plot that says something of certain models of vehicles only names them in `MODELS`.
 """
 
 import importlib

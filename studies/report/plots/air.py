@@ -3,11 +3,12 @@
 from matplotlib.figure import Figure
 
 from studies.flown import Flown
-from studies.report.style import AXIS_COLOURS, FLOWN, NotRecordedError, line, rows, shade_phases
+from studies.report.style import AXIS_COLOURS, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 80
 TITLE = "Air: wind and density"
 NEEDS = ("truth",)
+MODELS = STEERED
 
 
 def draw(flown: Flown) -> tuple[Figure, str]:

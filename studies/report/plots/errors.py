@@ -3,11 +3,12 @@
 from matplotlib.figure import Figure
 
 from studies.flown import AXES, Flown
-from studies.report.style import BOUND, FLOWN, NotRecordedError, line, rows, shade_phases
+from studies.report.style import BOUND, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 30
 TITLE = "Tracking error"
 NEEDS = ("truth", "setpoint", "actuators")
+MODELS = STEERED
 
 
 def draw(flown: Flown) -> tuple[Figure, str]:

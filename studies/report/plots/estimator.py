@@ -7,11 +7,12 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from studies.flown import Flown
-from studies.report.style import BOUND, FLOWN, NotRecordedError, line, rows, shade_phases
+from studies.report.style import BOUND, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 70
 TITLE = "Estimator: error and 3-sigma bounds"
 NEEDS = ("truth", "estimate")
+MODELS = STEERED
 _COLUMNS = (("position", "m", "xyz"), ("velocity", "m/s", "xyz"), ("attitude", "rad", "xyz"))
 
 

@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from studies.flown import Flown
-from studies.report.style import FLOWN, NotRecordedError, line, rows, shade_phases
+from studies.report.style import FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 50
 TITLE = "Motors: speed, voltage and power"
 NEEDS = ("truth",)
+MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 
 

@@ -5,11 +5,12 @@ from matplotlib.figure import Figure
 
 from studies.flown import Flown
 from studies.report.plots.motors import RPM
-from studies.report.style import DASHED, FLOWN, WIDTH, NotRecordedError
+from studies.report.style import DASHED, FLOWN, STEERED, WIDTH, NotRecordedError
 
 ORDER = 60
 TITLE = "Propulsion: thrust, torque and power over speed"
 NEEDS = ("truth",)
+MODELS = STEERED
 _SAMPLES = 20000  # drawn at most
 
 

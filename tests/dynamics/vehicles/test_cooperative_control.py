@@ -9,7 +9,7 @@ from dynamics.integrators import get, rate, simulate
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, exp, from_matrix
 from dynamics.lie.ts2 import Swing, normalise
 from dynamics.tree import retract, scale, unflatten
-from dynamics.vehicles import cooperative_control as control
+from dynamics.vehicles import cooperative_forces as forces_of
 from dynamics.vehicles.cooperative_control import FormationControl
 from dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
@@ -60,17 +60,17 @@ def tripod():
 def test_the_desired_path_is_the_published_one():
     p, _ = published()
     for t in (0.0, 1.3, 5.0):
-        position, velocity, acceleration = control.desired_load(p.drive.path, t)
+        position, velocity, acceleration = forces_of.desired_load(p.drive.path, t)
         assert position == pytest.approx((t - 2.5, 0.0, -((t - 2.5) ** 2 - 7.0)), abs=1e-14)
         assert velocity == pytest.approx((1.0, 0.0, -2 * (t - 2.5)), abs=1e-14)
         assert acceleration == (0.0, 0.0, -2.0)
 
 
 def forces(p, t, x, acceleration=ZERO, omega_rate=(ZERO,) * 3):
-    wanted, slope = control.wanted_specific(p, t, x, acceleration)
-    s, s_rate = control.shares(p, x, wanted, slope)
+    wanted, slope = forces_of.wanted_specific(p, t, x, acceleration)
+    s, s_rate = forces_of.shares(p, x, wanted, slope)
     n = len(x.link)
-    return wanted, [control.wanted_force(p, x, wanted, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
+    return wanted, [forces_of.wanted_force(p, x, wanted, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
 
 
 def test_wanted_forces_give_the_wanted_motion():
@@ -105,25 +105,25 @@ def test_derivatives_of_the_wanted_forces_along_the_motion():
 
 def test_wanted_attitude_and_its_rate():
     force, force_rate, h = np.array((1.0, -2.0, 7.0)), np.array((0.5, 0.3, -1.0)), 1e-6
-    matrix, omega = control.wanted_attitude(tuple(force), tuple(force_rate))
+    matrix, omega = forces_of.wanted_attitude(tuple(force), tuple(force_rate))
     m = np.array(matrix).reshape(3, 3)
     assert m @ (0, 0, 1) == pytest.approx(force / np.linalg.norm(force))
     assert m[0, 1] == pytest.approx(0.0, abs=1e-16)  # body x stays in the plane of z and world x, and towards that
     assert m[0, 0] > 0.0
     assert np.linalg.det(m) == pytest.approx(1.0)
-    ahead, behind = (control.wanted_attitude(tuple(force + s * h * force_rate), ZERO)[0] for s in (1, -1))
+    ahead, behind = (forces_of.wanted_attitude(tuple(force + s * h * force_rate), ZERO)[0] for s in (1, -1))
     spin = m.T @ (np.array(ahead) - behind).reshape(3, 3) / (2 * h)
     assert (spin[2, 1], spin[0, 2], spin[1, 0]) == pytest.approx(omega, abs=1e-9)
 
 
 def test_a_force_that_points_down_does_not_tip_the_quadrotor_over():
     for z in (-20.0, 0.0, 1.0):
-        kept, _ = control.upright((3.0, 1.0, z), (0.0, 0.0, 1.0), 2.0)
+        kept, _ = forces_of.upright((3.0, 1.0, z), (0.0, 0.0, 1.0), 2.0)
         assert kept[2] >= 2.0
-    kept, slope = control.upright((3.0, 1.0, 8.0), (0.0, 0.0, 1.0), 2.0)
+    kept, slope = forces_of.upright((3.0, 1.0, 8.0), (0.0, 0.0, 1.0), 2.0)
     assert kept == pytest.approx((3.0, 1.0, 8.0), rel=2e-3)
-    ahead, behind = (control.upright((0.0, 0.0, 2.1 + s * 1e-6), ZERO, 2.0)[0][2] for s in (1, -1))
-    assert control.upright((0.0, 0.0, 2.1), (0.0, 0.0, 1.0), 2.0)[1][2] == pytest.approx(
+    ahead, behind = (forces_of.upright((0.0, 0.0, 2.1 + s * 1e-6), ZERO, 2.0)[0][2] for s in (1, -1))
+    assert forces_of.upright((0.0, 0.0, 2.1), (0.0, 0.0, 1.0), 2.0)[1][2] == pytest.approx(
         (ahead - behind) / 2e-6, rel=1e-6
     )
     assert slope[2] == pytest.approx(1.0, abs=2e-3)
@@ -132,11 +132,11 @@ def test_a_force_that_points_down_does_not_tip_the_quadrotor_over():
 def test_the_moment_vanishes_on_the_wanted_attitude_and_opposes_an_error():
     p, x = published()
     force = (0.0, 0.0, 10.0)
-    aligned = from_matrix(control.wanted_attitude(force, ZERO)[0])
+    aligned = from_matrix(forces_of.wanted_attitude(force, ZERO)[0])
     assert isinstance(aligned, Quaternion)
-    assert control.moment(p, x._replace(attitude=(aligned,) * 2), force, ZERO, 0) == pytest.approx(ZERO, abs=1e-14)
+    assert forces_of.moment(p, x._replace(attitude=(aligned,) * 2), force, ZERO, 0) == pytest.approx(ZERO, abs=1e-14)
     tilted = x._replace(attitude=(exp((0.1, 0.0, 0.0)),) * 2)
-    assert control.moment(p, tilted, force, ZERO, 0) == pytest.approx(
+    assert forces_of.moment(p, tilted, force, ZERO, 0) == pytest.approx(
         (-9.0 / 0.81 * math.sin(0.1), 0.0, 0.0), abs=1e-12
     )
 
@@ -146,7 +146,7 @@ def test_the_published_flight_reaches_path_formation_and_attitude():
     _, rows = simulate(get("rkmk4"), p, x0, 5.0 / 2000, 2000, every=1000)
     for t, row in zip((2.5, 5.0), rows[1:], strict=True):
         now = unflatten(x0, tuple(map(float, row)))
-        position, velocity, _ = control.desired_load(p.drive.path, t)
+        position, velocity, _ = forces_of.desired_load(p.drive.path, t)
         assert now.load_position == pytest.approx(position, abs=5e-3)
         assert now.load_velocity == pytest.approx(velocity, abs=5e-2)
         for i, angle in enumerate((30.0, -30.0)):

@@ -1,0 +1,1 @@
+"""The control of quadrotors that carry a load together."""

@@ -1,0 +1,159 @@
+"""Plant models beyond the multirotor: a scene flown tick by tick is the library's own motion, bit for bit."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics.integrators import get, simulate
+from messages import stamp_ns
+from messages.topics import BODIES, LIFT, TRUTH
+from services.lockstep import LockStepError
+from services.plant.models import gyrostat, os4
+from services.scene import SceneError, load
+from services.table import lockstep_services
+
+SCENES = Path(__file__).parents[3] / "scenes"
+SATELLITE, OS4, LOAD = (
+    SCENES / "gyrostat_feedback.toml",
+    SCENES / "os4_experiment_3.toml",
+    SCENES / "cooperative_load.toml",
+)
+
+
+def ticks(scene, count):
+    """The plant's truth at the first `count` ticks, of a scene that nobody controls."""
+    plant = lockstep_services(scene)["plant"]
+    plant.prepare()
+    return [dict(plant.step(tick))[TRUTH] for tick in range(count)]
+
+
+@pytest.mark.parametrize(("path", "model"), [(SATELLITE, gyrostat), (OS4, os4)])
+def test_a_scene_moves_as_the_library_does(path, model):
+    scene = load(path)
+    count, solver = 20, scene.lookup("solver")
+    steps = round(1.0 / scene.lookup("exchange.rate") / solver.step)
+    p, start = model._system(scene)
+    _, rows = simulate(get(solver.integrator), p, start, solver.step, count * steps, every=steps)
+    for row, truth in zip(rows, ticks(scene, count + 1), strict=True):
+        q = truth.pose.orientation
+        first = 0 if model is gyrostat else 3
+        assert (q.w, q.x, q.y, q.z) == tuple(row[first : first + 4])
+
+
+def test_the_satellite_reaches_its_attitude():
+    scene = load(SCENES / "gyrostat_attitude.toml")
+    truth = ticks(scene, 7201)[-1]
+    half = np.linalg.norm((0.6, -0.9, 1.1)) / 2
+    axis = np.array((0.6, -0.9, 1.1)) / (2 * half)
+    q = truth.pose.orientation
+    assert (q.w, q.x, q.y, q.z) == pytest.approx((np.cos(half), *(np.sin(half) * axis)), abs=1e-6)
+
+
+def test_experiments_3_and_4_fall_as_the_published_forces_say():
+    falls = [ticks(load(SCENES / f"os4_experiment_{n}.toml"), 751)[-1].acceleration.z for n in (3, 4)]
+    assert falls[1] < falls[0] < 0.0
+
+
+def test_motors_reach_the_speed_at_which_torque_and_drag_balance():
+    scene = load(SCENES / "os4_motors.toml")
+    speed = ticks(scene, 751)[-1].rotor_speed[0]
+    current = (5.8 - 0.0205 * speed) / 0.6
+    assert 0.0205 * current == pytest.approx(7.5e-7 * speed**2, rel=1e-6)
+
+
+def carry(scene, count):
+    """(bodies, lift) of each tick, plant and control in turn."""
+    services = lockstep_services(scene)
+    plant, formation = services["plant"], services["formation"]
+    lift, flown = None, []
+    for tick in range(count):
+        bodies = dict(plant.step(tick, lift))[BODIES]
+        lift = dict(formation.step(tick, bodies))[LIFT]
+        flown.append((bodies, lift))
+    return flown
+
+
+def three(path):
+    """The formation with a third quadrotor across."""
+    text = LOAD.read_text()
+    text = text.replace("[0.755, 0.755]", "[0.755, 0.755, 0.6]").replace("[0.6, 0.8]", "[0.6, 0.8, 0.7]")
+    text = text.replace("0.1377]]", "0.1377], [0.0820, 0.0845, 0.1377]]")
+    lines = [
+        line.replace("]]", "], [0.0, 0.6, -0.8]]") if line.startswith("link_") and "[[" in line else line
+        for line in text.splitlines()
+    ]
+    path.write_text("\n".join(lines))
+    return load(path)
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_links_keep_their_lengths_and_the_load_its_path(number, tmp_path):
+    scene = load(LOAD) if number == 2 else three(tmp_path / "three.toml")
+    flown = carry(scene, 2001)
+    lengths = scene.lookup("cooperative_load.link_length")
+    for bodies, _ in flown[::50]:
+        places = [np.array(p.position) for p in bodies.pose]
+        assert [np.linalg.norm(places[0] - q) for q in places[1:]] == pytest.approx(lengths, abs=1e-14)
+    bodies, lift = flown[-1]
+    assert stamp_ns(bodies.header) == 5_000_000_000
+    assert tuple(bodies.pose[0].position) == pytest.approx((2.5, 0.0, 0.75), abs=2e-3)
+    assert len(lift.thrust) == number
+
+
+def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
+    digests = set()
+    for mode in ("processes", "single"):
+        figures = tmp_path / f"{mode}.json"
+        command = [sys.executable, "-m", "services.cli", "run", str(LOAD), "--mode", mode, "--set", "run.duration=0.5"]
+        command += ["--json", str(figures), "--log", str(tmp_path / f"{mode}.mcap")]
+        subprocess.run(command, check=True, timeout=300, capture_output=True)
+        digests.add(json.loads(figures.read_text())["digest"])
+    assert len(digests) == 1
+
+
+WRONG = {
+    "no such model": (SATELLITE, "vehicle.model=gyro", "vehicle.model: expected one of"),
+    "another model's table": (SATELLITE, "vehicle.model=os4", "os4: missing; the model os4 needs a table [os4]"),
+    "effects": (SATELLITE, "effects.gravity.acceleration=9.81", "effects: the model gyrostat knows no such table"),
+    "no rotation": (
+        SATELLITE,
+        "gyrostat.initial_attitude=[1.0, 0.1, 0.0, 0.0]",
+        "attitude is off its manifold by 0.00",
+    ),
+    "no inertia": (SATELLITE, "gyrostat.inertia=[500.0, 0.0, 1000.0]", "above 0, got 0 about y"),
+    "not for this state": (
+        OS4,
+        "solver.integrator=rigid_splitting",
+        "rigid_splitting is for states of attitude, omega_",
+    ),
+    "a link of no length": (LOAD, "cooperative_load.link_length=[0.6, 0.0]", "link_length[1] = 0: must be positive"),
+    "a link that is no unit vector": (LOAD, "cooperative_load.link_start=[[0, 0, -2], [1, 0, 0]]", "off its manifold"),
+    "a direction of nothing": (
+        LOAD,
+        "formation.link_direction=[[0, 0, 0], [1, 0, 0]]",
+        "2 directions that are not zero",
+    ),
+    "too few directions": (LOAD, "formation.link_direction=[[1, 0, 0]]", "formation.link_direction: expected 2"),
+    "a step of zero": (OS4, "solver.step=0", "solver.step: expected a number above 0"),
+    "control slower than the exchange": (LOAD, "rates.bodies=100", "rates.bodies: expected exchange.rate = 400 Hz"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_scene_is_refused_with_its_key(name):
+    path, override, message = WRONG[name]
+    with pytest.raises(SceneError) as error:
+        load(path, [override])
+    assert message in str(error.value)
+
+
+def test_numbers_that_run_away_are_named_with_their_time():
+    scene = load(
+        OS4, ["solver.step=0.004", "os4.translational_drag=[1e4, 1e4, 1e4]", "os4.rotor_speed_rpm=[9e3, 0, 0, 0]"]
+    )
+    with pytest.raises(LockStepError, match=r"os4: not finite at t = [\d.]+ s: \w+.*take a smaller step than 0.004 s"):
+        ticks(scene, 5000)
