@@ -26,7 +26,7 @@ class BusError(RuntimeError):
     """The bus could not be opened."""
 
 
-def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> zenoh.Config:
+def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str, lease_ms: int) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
         "mode": mode,
@@ -37,7 +37,7 @@ def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> 
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/lease": lease_ms,
     }.items():
         config.insert_json5(key, json.dumps(value))
     return config
@@ -46,15 +46,23 @@ def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> 
 class ZenohBus:
     """A session with explicit endpoints, publishers by key, and subscriptions that are queues."""
 
-    def __init__(self, listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer"):
+    def __init__(
+        self, listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer", lease_ms: int = LEASE_MS
+    ):
         """Open the session.
+
+        Args:
+            listen: endpoints where others find it.
+            connect: endpoints of others.
+            mode: Zenoh's: peer, client, router.
+            lease_ms: after this long without a sign of life the others let it go.
 
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
         """
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configuration(listen, connect, mode))
+            self._session = zenoh.open(_configuration(listen, connect, mode, lease_ms))
         except zenoh.ZError as error:
             endpoints = ", ".join(connect if mode == "client" else listen)
             action = "connect to" if mode == "client" else "listen on"
@@ -83,11 +91,19 @@ class ZenohBus:
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
-    def subscribe(self, *key_expressions: str) -> "Subscription":
-        """Receive what is published on any of the keys, in order of arrival."""
+    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> "Subscription":
+        """Receive what is published on any of the keys, in order of arrival.
+
+        `notify` is called from another thread after each arrival, for those who wait for other things besides.
+        """
         arrived: queue.SimpleQueue = queue.SimpleQueue()
+
+        def take(sample: zenoh.Sample) -> None:
+            arrived.put(sample)
+            notify()  # type: ignore[misc]
+
         for key_expression in key_expressions:
-            handler = zenoh.handlers.Callback(arrived.put, indirect=False)
+            handler = zenoh.handlers.Callback(take if notify else arrived.put, indirect=False)
             self._held.append(self._session.declare_subscriber(key_expression, handler))
         return Subscription(arrived)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from services.mavlink.hub import Options
     from services.scene import Scene
 
 app = typer.Typer(
@@ -34,6 +35,16 @@ Peers = Annotated[
     str | None,
     typer.Option(metavar="TABLE", help="name=endpoint,... of all participants, when they are started separately"),
 ]
+
+MavlinkUrls = Annotated[
+    list[str] | None,
+    typer.Option("--mavlink", metavar="URL", help="a link to ground stations: udpout:127.0.0.1:14550 (repeatable)"),
+]
+MavlinkKey = Annotated[
+    Path | None,
+    typer.Option("--mavlink-key", metavar="FILE", help="a passphrase: sign, and take only what is signed with it"),
+]
+Insecure = Annotated[bool, typer.Option("--insecure", help="take unsigned MAVLink commands from other machines")]
 
 USER_ERROR = 2
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
@@ -112,6 +123,9 @@ def run(
     open_: Annotated[
         str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
     ] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
 ) -> None:
     """Fly a scene, record it, and report."""
     from services import flight
@@ -124,8 +138,13 @@ def run(
             raise ValueError(f"--mode {mode}: expected processes or single")
         if mode == "single" and (peers is not None or open_ is not None):
             raise ValueError("--mode single: has no network; leave out --peers and --open")
+        if mavlink and (mode == "single" or peers is not None):
+            raise ValueError("--mavlink: belongs to a run in processes; with --peers start the service mavlink instead")
         if open_ is not None:
             flight.check_endpoint("--open", open_)
+        link = _mavlink_arguments(mavlink, mavlink_key, insecure)
+        if mavlink:
+            set_, speed = [*(set_ or []), "autopilot.operator=true"], speed or "1"
         loaded = load(scene, set_ or [])
         pace = parse_speed(speed)
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]
@@ -133,7 +152,24 @@ def run(
         _check_distinct({"SCENE": scene, "--log": log, "--json": json})
         path = _log_path(loaded, log, exists=table is not None)
         _check_writable(json)
-        _fly(loaded, set_ or [], mode, speed, pace, path, space, table, json, open_)
+        _fly(loaded, set_ or [], mode, speed, pace, path, space, table, json, open_, link)
+
+
+def _mavlink_arguments(urls: list[str] | None, key: Path | None, insecure: bool) -> list[str]:
+    """The arguments that start the service mavlink; none without a URL. What cannot be is refused now."""
+    if not urls:
+        if key or insecure:
+            raise ValueError(f"{'--mavlink-key' if key else '--insecure'}: expected with --mavlink URL")
+        return []
+    from services.mavlink.channel import read_key
+    from services.mavlink.links import check
+
+    for url in urls:
+        check(url)
+    if key:
+        read_key(key)
+    arguments = [part for url in urls for part in ("--mavlink", url)]
+    return [*arguments, *(["--mavlink-key", str(key)] if key else []), *(["--insecure"] if insecure else [])]
 
 
 def _fly(
@@ -147,19 +183,22 @@ def _fly(
     peers: dict[str, str] | None,
     json: Path | None,
     door: str | None,
+    link: list[str],
 ) -> None:
     from rich.console import Console
 
     from services import flight, summary
     from services.progress import Display
     from services.sections import Run
+    from services.table import MAVLINK
     from studies.flown import Flown
     from studies.report import write as write_report
 
     core = flight.shared_core(scene)
 
     def command(name: str) -> list[str]:
-        extra = ["--log", str(log)] if name == "recorder" else ["--open", str(door)] if name == "router" else []
+        own = {"recorder": ["--log", str(log)], "router": ["--open", str(door)], MAVLINK: link}
+        extra = own.get(name, [])
         pacing = ["--speed", speed] if speed else []
         pacing += ["--core", str(core)] if core is not None else []
         return ["service", name, *flight.scene_arguments(scene.path, overrides), "--space", space, *pacing, *extra]
@@ -173,7 +212,9 @@ def _fly(
         elif peers:
             simulated, wall = flight.fly_joined(scene, peers, space, display)
         else:
-            simulated, wall = flight.fly_processes(scene, command, space, display, door is not None)
+            simulated, wall = flight.fly_processes(
+                scene, command, space, display, door is not None, [MAVLINK] if link else []
+            )
     flown = Flown(log)
     result = {
         "scene": scene.name,
@@ -258,6 +299,9 @@ def service(
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="the recorder's MCAP log")] = None,
     core: Annotated[int | None, typer.Option(metavar="N", help="the core that all lock-step services share")] = None,
     open_: Annotated[list[str] | None, typer.Option("--open", metavar="ENDPOINT", help="the router's door")] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
     with_parent: Annotated[bool, typer.Option("--with-parent", help="end when standard input closes")] = False,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
@@ -266,7 +310,7 @@ def service(
     from services.launcher import WATCHER, check_space
     from services.process import Process, Stopped, run_lockstep
     from services.scene import load
-    from services.table import RECORDER, lockstep_services, modules
+    from services.table import MAVLINK, RECORDER, lockstep_services, modules
 
     with user_errors():
         check_space(space)
@@ -278,7 +322,10 @@ def service(
         loaded = load(scene, set_ or [])
         flying = lockstep_services(loaded)
         listen, connect = mesh(name, table)
-        with ZenohBus([*listen, *(open_ or [])], connect, getattr(modules()[name], "MODE", "peer")) as bus:
+        settings = {
+            key.lower(): getattr(modules()[name], key) for key in ("MODE", "LEASE_MS") if hasattr(modules()[name], key)
+        }
+        with ZenohBus([*listen, *(open_ or [])], connect, **settings) as bus:
             watched = WATCHER in table and not with_parent
             others = [*flying, RECORDER, WATCHER] if watched else [*flying, RECORDER]
             process = Process(name, loaded, bus, space, others, parse_speed(speed), core)
@@ -290,10 +337,21 @@ def service(
                 if name in flying:
                     flying[name].prepare()
                     run_lockstep(process, flying[name])
+                elif name == MAVLINK:
+                    modules()[name].run(process, _mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed)))
                 else:
                     modules()[name].run(process, log)
             except Stopped:
                 pass
+
+
+def _mavlink_options(urls: list[str] | None, key: Path | None, insecure: bool, speed: float | None) -> "Options":
+    from services.mavlink.channel import read_key
+    from services.mavlink.hub import Options
+
+    if not urls:
+        raise ValueError("--mavlink: expected at least one URL")
+    return Options(tuple(urls), read_key(key) if key else None, insecure, speed)
 
 
 @app.command()

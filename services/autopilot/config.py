@@ -16,6 +16,7 @@ class Autopilot(Section):
     OPTIONAL: ClassVar[bool] = True
     gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
     estimator: Literal["sensors", "truth"] = "sensors"
+    operator: bool = False  # whether somebody outside, a ground station or a plan, commands it
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
 
     def gain_set(self, scene: Scene) -> GainSet:

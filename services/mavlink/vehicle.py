@@ -29,7 +29,11 @@ class Vehicle:
         self.on_truth = not scene.tables("sensors")  # nothing is measured: the truth stands for the sensors
         self.view = View()
         self.time_ns = 0
-        self.origin = (whole(HOME.latitude_deg * 1e7, 32), whole(HOME.longitude_deg * 1e7, 32), whole(1e3 * HOME.height, 32))
+        self.origin = (
+            whole(HOME.latitude_deg * 1e7, 32),
+            whole(HOME.longitude_deg * 1e7, 32),
+            whole(1e3 * HOME.height, 32),
+        )
 
     @property
     def boot_ms(self) -> int:

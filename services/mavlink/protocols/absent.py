@@ -42,6 +42,4 @@ def nothing_to_erase(adapter: "Adapter", client: Client, m: Any) -> None:
 @handles("SERIAL_CONTROL")
 def no_console(adapter: "Adapter", client: Client, m: Any) -> None:
     """No console: an empty reply."""
-    client.send(
-        mavlink.MAVLink_serial_control_message(m.device, mavlink.SERIAL_CONTROL_FLAG_REPLY, 0, 0, 0, [0] * 70)
-    )
+    client.send(mavlink.MAVLink_serial_control_message(m.device, mavlink.SERIAL_CONTROL_FLAG_REPLY, 0, 0, 0, [0] * 70))

@@ -139,7 +139,7 @@ def arm_disarm(adapter: "Adapter", client: Client, c: Command) -> Ask | int:
 
 @rule(mavlink.MAV_CMD_NAV_TAKEOFF)
 def takeoff(adapter: "Adapter", client: Client, c: Command) -> Ask | int:
-    """Up to an altitude, or to that of the parameter where none is given; above the sea or home as the flavour has it."""
+    """Up to an altitude, above the sea or home as the flavour has it, or to the parameter's where none is given."""
     frame = c.frame if adapter.vehicle.flavour.TAKEOFF_ABOVE_SEA else mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     _, _, height = to_world(frame, math.nan, math.nan, c.altitude)
     return Ask("takeoff", (height, math.nan))

@@ -77,6 +77,4 @@ def altitude(v: Vehicle) -> Any:
     if (m := v.motion) is None:
         return None
     above_sea, above_home = m.geodetic[2], m.position_world[2]
-    return mavlink.MAVLink_altitude_message(
-        v.boot_us, above_sea, above_sea, above_home, above_home, math.nan, math.nan
-    )
+    return mavlink.MAVLink_altitude_message(v.boot_us, above_sea, above_sea, above_home, above_home, math.nan, math.nan)
