@@ -3,7 +3,7 @@
 import selectors
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 from messages import OperatorInput
@@ -11,6 +11,7 @@ from messages.topics import ESTIMATE, Topic
 from services.mavlink.adapter import Adapter
 from services.mavlink.lateness import Lateness
 from services.mavlink.links import open_link
+from services.mavlink.parameters import Parameter
 from services.mavlink.vehicle import Vehicle
 from services.scene import Scene
 
@@ -29,12 +30,19 @@ class Options(NamedTuple):
 class Hub:
     """Links of one vehicle; a context manager."""
 
-    def __init__(self, scene: Scene, options: Options, operate: Callable[[bytes], None] | None):
+    def __init__(
+        self,
+        scene: Scene,
+        options: Options,
+        parameters: Iterable[Parameter],
+        operate: Callable[[bytes], None] | None,
+    ):
         """Open every link.
 
         Args:
             scene: what flies.
             options: the links, and who may command.
+            parameters: what can be tuned.
             operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
 
         Raises:
@@ -45,7 +53,8 @@ class Hub:
             assert operate
             operate(OperatorInput(commands=(command,)).encode())
 
-        self.adapter = Adapter(Vehicle(scene), (), put if operate else None, options.key, options.insecure)
+        operator = put if operate else None
+        self.adapter = Adapter(Vehicle(scene), tuple(parameters), operator, options.key, options.insecure)
         self.lateness = Lateness(options.speed)
         self._selector = selectors.DefaultSelector()
         self._woken, self._wake = socket.socketpair()

@@ -30,7 +30,7 @@ def run(process: Process, options: "Options") -> None:
     interval = process.scene[Exchange].interval_ns
     topics = {process.key(topic): topic for topic in AT_ONCE}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
-    with Hub(process.scene, options, lambda payload: put(payload, 0)) as hub:
+    with Hub(process.scene, options, (), lambda payload: put(payload, 0)) as hub:
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
         process.join()
         flying = True
