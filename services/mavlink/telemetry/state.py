@@ -70,7 +70,7 @@ def sys_status(v: Vehicle) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
-    sound = _CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    sound = _CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_GEOFENCE
     for bits, good in _SENSORS.items():
         sound |= bits if (healthy(v) if v.on_truth else good(v)) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0

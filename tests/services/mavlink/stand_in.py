@@ -1,6 +1,6 @@
 """A vehicle that keeps the autopilot's side of the interface, moves like a point, and needs no kernels.
 
-What is proved with it is the link: that clients which we did not write can say what they want and hear what became of it.
+It serves to prove the link: that clients which we did not write can say what they want, and hear what became of it.
 """
 
 import math
