@@ -51,6 +51,11 @@ def euler(q: Quaternion) -> Vec3:
     return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def compass(angle: float) -> int:
+    """Angle from north, to the right [rad] as hundredths of a degree, 0 to 35999; not known: 65535."""
+    return round(math.degrees(angle) * 100.0) % 36000 if math.isfinite(angle) else 0xFFFF
+
+
 def whole(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
     """The nearest whole number that a field of so many bits holds.
 

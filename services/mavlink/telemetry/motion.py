@@ -4,16 +4,10 @@ import math
 from typing import Any
 
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import whole
+from services.mavlink.frames import compass, whole
 from services.mavlink.telemetry.power import motor_shares
 from services.mavlink.telemetry.stream import stream
 from services.mavlink.vehicle import Vehicle
-from services.mavlink.view import Motion
-
-
-def heading(m: Motion) -> int:
-    """Heading [0.01 deg], 0 to 35999."""
-    return round(math.degrees(m.angles[2]) * 100.0) % 36000
 
 
 @stream("ATTITUDE", 50.0)
@@ -53,7 +47,7 @@ def global_position(v: Vehicle) -> Any:
         whole(altitude * 1e3, 32),
         whole(m.position_world[2] * 1e3, 32),
         *[whole(u * 1e2, 16) for u in m.velocity_ned],
-        heading(m),
+        compass(m.angles[2]),
     )
 
 
@@ -67,7 +61,7 @@ def hud(v: Vehicle) -> Any:
     shares = motor_shares(v)
     throttle = round(100.0 * sum(shares) / max(1, len(shares)))
     return mavlink.MAVLink_vfr_hud_message(
-        ground_speed, ground_speed, heading(m) // 100, throttle, m.geodetic[2], -down
+        ground_speed, ground_speed, compass(m.angles[2]) // 100, throttle, m.geodetic[2], -down
     )
 
 

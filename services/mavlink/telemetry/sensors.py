@@ -6,7 +6,7 @@ from typing import Any
 from messages import NavSatStatus
 from messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG, SONAR
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_body, whole
+from services.mavlink.frames import compass, swap_body, whole
 from services.mavlink.telemetry.stream import stream
 from services.mavlink.vehicle import Vehicle
 
@@ -125,7 +125,7 @@ def _fix(v: Vehicle, place: Any, moving: Any, spread: tuple[float, float], speed
         height,
         *(100, 100),  # dilution of precision, in hundredths
         whole(100.0 * math.hypot(north, east), 16, unsigned=True),
-        round(100.0 * math.degrees(math.atan2(east, north))) % 36000,
+        compass(math.atan2(east, north)),
         SATELLITES,
         height,
         *[whole(1e3 * s, 32, unsigned=True) for s in spread],
