@@ -6,14 +6,14 @@ service's process starts quickly.
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from services.mavlink.hub import Options
+    from services.mavlink.hub import Hub, Options
     from services.scene import Scene
 
 app = typer.Typer(
@@ -354,6 +354,16 @@ def _mavlink_options(urls: list[str] | None, key: Path | None, insecure: bool, s
     return Options(tuple(urls), read_key(key) if key else None, insecure, speed)
 
 
+def _recorded_hub(log: Path, options: "Options") -> "Hub":
+    from services.log import LogReader
+    from services.mavlink.hub import Hub
+    from services.mavlink.vehicle import Vehicle
+
+    with LogReader(log) as recorded:
+        text = recorded.attachments.get("scene.toml", b"").decode()
+    return Hub(Vehicle.recorded(text), options, (), None)
+
+
 @app.command()
 def scenes(folder: Annotated[Path, typer.Argument(help="where to look")] = Path("scenes")) -> None:
     """List the scenes, a line each."""
@@ -448,6 +458,9 @@ def replay(
     space: Space = "lapwing",
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="where subscribers connect")] = "tcp/127.0.0.1:7447",
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="also write what is published to a log")] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
 ) -> None:
     """Publish a log on Zenoh with its own timing, as the live run did."""
     from services.flight import Stop
@@ -462,8 +475,18 @@ def replay(
         if record and record.resolve() == log.resolve():
             raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
         _check_writable(record)
-        with key_space(space), Stop() as stop:
-            count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None)
+        _mavlink_arguments(mavlink, mavlink_key, insecure)
+        with ExitStack() as stack:
+            hub = None
+            if mavlink:
+                options = _mavlink_options(mavlink, mavlink_key, insecure, pace)
+                hub = stack.enter_context(_recorded_hub(log, options))
+            stack.enter_context(key_space(space))
+            stop = stack.enter_context(Stop())
+            listeners = (hub.replay, hub.wait) if hub else ()
+            count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None, *listeners)
+            for line in hub.report() if hub else ():
+                typer.echo(f"mavlink: {line}")
             stop.check()
         typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
 

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from services.bus import ZenohBus, mesh
 from services.process import ALIVE_KEY, WAITING_KEY
@@ -155,7 +156,7 @@ def launch(
     endpoints = loopback_endpoints([*everybody, WATCHER])
     peers = ",".join(f"{name}={endpoint}" for name, endpoint in endpoints.items())
     children: dict[str, subprocess.Popen] = {}
-    errors = {name: tempfile.TemporaryFile() for name in everybody}  # noqa: SIM115 (closed below, with the processes)
+    errors: dict[str, Any] = {name: tempfile.TemporaryFile() for name in everybody}  # noqa: SIM115 (closed below, with the processes)
     try:
         for name in everybody:
             arguments = [sys.executable, "-m", "services.cli", *command(name), "--peers", peers, "--with-parent"]
@@ -222,7 +223,7 @@ def _last_words(file: "tempfile._TemporaryFileWrapper") -> str:  # type: ignore[
     return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
 
 
-def _farewell(code: int, file: "tempfile._TemporaryFileWrapper") -> str:  # type: ignore[name-defined]
+def _farewell(code: int, file: Any) -> str:
     if code:
         return f"ended before the flight ({_reason(code)}){_last_words(file)}"
     file.seek(0)

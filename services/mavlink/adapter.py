@@ -182,6 +182,6 @@ class Adapter:
             self.send_all("MISSION_CURRENT")
         if s.mission_reached != self._reached:
             self._reached = s.mission_reached
-            if s.mission_reached != NONE:
+            if s.mission_count and s.mission_reached != NONE:
                 for client in self.clients:
                     client.send(mavlink.MAVLink_mission_item_reached_message(s.mission_reached))

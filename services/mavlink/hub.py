@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 from messages import OperatorInput
-from messages.topics import ESTIMATE, Topic
+from messages.topics import ESTIMATE, TOPICS, Topic
 from services.mavlink.adapter import Adapter
 from services.mavlink.lateness import Lateness
 from services.mavlink.links import open_link
 from services.mavlink.parameters import Parameter
+from services.mavlink.place import prepare
 from services.mavlink.vehicle import Vehicle
-from services.scene import Scene
 
 WAIT = 0.05  # [s] at most until something else is looked at
 
@@ -32,7 +32,7 @@ class Hub:
 
     def __init__(
         self,
-        scene: Scene,
+        vehicle: Vehicle,
         options: Options,
         parameters: Iterable[Parameter],
         operate: Callable[[bytes], None] | None,
@@ -40,7 +40,7 @@ class Hub:
         """Open every link.
 
         Args:
-            scene: what flies.
+            vehicle: what flies.
             options: the links, and who may command.
             parameters: what can be tuned.
             operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
@@ -54,14 +54,16 @@ class Hub:
             operate(OperatorInput(commands=(command,)).encode())
 
         operator = put if operate else None
-        self.adapter = Adapter(Vehicle(scene), tuple(parameters), operator, options.key, options.insecure)
+        self.adapter = Adapter(vehicle, tuple(parameters), operator, options.key, options.insecure)
         self.lateness = Lateness(options.speed)
+        self._topics = {topic.key(vehicle.name): topic for topic in TOPICS}
         self._selector = selectors.DefaultSelector()
         self._woken, self._wake = socket.socketpair()
         self._woken.setblocking(False)
         self._wake.setblocking(False)
         self._selector.register(self._woken, selectors.EVENT_READ, self._drain)
         self._links: list = []
+        prepare()
         try:
             for url in options.urls:
                 self._links.append(open_link(url, self.adapter, self._selector))
@@ -85,6 +87,14 @@ class Hub:
         self.adapter.tick(time.monotonic())
         for key, _ in ready:
             key.data()
+
+    def replay(self, key: str, time_ns: int, payload: bytes) -> None:
+        """A recorded message of a topic, by its name in the log; serves the clients now and then."""
+        topic = self._topics.get(key)
+        if topic:
+            self.take(topic, time_ns, payload)
+        if topic is ESTIMATE:
+            self.wait(0.0)
 
     def take(self, topic: Topic, time_ns: int, payload: bytes) -> None:
         """The vehicle has published a message."""

@@ -2,7 +2,7 @@
 
 import math
 
-from dynamics.geodesy import geodetic_to_enu
+from dynamics.geodesy import enu_to_geodetic, geodetic_to_enu
 from dynamics.vector import Vec3
 from services.mavlink.dialect import mavlink
 from services.mavlink.view import HOME
@@ -41,3 +41,8 @@ def to_world(frame: int, latitude: float, longitude: float, altitude: float) -> 
         east, north, _ = geodetic_to_enu(HOME, latitude, longitude, HOME.height)
         return east, north, math.nan
     return geodetic_to_enu(HOME, latitude, longitude, height)
+
+
+def prepare() -> None:
+    """Load the compiled conversions, so that the first message does not wait for them."""
+    enu_to_geodetic(HOME, geodetic_to_enu(HOME, *HOME))

@@ -25,12 +25,14 @@ def run(process: Process, options: "Options") -> None:
     Raises:
         ValueError: a link cannot be opened.
     """
-    from services.mavlink.hub import Hub  # every service's process imports this file; only this one needs MAVLink
+    # Every service's process imports this file; only this one needs MAVLink.
+    from services.mavlink.hub import Hub
+    from services.mavlink.vehicle import Vehicle
 
     interval = process.scene[Exchange].interval_ns
     topics = {process.key(topic): topic for topic in AT_ONCE}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
-    with Hub(process.scene, options, (), lambda payload: put(payload, 0)) as hub:
+    with Hub(Vehicle.of(process.scene), options, (), lambda payload: put(payload, 0)) as hub:
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
         process.join()
         flying = True

@@ -2,14 +2,13 @@
 
 from types import ModuleType
 
-from dynamics.vehicles.airframe import Airframe
 from messages import Status
 from messages.topics import STATUS
 from services.mavlink import flavours
 from services.mavlink.config import Mavlink
 from services.mavlink.frames import whole
 from services.mavlink.view import HOME, Motion, View
-from services.scene import Scene
+from services.scene import Scene, recorded_data
 from services.sections import Vehicle as Named
 from services.sections import airframe
 
@@ -20,20 +19,36 @@ STANDING = Status(landed=True)  # before the vehicle has said anything
 class Vehicle:
     """One vehicle on its links."""
 
-    def __init__(self, scene: Scene):
-        """Of a scene; says nothing of itself before the first message has come."""
-        self.system = scene[Mavlink].system
-        self.flavour: ModuleType = flavours.get(scene[Mavlink].flavour)
-        self.name: str = scene[Named].name
-        self.airframe: Airframe = airframe(scene)
-        self.on_truth = not scene.tables("sensors")  # nothing is measured: the truth stands for the sensors
+    def __init__(self, name: str, identity: Mavlink, full_voltage: float | None, on_truth: bool):
+        """A vehicle that has said nothing yet.
+
+        Args:
+            name: first part of its topics' names.
+            identity: who it says it is.
+            full_voltage: of its motors [V]; None where it is not known.
+            on_truth: nothing is measured, the truth stands for the sensors.
+        """
+        self.name, self.system, self.on_truth = name, identity.system, on_truth
+        self.flavour: ModuleType = flavours.get(identity.flavour)
+        self.full_voltage = full_voltage
         self.view = View()
         self.time_ns = 0
-        self.origin = (
-            whole(HOME.latitude_deg * 1e7, 32),
-            whole(HOME.longitude_deg * 1e7, 32),
-            whole(1e3 * HOME.height, 32),
-        )
+        latitude, longitude, height = HOME
+        self.origin = whole(latitude * 1e7, 32), whole(longitude * 1e7, 32), whole(height * 1e3, 32)
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Vehicle":
+        """The vehicle of a scene that is flown."""
+        engine = airframe(scene).motor
+        voltage = engine.max_voltage if engine else None
+        return cls(scene[Named].name, scene[Mavlink], voltage, not scene.tables("sensors"))
+
+    @classmethod
+    def recorded(cls, text: str) -> "Vehicle":
+        """The vehicle of a scene as a log carries it. Raises ValueError for one that is none."""
+        data = recorded_data(text)
+        identity = Mavlink.model_validate(data.get("mavlink", {}))
+        return cls(data.get("vehicle", {}).get("name", Named().name), identity, None, "sensors" not in data)
 
     @property
     def boot_ms(self) -> int:

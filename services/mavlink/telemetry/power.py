@@ -17,10 +17,10 @@ EMPTY = 0xFFFF  # a cell that is not there
 
 def motor_shares(v: Vehicle) -> list[float]:
     """Voltage of each motor as a share of the greatest, 0 to 1."""
-    actuators, engine = v.view.get(ACTUATORS), v.airframe.motor
-    if actuators is None or engine is None:
+    actuators = v.view.get(ACTUATORS)
+    if actuators is None or v.full_voltage is None:
         return []
-    return [min(1.0, max(0.0, u / engine.max_voltage)) for u in actuators.motor_voltage]
+    return [min(1.0, max(0.0, u / v.full_voltage)) for u in actuators.motor_voltage]
 
 
 @stream("SERVO_OUTPUT_RAW", 5.0, 10.0)

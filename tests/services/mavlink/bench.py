@@ -17,7 +17,7 @@ class Bench:
     def __init__(self, *overrides, recorded=False, **options):
         self.vehicle = StandIn()
         put = None if recorded else lambda command: self.vehicle.operate(OperatorInput(commands=(command,)).encode())
-        self.adapter = Adapter(Vehicle(load("scenes/hover.toml", overrides)), PARAMETERS, put, **options)
+        self.adapter = Adapter(Vehicle.of(load("scenes/hover.toml", overrides)), PARAMETERS, put, **options)
         self.partners = []
 
     @property

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from messages import Answer, Answers, Estimate, OperatorInput, Point, Pose, Quaternion, Status, Vector3, header
 from messages.topics import ANSWERS, ESTIMATE, STATUS
 from services.mavlink.hub import Hub, Options
+from services.mavlink.vehicle import Vehicle
 from services.scene import load
 
 PERIOD = 0.02  # [s] simulated
@@ -231,7 +232,7 @@ class Running:
     def __init__(self, *urls, speed=1.0, overrides=(), **options):
         self.vehicle = StandIn()
         scene = load("scenes/hover.toml", overrides)
-        self.hub = Hub(scene, Options(urls, speed=speed, **options), PARAMETERS, self.vehicle.operate)
+        self.hub = Hub(Vehicle.of(scene), Options(urls, speed=speed, **options), PARAMETERS, self.vehicle.operate)
         self._speed, self._over = speed, False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

@@ -174,11 +174,7 @@ def test_a_mission_of_a_kind_that_is_none():
     ],
 )
 def test_senseless_commands_are_answered(number, params, result):
-    assert Bench().partner and _result(number, params) == result
-
-
-def _result(number, params):
-    return Bench().partner().command(number, *params)
+    assert Bench().partner().command(number, *params) == result
 
 
 @pytest.mark.parametrize("bad", [NAN, INF, -INF, 1e38])
