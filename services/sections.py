@@ -65,6 +65,7 @@ class Rates(Section):
     status: int = Field(default=10, gt=0)
     battery: int = Field(default=10, gt=0)
     bodies: int = Field(default=50, gt=0)  # the single bodies of a vehicle that has several
+    operator: int = Field(default=50, gt=0)  # what comes from outside, and the answers
 
     def check(self, scene: Scene) -> None:
         """Every rate divides the exchange rate."""
