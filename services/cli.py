@@ -288,6 +288,12 @@ def _check_writable(path: Path | None) -> None:
         path.unlink()
 
 
+def _check_plot(path: Path | None) -> None:
+    if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"--plot {path}: expected a name that ends in .png, .svg or .pdf")
+    _check_writable(path)
+
+
 @app.command()
 def service(
     name: Annotated[str, typer.Argument(metavar="NAME", help="plant, sensors, autopilot, ...")],
@@ -446,6 +452,36 @@ def performance(
         show(figures)
         if json:
             write_json(json, figures)
+
+
+@app.command()
+def effects(
+    scene: SceneFile,
+    set_: Overrides = None,
+    within: Annotated[float, typer.Option(metavar="M", help="how far the trajectory may change")] = 0.01,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the study as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
+) -> None:
+    """What each effect of a scene costs and changes, and which of them it could do without."""
+    from rich.console import Console
+
+    from services.scene import load
+    from studies.effects import show
+    from studies.effects.study import study
+
+    with user_errors():
+        if not within > 0.0:
+            raise ValueError(f"--within {within:g}: expected a distance above 0 m")
+        _check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+        _check_writable(json)
+        _check_plot(plot)
+        console = Console()
+        found = study(load(scene, set_ or []), within, lambda text: console.print(text, highlight=False))
+        show.show(console, found)
+        if json:
+            show.write_json(json, found)
+        if plot:
+            show.plot(plot, found)
 
 
 @app.command()

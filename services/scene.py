@@ -77,6 +77,10 @@ class Scene:
         """Whether there is this table: always, unless it is optional."""
         return section in self._tables
 
+    def replaced(self, section: Section) -> "Scene":
+        """The same scene with this table in the place of its own; not checked against the others."""
+        return Scene(self.path, self.text, {**self._tables, type(section): section})
+
     @property
     def name(self) -> str:
         """The file's name without its ending."""

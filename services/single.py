@@ -7,10 +7,9 @@ from typing import Any
 
 from messages.topics import Topic
 from services.lockstep import Service, execution_order, published
-from services.log import LogWriter
 from services.outside import Operator, joined, nobody
 from services.recorder.collate import Collator
-from services.recorder.service import Writing
+from services.recorder.service import Sink, Writing
 from services.scene import Scene
 from services.sections import Exchange, Vehicle, period
 
@@ -34,7 +33,7 @@ class _Port:
 def run_single(
     scene: Scene,
     services: dict[str, Service],
-    writer: LogWriter,
+    writer: Sink,
     speed: float | None,
     observe: Callable[[int, dict[Topic, bytes]], bool],
     operator: Operator = nobody,
@@ -44,7 +43,7 @@ def run_single(
     Args:
         scene: what to fly.
         services: its lock-step services by name.
-        writer: the log.
+        writer: the log, or whatever takes its messages.
         speed: simulated seconds per second, None for as fast as it goes.
         observe: called now and then with the time [ns] and the newest payload of each topic; says
             whether to stop.

@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
 def test_lapwing_commands_run_as_written(command, folder):
     words = command.split()[1:]
     more = ["--space", "test-readme"] if words[0] in ("run", "replay") else []
-    subprocess.run([sys.executable, "-m", "services.cli", *words, *more], cwd=folder, check=True, timeout=400)
+    subprocess.run([sys.executable, "-m", "services.cli", *words, *more], cwd=folder, check=True, timeout=900)
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("make ")])

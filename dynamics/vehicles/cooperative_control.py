@@ -6,10 +6,11 @@ Pure: (p, t, x) -> LiftCommand, for the control service and the closed loop alik
 from typing import NamedTuple
 
 from dynamics.kernel import kernel
+from dynamics.unrolled import each
 from dynamics.vector import Vec3, add
 from dynamics.vehicles import cooperative_forces as forces
 from dynamics.vehicles import cooperative_load as formation
-from dynamics.vehicles.cooperative_load import COMMANDS, LiftCommand, each, load_acceleration
+from dynamics.vehicles.cooperative_load import COMMANDS, LiftCommand, load_acceleration
 
 
 class FormationControl(NamedTuple):

@@ -12,6 +12,7 @@ from dynamics.integrators import RATES
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import Quaternion, rotation_matrix
 from dynamics.lie.ts2 import Swing, tangent
+from dynamics.unrolled import each
 from dynamics.vector import Mat3, Vec3, add, apply, cross, divide, dot, multiply, scale, subtract
 
 
@@ -60,20 +61,6 @@ class CooperativeLoadState(NamedTuple):
 
 COMMANDS: dict[type, Any] = {}
 """The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
-
-
-def each(function, count, *arguments):
-    """(function(*arguments, 0), function(*arguments, 1), ...), one for each entry of the tuple `count`."""
-    return tuple(function(*arguments, i) for i in range(len(count)))
-
-
-@overload(each)
-def _each(function, count, *arguments):
-    given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
-    calls = "".join(f"function({given}{i}), " for i in range(len(count)))
-    names: dict = {}
-    exec(f"def each(function, count, *arguments):\n    return ({calls})\n", names)
-    return names["each"]
 
 
 def command(p, t, x):

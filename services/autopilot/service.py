@@ -73,6 +73,7 @@ class Autopilot:
         command, self._stage = self._steer(self._state, setpoint)
         time_ns = tick * self._interval_ns
         armed = self._stage == FLYING
+        finished = command.finished and setpoint.final
         yield (
             ACTUATORS,
             Actuators(
@@ -88,7 +89,7 @@ class Autopilot:
         if tick % self._status_every == 0:
             yield (
                 STATUS,
-                Status(header(time_ns, "body"), "mission", setpoint.phase, armed, not armed, command.finished, ""),
+                Status(header(time_ns, "body"), "mission", setpoint.phase, armed, not armed, finished, ""),
             )
 
 

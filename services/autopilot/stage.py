@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from dynamics.kernel import leaf
 
-STANDING, FLYING, LANDED = 0, 1, 2  # motors off before take-off, flying, cut off for good
+STANDING, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
 CUT_HEIGHT = (
     0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
 )
@@ -30,7 +30,9 @@ def advance_stage(stage, resting_height, estimate, setpoint, dt):
     asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
     if stage.name == STANDING:
         return Stage(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else STANDING, 0.0)
-    if stage.name == LANDED or asked_height >= CUT_HEIGHT or asked_speed > 0.0:
-        return Stage(stage.name, 0.0)
+    if asked_height >= CUT_HEIGHT or asked_speed > 0.0:
+        return Stage(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
+    if stage.name == LANDED:
+        return stage
     waiting = stage.waiting + dt if abs(speed) < STILL and height < DOUBT else 0.0
     return Stage(LANDED if height < CUT_HEIGHT or waiting > PATIENCE else FLYING, waiting)

@@ -5,9 +5,10 @@ from typing import Any
 
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import Quaternion
+from dynamics.unrolled import each
 from dynamics.vector import norm, scale
 from dynamics.vehicles.cooperative_control import FormationControl, formation_control
-from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, each
+from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState
 from messages import BodyStates, LiftCommand, Vector3, header
 from messages.topics import BODIES, LIFT, Topic
 from services.formation import links

@@ -2,6 +2,7 @@
 
 import time
 from pathlib import Path
+from typing import Any, Protocol
 
 from messages import WallTime, header
 from messages.topics import WALL_TIME, Topic
@@ -39,10 +40,18 @@ def run(process: Process, log: Path) -> None:
             pass
 
 
+class Sink(Protocol):
+    """What takes the messages of a run: a log, or a study that looks at them."""
+
+    def write(self, topic: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
+        """Take one message, as `LogWriter.write` does."""
+        ...
+
+
 class Writing:
     """Writes complete ticks into a log, and now and then the wall time."""
 
-    def __init__(self, writer: LogWriter, collator: Collator, vehicle: str, interval: int):
+    def __init__(self, writer: Sink, collator: Collator, vehicle: str, interval: int):
         """Ticks of `interval` [ns], topics of `vehicle`."""
         self._writer, self._collator, self._interval = writer, collator, interval
         self._names = {topic: topic.key(vehicle) for topic in collator.topics}

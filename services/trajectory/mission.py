@@ -11,6 +11,7 @@ from services.trajectory.config import Phase, Trajectory
 from services.trajectory.piece import Channel, Parameters, Piece
 
 CHANNELS = ("x", "y", "z", "yaw")
+GROUNDED = 1e-6  # [m] a phase that ends lower ends on the ground
 SLACK = 1e-9  # [s] rounding allowed between a phase's duration and the sum of its segments
 
 
@@ -20,6 +21,7 @@ class Compiled(NamedTuple):
     parameters: Parameters  # for piece.evaluate
     phases: tuple[str, ...]  # names, by the index that evaluate returns
     duration: float  # [s]
+    final: int  # index of the first phase after which none ends in the air
 
 
 def compile(
@@ -33,8 +35,8 @@ def compile(
     trajectory = validate(spec)
     joined: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
     value = dict.fromkeys(CHANNELS, 0.0)
-    starts, now = [], 0.0
-    for phase in trajectory.phase:
+    starts, now, final = [], 0.0, 0
+    for index, phase in enumerate(trajectory.phase):
         starts.append(now)
         moved = {channel: _pieces(phase, channel, value, folder) for channel in CHANNELS}
         length = {channel: sum(piece.duration for piece in pieces) for channel, pieces in moved.items()}
@@ -46,13 +48,14 @@ def compile(
                 time += piece.duration
             joined[channel].append((min(time, end), Piece(0.0, (value[channel],))))
         now = end
+        final = index + 1 if value["z"] > GROUNDED else final
     parameters = Parameters(
         **{channel: _channel(joined[channel]) for channel in CHANNELS},
         phase_start=np.array(starts),
         origin_world=origin_world,
         origin_yaw=float(origin_yaw),
     )
-    return Compiled(parameters, tuple(phase.name for phase in trajectory.phase), now)
+    return Compiled(parameters, tuple(phase.name for phase in trajectory.phase), now, final)
 
 
 def validate(spec: Trajectory | dict) -> Trajectory:

@@ -30,7 +30,7 @@ class Trajectory:
         self.inputs = (Input(CLOCK, max(1, round(LEAD * exchange.rate))),)
         self._interval, self._interval_ns = exchange.interval, exchange.interval_ns
         compiled = compile(scene[Spec], (0.0, 0.0, start_height(scene)), folder=scene.path.parent)
-        self._parameters, self._phases = compiled.parameters, compiled.phases
+        self._parameters, self._phases, self._final = compiled.parameters, compiled.phases, compiled.final
 
     def prepare(self) -> None:
         """Compile or load the kernel."""
@@ -49,5 +49,6 @@ class Trajectory:
                 r.yaw,
                 r.yaw_rate,
                 self._phases[r.phase],
+                r.phase >= self._final,
             ),
         )

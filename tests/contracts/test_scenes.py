@@ -9,6 +9,7 @@ import pytest
 
 from services.scene import load
 from services.sections import Published, Run
+from studies.flown import Flown
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
@@ -44,3 +45,21 @@ def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
     assert flown["landed"]
     for axis in "xyz":
         assert flown["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis
+
+
+def test_the_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
+    scene = ROOT / "scenes/delivery_full.toml"
+    published = load(scene)[Published].rmse
+    flown = fly(scene, tmp_path)
+    assert flown["landed"]
+    assert flown["sim_time_s"] > 120.0
+    for axis, value in published.items():
+        assert flown["rmse"][axis] < value, axis
+    log = Flown(tmp_path / "log.mcap")
+    t, height = log.times("truth"), log.column("truth", lambda m: m.pose.position.z)
+    thrust = log.column("truth", lambda m: sum(m.rotor_thrust))
+    there, home = ((t > begin) & (t < begin + 4.0) for begin in (13.0, 98.0))  # hovering at 10 m, before and after
+    assert height[there | home].min() > 9.5
+    assert thrust[there].mean() - thrust[home].mean() == pytest.approx(2.0 * 9.81, rel=0.05)
+    end = log.column("truth", lambda m: m.pose.position)[-1]
+    assert abs(end[:2]).max() < 0.1

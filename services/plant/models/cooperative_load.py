@@ -7,11 +7,11 @@ from dynamics.effects._types import Motion
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.lie.ts2 import Swing
+from dynamics.unrolled import each
 from dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
     CooperativeLoadState,
     LiftCommand,
-    each,
     quad_position,
     quad_velocity,
 )

@@ -27,8 +27,12 @@ def test_motors_stop_below_five_centimetres_only_when_asked_to_land():
     assert after(Stage(FLYING, 0.0), 0.049, 0.0, speed=-1.0, asked_speed=-1.0) == LANDED
 
 
-def test_landed_is_for_good():
-    assert after(Stage(LANDED, 0.0), 5.0, 10.0, asked_speed=1.0) == LANDED
+def test_landed_lasts_until_the_mission_climbs_again():
+    assert after(Stage(LANDED, 0.0), 0.0, 0.0) == LANDED
+    assert after(Stage(LANDED, 0.0), 0.0, 0.04, asked_speed=-1.0) == LANDED
+    assert after(Stage(LANDED, 0.0), 5.0, 10.0) == LANDED  # a setpoint that stands in the air is none to start from
+    assert after(Stage(LANDED, 0.0), 0.0, 0.04, asked_speed=1.0) == LANDED
+    assert after(Stage(LANDED, 0.0), 0.0, 0.06, asked_speed=1.0) == FLYING
 
 
 def test_a_vehicle_that_stands_stops_although_its_height_is_estimated_wrong():

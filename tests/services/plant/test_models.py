@@ -17,11 +17,8 @@ from services.scene import SceneError, load
 from services.table import lockstep_services
 
 SCENES = Path(__file__).parents[3] / "scenes"
-SATELLITE, OS4, LOAD = (
-    SCENES / "gyrostat_feedback.toml",
-    SCENES / "os4_experiment_3.toml",
-    SCENES / "cooperative_load.toml",
-)
+SATELLITE, OS4 = SCENES / "gyrostat_feedback.toml", SCENES / "os4_experiment_3.toml"
+LOAD, CRATE = SCENES / "cooperative_load.toml", SCENES / "unload.toml"
 
 
 def ticks(scene, count):
@@ -138,6 +135,8 @@ WRONG = {
         "2 directions that are not zero",
     ),
     "too few directions": (LOAD, "formation.link_direction=[[1, 0, 0]]", "formation.link_direction: expected 2"),
+    "a pack that does not fit": (CRATE, "beer_carrier.depth=0.15", "beer_carrier.pack_size: a pack that fits into"),
+    "friction that grows": (CRATE, "beer_carrier.door_friction=[0.1, 0.2]", "expected [static, dynamic] with 0 < dyn"),
     "a step of zero": (OS4, "solver.step=0", "solver.step: expected a number above 0"),
     "control slower than the exchange": (LOAD, "rates.bodies=100", "rates.bodies: expected exchange.rate = 400 Hz"),
 }

@@ -25,7 +25,7 @@ TURN = math.pi / 2 / 0.3
 
 
 def test_delivery_mission_is_at_each_corner_when_it_should_be():
-    parameters, phases, duration = compile({"phase": DELIVERY}, (0.0, 0.0, 0.35))
+    parameters, phases, duration, _ = compile({"phase": DELIVERY}, (0.0, 0.0, 0.35))
     assert phases == tuple(phase["name"] for phase in DELIVERY)
     assert duration == pytest.approx(60.0 + TURN, abs=1e-12)
     corners = {0.0: (0, 0, 0), 10.0: (0, 0, 10), 15.0: (0, 0, 10), 25.0: (10, 0, 10), 40.0: (10, 10, 10)}
@@ -47,14 +47,14 @@ def test_a_phase_lasts_as_long_as_its_longest_channel_and_the_others_hold():
         "x": {"kind": "ramp", "to": 1.0, "duration": 2.0},
         "y": [RAMP, {"kind": "hold", "duration": 3.0}],
     }
-    parameters, _, duration = compile({"phase": [phase]})
+    parameters, _, duration, _ = compile({"phase": [phase]})
     assert duration == 13.0
     assert evaluate(parameters, 5.0).position_world == (1.0, 5.0, 0.0)
     assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
 
 
 def test_a_step_is_a_jump_that_takes_no_time():
-    parameters, _, duration = compile(
+    parameters, _, duration, _ = compile(
         {"phase": [{"name": "a", "duration": 1.0}, {"name": "b", "x": {"kind": "step", "to": 2.0}}]}
     )
     assert duration == 1.0
@@ -81,7 +81,7 @@ SEGMENTS = st.one_of(
 @settings(deadline=None, max_examples=60)
 def test_everything_but_a_step_joins_continuously(pairs):
     phases = [{"name": str(k), "x": list(pair), "duration": 7.0} for k, pair in enumerate(pairs)]
-    parameters, _, _ = compile({"phase": phases})
+    parameters, *_ = compile({"phase": phases})
     assert all(np.diff(parameters.x.start) > 0.0)
     for start in parameters.x.start[1:]:
         assert channel_at(parameters.x, start)[0] == pytest.approx(channel_at(parameters.x, start - 1e-9)[0], abs=1e-6)
@@ -119,3 +119,12 @@ def test_what_is_wrong_is_said_in_one_line(spec, message):
     with pytest.raises(ValueError, match=r"\A[^\n]+\Z") as error:
         compile(spec, folder=Path())
     assert message in str(error.value)
+
+
+def test_the_last_landing_is_known():
+    up = {"name": "up", "z": {"kind": "ramp", "to": 2.0, "rate": 1.0}}
+    down = {"name": "down", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}}
+    again = [{**up, "name": "up again"}, {**down, "name": "down again"}, {"name": "stand", "duration": 1.0}]
+    assert compile({"phase": [up, down]}).final == 1
+    assert compile({"phase": [up, down, *again]}).final == 3
+    assert compile({"phase": [up]}).final == 1  # never lands: no phase is the last one on the ground

@@ -1,0 +1,56 @@
+"""The same scene with other effects, flown on as many cores as there are."""
+
+import multiprocessing
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+from dynamics import effects
+from services.scene import Scene
+from services.sections import Effects, airframe
+from studies.flight import Trace, fly
+
+Tables = Mapping[str, Any]  # the table of each effect that a variant has
+
+
+def variant(scene: Scene, tables: Tables) -> Scene:
+    """`scene` with these effects instead of its own."""
+    return scene.replaced(Effects.model_validate(dict(tables)))
+
+
+def refusal(scene: Scene, tables: Tables) -> str:
+    """Why a scene cannot have these effects, "" if it can."""
+    try:
+        effects.from_scene(tables, airframe(scene))
+    except ValueError as error:
+        return str(error).removeprefix("effects.")
+    return ""
+
+
+def _fly(scene: Scene) -> Trace:
+    return fly(scene)
+
+
+class Hangar:
+    """Flies variants of one scene side by side; each set of effects is compiled once and kept on disk."""
+
+    def __init__(self, scene: Scene, pool: ProcessPoolExecutor):
+        self._scene, self._pool = scene, pool
+
+    def fly(self, variants: Iterable[Tables]) -> Iterator[Trace]:
+        """The flight of each variant, in order, as they come."""
+        return self._pool.map(_fly, [variant(self._scene, tables) for tables in variants])
+
+
+@contextmanager
+def hangar(scene: Scene) -> Iterator[Hangar]:
+    """A hangar whose processes end with the block."""
+    # spawned: a fork of a process with threads may hang
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(os.cpu_count(), context) as pool:
+        try:
+            yield Hangar(scene, pool)
+        finally:
+            pool.shutdown(cancel_futures=True)

@@ -1,0 +1,113 @@
+"""The unloading crate against closed forms: reaction, door, friction, rollers, bounces; the whole under half steps."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dynamics.integrators import get, march, rate
+from dynamics.lie.quaternion import Quaternion, exp
+from dynamics.tree import retract, scale
+from dynamics.vehicles.beer_carrier import BeerCarrierParameters, energy, initial_state, roller_speed
+
+RK4 = get("rk4_renormalised").Method()
+G, H = 9.81, 2.5e-4
+SIZE, MASS = (0.2, 0.13, 0.23), 2.0
+INERTIA = tuple(MASS / 12 * (sum(s * s for s in SIZE) - side * side) for side in SIZE)
+HALF = tuple(0.5 * s for s in SIZE)
+SURFACE = (2e4, 60.0)
+P = BeerCarrierParameters(
+    MASS, HALF, INERTIA, math.radians(5.0), 0.1, 0.23, 0.075, 0.02, 0.06, 2 * math.pi, 1.0, 1.0, 0.25, 0.15, 0.043,
+    math.pi, 0.002, 50.0, 0.003, 5.0, G, (*SURFACE, 0.5, 0.3), (*SURFACE, 0.2, 0.1), (*SURFACE, 0.5, 0.3),
+)  # fmt: skip
+NEVER = 1e6
+FORWARD = np.array((math.cos(P.tilt), 0.0, -math.sin(P.tilt)))
+
+
+def run(p, x, seconds, start=0.0, h=H):
+    return march(RK4, p, start, x, h, round(seconds / h))
+
+
+def test_the_contact_of_two_that_move_as_one_does_no_work():
+    """Pack and door turn together about the hinge: what the door takes from the pack, the pack gets."""
+    p = P._replace(floor_height=5.0, ramp_start=-1.0, door_damping=0.0, depth=9.0)
+    angle, turning = 1.2, 0.7
+    inward = np.array((-math.cos(angle + p.tilt), 0.0, math.sin(angle + p.tilt)))
+    along = np.array((math.sin(angle + p.tilt), 0.0, math.cos(angle + p.tilt)))
+    hinge = np.array((0.0, 0.0, 5.0))
+    # upright on the door's inner face clear of the rollers, 1 mm deep
+    place = hinge + 0.13 * along + (HALF[0] - 0.001) * inward
+    half = 0.5 * (angle + p.tilt)
+    x = initial_state(p)._replace(
+        position_world=tuple(place),
+        attitude=Quaternion(math.cos(half), 0.0, math.sin(half), 0.0),
+        velocity_world=tuple(turning * np.cross((0, 1, 0), place - hinge)),
+        omega_body=(0.0, turning, 0.0),
+        door=(angle, turning),
+    )
+    tangent = rate(p, 0.0, x)
+    assert np.linalg.norm(np.add(tangent.velocity_world, (0, 0, G))) > 1.0  # there is a force
+    step = 1e-6
+    ahead, behind = (energy(p, 0.0, retract(x, scale(s, tangent))) for s in (step, -step))
+    assert (ahead - behind) / (2 * step) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_door_alone_swings_with_its_period():
+    p = P._replace(gravity=0.0, floor_height=1.0, ramp_start=-1.0, pickup=0.0, door_damping=0.0, door_preload=-1.5)
+    x = run(p, initial_state(p)._replace(position_world=(0.0, 0.0, 5.0), door=(1.0, 0.0)), 1.0)
+    w = math.sqrt(3 * p.door_spring / (p.door_mass * p.door_length**2))
+    assert x.door[0] == pytest.approx(1.5 - 0.5 * math.cos(w), abs=1e-9)
+    assert x.door[1] == pytest.approx(0.5 * w * math.sin(w), abs=1e-9)
+
+
+def test_below_the_friction_angle_the_pack_stands():
+    p = P._replace(ramp_start=NEVER, pickup=NEVER)
+    settled = run(p, initial_state(p), 1.0)
+    later = run(p, settled, 4.0, start=1.0)
+    assert later.position_world == pytest.approx(settled.position_world, abs=1e-7)
+
+
+def test_above_the_friction_angle_it_slides_as_coulomb_says():
+    p = P._replace(tilt=math.radians(35.0), ramp_start=NEVER, pickup=NEVER, depth=9.0)
+    speeds = [np.linalg.norm(run(p, initial_state(p, gap=0.05), t).velocity_world) for t in (0.06, 0.12)]
+    expected = G * (math.sin(p.tilt) - 0.3 * math.cos(p.tilt))
+    assert (speeds[1] - speeds[0]) / 0.06 == pytest.approx(expected, rel=0.02)
+
+
+def test_rollers_carry_the_pack_at_their_surface_speed():
+    p = P._replace(roller_speed=2.5, ramp_start=0.0, ramp_duration=0.2, pickup=NEVER, depth=9.0)
+    x = run(p, initial_state(p, gap=0.1), 0.8)
+    assert np.dot(x.velocity_world, FORWARD) == pytest.approx(2.5 * p.roller_radius, rel=1e-3)
+
+
+def test_the_ramp():
+    assert [roller_speed(P, t) for t in (0.5, 1.5, 9.0)] == pytest.approx([0.0, math.pi, 2 * math.pi])
+
+
+def test_a_fall_bounces_lower_every_time():
+    p = P._replace(pickup=NEVER)
+    x = initial_state(p)._replace(position_world=(1.0, 0.0, 0.2), attitude=exp((0.0, 0.05, 0.0)))
+    at, total, t = [], [], 0.0
+    for _ in range(400):
+        x = run(p, x, 0.005, start=t)
+        t += 0.005
+        at.append(x.position_world[2])
+        total.append(energy(p, t, x._replace(door=(0.0, 0.0))))
+    # between two bounces the energy is that of a free body: its stairs only go down
+    free = [e for e, z in zip(total, at, strict=True) if z > 0.13]
+    assert all(b <= a + 1e-6 for a, b in pairwise(free))
+    assert at[-1] == pytest.approx(HALF[2], abs=1e-3)
+
+
+def test_the_whole_unloading_converges_and_the_door_shuts():
+    coarse, fine = (run(P, initial_state(P), 4.5, h=h) for h in (H, H / 2))
+    assert fine.position_world == pytest.approx(coarse.position_world, abs=2e-3)
+    x, _, z = coarse.position_world
+    assert x > 0.2  # out of the crate
+    assert z < 0.16  # and down
+    assert abs(coarse.position_world[1]) < 1e-9  # a planar motion, as the source has it
+    assert math.degrees(coarse.door[0]) > 95.0
+    shut = run(P, coarse, 4.5, start=4.5)
+    assert abs(math.degrees(shut.door[0])) < 0.5
+    assert shut.position_world[2] > 1.0  # somebody has taken the pack
