@@ -26,7 +26,7 @@ class BusError(RuntimeError):
     """The bus could not be opened."""
 
 
-def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str, lease_ms: int) -> zenoh.Config:
+def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
         "mode": mode,
@@ -37,7 +37,7 @@ def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str, lea
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": lease_ms,
+        "transport/link/tx/lease": LEASE_MS,
     }.items():
         config.insert_json5(key, json.dumps(value))
     return config
@@ -46,23 +46,15 @@ def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str, lea
 class ZenohBus:
     """A session with explicit endpoints, publishers by key, and subscriptions that are queues."""
 
-    def __init__(
-        self, listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer", lease_ms: int = LEASE_MS
-    ):
+    def __init__(self, listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer"):
         """Open the session.
-
-        Args:
-            listen: endpoints where others find it.
-            connect: endpoints of others.
-            mode: Zenoh's: peer, client, router.
-            lease_ms: after this long without a sign of life the others let it go.
 
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
         """
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configuration(listen, connect, mode, lease_ms))
+            self._session = zenoh.open(_configuration(listen, connect, mode))
         except zenoh.ZError as error:
             endpoints = ", ".join(connect if mode == "client" else listen)
             action = "connect to" if mode == "client" else "listen on"

@@ -328,10 +328,7 @@ def service(
         loaded = load(scene, set_ or [])
         flying = lockstep_services(loaded)
         listen, connect = mesh(name, table)
-        settings = {
-            key.lower(): getattr(modules()[name], key) for key in ("MODE", "LEASE_MS") if hasattr(modules()[name], key)
-        }
-        with ZenohBus([*listen, *(open_ or [])], connect, **settings) as bus:
+        with ZenohBus([*listen, *(open_ or [])], connect, getattr(modules()[name], "MODE", "peer")) as bus:
             watched = WATCHER in table and not with_parent
             others = [*flying, RECORDER, WATCHER] if watched else [*flying, RECORDER]
             process = Process(name, loaded, bus, space, others, parse_speed(speed), core)

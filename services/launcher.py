@@ -190,7 +190,9 @@ def _follow(watch: Watch, everybody: dict, needed: set[str], observe: Callable[[
             if code is not None and (code != 0 or (not watch.ended and ended_at is None and not _grace(watch))):
                 raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
         if set(children) <= watch.present and (culprit := watch.frozen(children)):
-            raise RunFailed(culprit)
+            if not _let_go(everybody, needed):
+                raise RunFailed(culprit)
+            watch.last_news = time.monotonic()
         if not watch.present >= set(children):
             watch.last_news = time.monotonic()
         if observe(watch):
@@ -201,6 +203,15 @@ def _follow(watch: Watch, everybody: dict, needed: set[str], observe: Callable[[
                 left = ", ".join(name for name, child in children.items() if child.poll() is None)
                 raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
     observe(watch)
+
+
+def _let_go(everybody: dict, needed: set[str]) -> bool:
+    """Kill those beside the run, one of whom may be frozen and hold it up; says whether there was any."""
+    beside = [child for name, child in everybody.items() if name not in needed and child.poll() is None]
+    for child in beside:
+        child.kill()
+        child.wait()
+    return bool(beside)
 
 
 def _grace(watch: Watch) -> bool:

@@ -2,6 +2,8 @@
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
 from services.autopilot.gains import GainSet, load
 from services.scene import Scene, Section
 from services.sections import airframe
@@ -16,8 +18,9 @@ class Autopilot(Section):
     OPTIONAL: ClassVar[bool] = True
     gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
     estimator: Literal["sensors", "truth"] = "sensors"
-    operator: bool = False  # whether somebody outside, a ground station or a plan, commands it
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
+    operator: bool = False  # whether commands from outside are listened to
+    parameters: dict[str, float] = Field(default_factory=dict)  # of services/parameters.py, by name
 
     def gain_set(self, scene: Scene) -> GainSet:
         """The gain set that the scene names; ValueError if there is none."""

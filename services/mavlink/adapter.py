@@ -10,11 +10,12 @@ from services.mavlink.client import Client
 from services.mavlink.clock import Clock, Instant
 from services.mavlink.dialect import id_of, mavlink
 from services.mavlink.missions import Missions
-from services.mavlink.parameters import Parameter, Parameters
+from services.mavlink.parameters import Parameters
 from services.mavlink.protocols import HANDLERS
 from services.mavlink.requests import Requests
 from services.mavlink.telemetry import STREAMS
 from services.mavlink.vehicle import COMPONENT, Vehicle
+from services.parameters import Parameter
 
 SECOND = 1_000_000_000
 FRESH = 3.5  # [s] after its last heartbeat a ground station counts as gone

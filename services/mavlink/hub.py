@@ -11,9 +11,9 @@ from messages.topics import ESTIMATE, TOPICS, Topic
 from services.mavlink.adapter import Adapter
 from services.mavlink.lateness import Lateness
 from services.mavlink.links import open_link
-from services.mavlink.parameters import Parameter
 from services.mavlink.place import prepare
 from services.mavlink.vehicle import Vehicle
+from services.parameters import Parameter
 
 WAIT = 0.05  # [s] at most until something else is looked at
 

@@ -4,23 +4,16 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 from services.mavlink.client import Client
 from services.mavlink.dialect import mavlink
 from services.mavlink.requests import Requests
+from services.parameters import Parameter
 
 BY_NAME = -1  # the index of a request that gives a name
 UNKNOWN = 0xFFFF  # the index of a parameter outside the list
 PER_STEP = 20  # values of a list sent to one client at each step of the telemetry
-
-
-class Parameter(Protocol):
-    """What is needed of a parameter of services.parameters."""
-
-    name: str
-    default: float
-    whole: bool
 
 
 class Parameters:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from messages.topics import ANSWERS, ESTIMATE, STATUS
 from services.journal import JOURNAL_KEY, entries
 from services.outside import OPERATOR_KEY
+from services.parameters import table
 from services.process import Process
 from services.sections import Exchange
 
 if TYPE_CHECKING:
     from services.mavlink.hub import Options
 
-LEASE_MS = 1000  # a link that is frozen for so long is cut off, before it can hold up the flight
 AT_ONCE = (ESTIMATE, STATUS, ANSWERS)
 
 
@@ -32,7 +32,7 @@ def run(process: Process, options: "Options") -> None:
     interval = process.scene[Exchange].interval_ns
     topics = {process.key(topic): topic for topic in AT_ONCE}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
-    with Hub(Vehicle.of(process.scene), options, (), lambda payload: put(payload, 0)) as hub:
+    with Hub(Vehicle.of(process.scene), options, table(process.scene).values(), lambda payload: put(payload, 0)) as hub:
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
         process.join()
         flying = True

@@ -8,12 +8,12 @@ import socket
 import threading
 import time
 from contextlib import contextmanager
-from typing import NamedTuple
 
 from messages import Answer, Answers, Estimate, OperatorInput, Point, Pose, Quaternion, Status, Vector3, header
 from messages.topics import ANSWERS, ESTIMATE, STATUS
 from services.mavlink.hub import Hub, Options
 from services.mavlink.vehicle import Vehicle
+from services.parameters import Parameter
 from services.scene import load
 
 PERIOD = 0.02  # [s] simulated
@@ -22,19 +22,11 @@ NEAR = 0.3  # [m]
 NONE = 65535
 
 
-class Parameter(NamedTuple):
-    name: str
-    default: float
-    whole: bool = False
-    least: float = -1e3
-    most: float = 1e3
-
-
 PARAMETERS = (
-    Parameter("MIS_TAKEOFF_ALT", 2.5, least=0.5, most=100.0),
-    Parameter("MPC_XY_P", 0.95),
-    Parameter("NAV_DLL_ACT", 2.0, whole=True, least=0.0, most=3.0),
-    *[Parameter(f"FILL_{k}", float(k)) for k in range(40)],
+    Parameter("MIS_TAKEOFF_ALT", "m", 2.5, 0.5, 100.0, ""),
+    Parameter("MPC_XY_P", "1/s", 0.95, -100.0, 100.0, ""),
+    Parameter("NAV_DLL_ACT", "", 2.0, 0.0, 3.0, "", True),
+    *[Parameter(f"FILL_{k}", "", float(k), 0.0, 100.0, "") for k in range(40)],
 )
 
 
