@@ -137,6 +137,14 @@ class Published(Section):
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
 
 
+def follows_trajectory(scene: Scene) -> bool:
+    """Whether the vehicle flies along the scene's `[trajectory]`: there is one, and no operator takes its place."""
+    known = sections()
+    return scene.has(known["trajectory"]) and not (
+        scene.has(known["autopilot"]) and not scene.lookup("autopilot.trajectory")
+    )
+
+
 def needs(scene: Scene, *tables: str) -> None:
     """WrongKeyError if a scene lacks one of these optional tables."""
     for name in tables:
