@@ -168,9 +168,10 @@ def launch(
             try:
                 _follow(Watch(bus, space, topics), children, set(names), observe, errors)
             finally:
+                early = {name for name in beside if children[name].poll() is not None}
                 _ask_to_end(children)  # before this session closes, which takes a while
         _end(children)
-        return {name: _farewell(children[name].returncode, errors[name]) for name in beside}
+        return {name: _farewell(children[name].returncode if name in early else 0, errors[name]) for name in beside}
     finally:
         _end(children)
         for file in errors.values():
