@@ -131,9 +131,7 @@ def main():
             link = ["--mavlink", f"udpout:127.0.0.1:{free_port()}"]
             factors["with"].append(top_speed(folder, *link))
         a, b = median(factors["without"]), median(factors["with"])
-        print(
-            f"lock step at top speed: {a:.2f} x real time without a link, {b:.2f} with one: {100.0 * (b / a - 1):+.1f} %"
-        )
+        print(f"lock step at top speed: {a:.2f} x real time, with a link {b:.2f}: {100.0 * (b / a - 1):+.1f} %")
 
 
 if __name__ == "__main__":
