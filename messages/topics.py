@@ -5,6 +5,7 @@ from typing import Any
 
 from messages.types import (
     Actuators,
+    Answers,
     BatteryState,
     BodyStates,
     Clock,
@@ -15,6 +16,7 @@ from messages.types import (
     MagneticField,
     NavSatFix,
     Odometry,
+    OperatorInput,
     PoseStamped,
     Range,
     Setpoint,
@@ -65,5 +67,7 @@ ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
 LIFT = Topic("{vehicle}/lift", LiftCommand)
 ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
+OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
+ANSWERS = Topic("{vehicle}/answers", Answers, rate="rates.operator")
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

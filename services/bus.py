@@ -83,11 +83,19 @@ class ZenohBus:
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
-    def subscribe(self, *key_expressions: str) -> "Subscription":
-        """Receive what is published on any of the keys, in order of arrival."""
+    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> "Subscription":
+        """Receive what is published on any of the keys, in order of arrival.
+
+        `notify` is called from another thread after each arrival, for those who wait for other things besides.
+        """
         arrived: queue.SimpleQueue = queue.SimpleQueue()
+
+        def take(sample: zenoh.Sample) -> None:
+            arrived.put(sample)
+            notify()  # type: ignore[misc]
+
         for key_expression in key_expressions:
-            handler = zenoh.handlers.Callback(arrived.put, indirect=False)
+            handler = zenoh.handlers.Callback(take if notify else arrived.put, indirect=False)
             self._held.append(self._session.declare_subscriber(key_expression, handler))
         return Subscription(arrived)
 

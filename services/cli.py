@@ -6,13 +6,14 @@ service's process starts quickly.
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from services.mavlink.hub import Hub, Options
     from services.scene import Scene
 
 app = typer.Typer(
@@ -34,6 +35,16 @@ Peers = Annotated[
     str | None,
     typer.Option(metavar="TABLE", help="name=endpoint,... of all participants, when they are started separately"),
 ]
+
+MavlinkUrls = Annotated[
+    list[str] | None,
+    typer.Option("--mavlink", metavar="URL", help="a link to ground stations: udpout:127.0.0.1:14550 (repeatable)"),
+]
+MavlinkKey = Annotated[
+    Path | None,
+    typer.Option("--mavlink-key", metavar="FILE", help="a passphrase: sign, and take only what is signed with it"),
+]
+Insecure = Annotated[bool, typer.Option("--insecure", help="take unsigned MAVLink commands from other machines")]
 
 USER_ERROR = 2
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
@@ -112,6 +123,9 @@ def run(
     open_: Annotated[
         str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
     ] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
 ) -> None:
     """Fly a scene, record it, and report."""
     from services import flight
@@ -123,8 +137,13 @@ def run(
             raise ValueError(f"--mode {mode}: expected processes or single")
         if mode == "single" and (peers is not None or open_ is not None):
             raise ValueError("--mode single: has no network; leave out --peers and --open")
+        if mavlink and (mode == "single" or peers is not None):
+            raise ValueError("--mavlink: belongs to a run in processes; with --peers start the service mavlink instead")
         if open_ is not None:
             flight.check_endpoint("--open", open_)
+        link = _mavlink_arguments(mavlink, mavlink_key, insecure)
+        if mavlink:
+            set_, speed = [*(set_ or []), "autopilot.operator=true"], speed or "1"
         pace = parse_speed(speed)
         loaded, overrides = _decided(scene, set_ or [])
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]
@@ -132,7 +151,24 @@ def run(
         _check_distinct({"SCENE": scene, "--log": log, "--json": json})
         path = _log_path(loaded, log, exists=table is not None)
         _check_writable(json)
-        _fly(loaded, overrides, mode, speed, pace, path, space, table, json, open_)
+        _fly(loaded, overrides, mode, speed, pace, path, space, table, json, open_, link)
+
+
+def _mavlink_arguments(urls: list[str] | None, key: Path | None, insecure: bool) -> list[str]:
+    """The arguments that start the service mavlink; none without a URL. What cannot be is refused now."""
+    if not urls:
+        if key or insecure:
+            raise ValueError(f"{'--mavlink-key' if key else '--insecure'}: expected with --mavlink URL")
+        return []
+    from services.mavlink.channel import read_key
+    from services.mavlink.links import check
+
+    for url in urls:
+        check(url)
+    if key:
+        read_key(key)
+    arguments = [part for url in urls for part in ("--mavlink", url)]
+    return [*arguments, *(["--mavlink-key", str(key)] if key else []), *(["--insecure"] if insecure else [])]
 
 
 def _fly(
@@ -146,19 +182,22 @@ def _fly(
     peers: dict[str, str] | None,
     json: Path | None,
     door: str | None,
+    link: list[str],
 ) -> None:
     from rich.console import Console
 
     from services import flight, summary
     from services.progress import Display
     from services.sections import Run
+    from services.table import MAVLINK
     from studies.flown import Flown
     from studies.report import write as write_report
 
     core = flight.shared_core(scene)
 
     def command(name: str) -> list[str]:
-        extra = ["--log", str(log)] if name == "recorder" else ["--open", str(door)] if name == "router" else []
+        own = {"recorder": ["--log", str(log)], "router": ["--open", str(door)], MAVLINK: link}
+        extra = own.get(name, [])
         pacing = ["--speed", speed] if speed else []
         pacing += ["--core", str(core)] if core is not None else []
         return ["service", name, *flight.scene_arguments(scene.path, overrides), "--space", space, *pacing, *extra]
@@ -172,7 +211,9 @@ def _fly(
         elif peers:
             simulated, wall = flight.fly_joined(scene, peers, space, display)
         else:
-            simulated, wall = flight.fly_processes(scene, command, space, display, door is not None)
+            simulated, wall = flight.fly_processes(
+                scene, command, space, display, door is not None, [MAVLINK] if link else []
+            )
     flown = Flown(log)
     result = {
         "scene": scene.name,
@@ -278,6 +319,9 @@ def service(
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="the recorder's MCAP log")] = None,
     core: Annotated[int | None, typer.Option(metavar="N", help="the core that all lock-step services share")] = None,
     open_: Annotated[list[str] | None, typer.Option("--open", metavar="ENDPOINT", help="the router's door")] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
     with_parent: Annotated[bool, typer.Option("--with-parent", help="end when standard input closes")] = False,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
@@ -286,7 +330,7 @@ def service(
     from services.launcher import WATCHER, check_space
     from services.process import Process, Stopped, run_lockstep
     from services.scene import load
-    from services.table import RECORDER, lockstep_services, modules
+    from services.table import MAVLINK, RECORDER, lockstep_services, modules
 
     with user_errors():
         check_space(space)
@@ -310,10 +354,31 @@ def service(
                 if name in flying:
                     flying[name].prepare()
                     run_lockstep(process, flying[name])
+                elif name == MAVLINK:
+                    modules()[name].run(process, _mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed)))
                 else:
                     modules()[name].run(process, log)
             except Stopped:
                 pass
+
+
+def _mavlink_options(urls: list[str] | None, key: Path | None, insecure: bool, speed: float | None) -> "Options":
+    from services.mavlink.channel import read_key
+    from services.mavlink.hub import Options
+
+    if not urls:
+        raise ValueError("--mavlink: expected at least one URL")
+    return Options(tuple(urls), read_key(key) if key else None, insecure, speed)
+
+
+def _recorded_hub(log: Path, options: "Options") -> "Hub":
+    from services.log import LogReader
+    from services.mavlink.hub import Hub
+    from services.mavlink.vehicle import Vehicle
+
+    with LogReader(log) as recorded:
+        text = recorded.attachments.get("scene.toml", b"").decode()
+    return Hub(Vehicle.recorded(text), options, (), None)
 
 
 @app.command()
@@ -457,6 +522,9 @@ def replay(
     space: Space = "lapwing",
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="where subscribers connect")] = "tcp/127.0.0.1:7447",
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="also write what is published to a log")] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
 ) -> None:
     """Publish a log on Zenoh with its own timing, as the live run did."""
     from services.flight import Stop
@@ -471,8 +539,18 @@ def replay(
         if record and record.resolve() == log.resolve():
             raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
         _check_writable(record)
-        with key_space(space), Stop() as stop:
-            count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None)
+        _mavlink_arguments(mavlink, mavlink_key, insecure)
+        with ExitStack() as stack:
+            hub = None
+            if mavlink:
+                options = _mavlink_options(mavlink, mavlink_key, insecure, pace)
+                hub = stack.enter_context(_recorded_hub(log, options))
+            stack.enter_context(key_space(space))
+            stop = stack.enter_context(Stop())
+            listeners = (hub.replay, hub.wait) if hub else ()
+            count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None, *listeners)
+            for line in hub.report() if hub else ():
+                typer.echo(f"mavlink: {line}")
             stop.check()
         typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
 

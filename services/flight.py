@@ -78,9 +78,22 @@ def prepare(scene: Scene, say: Callable[[str], None]) -> None:
 
 
 def fly_processes(
-    scene: Scene, command: Callable[[str], list[str]], space: str, display: Display, door: bool
+    scene: Scene,
+    command: Callable[[str], list[str]],
+    space: str,
+    display: Display,
+    door: bool,
+    beside: Iterable[str] = (),
 ) -> tuple[float, float]:
-    """Fly with every service in a process of its own, and a router if there is a `door`; (simulated, wall) seconds.
+    """Fly with every service in a process of its own; (simulated, wall) seconds.
+
+    Args:
+        scene: what to fly.
+        command: the arguments of `lapwing` that start a service.
+        space: the key space.
+        display: shows how far it is, and at the end what the services beside had to say.
+        door: whether there is a router.
+        beside: services without which the flight goes on.
 
     Raises:
         RunFailed: a service died or froze.
@@ -90,7 +103,10 @@ def fly_processes(
     clock = _Clock(scene, space, display)
     with key_space(space), Stop() as stop:
         names = [*lockstep_services(scene), RECORDER, *([ROUTER] if door else [])]
-        launch(names, command, space, clock.topics, lambda watch: clock.observe(watch) or stop.number is not None)
+        ended = lambda watch: clock.observe(watch) or stop.number is not None  # noqa: E731
+        for name, words in launch(names, command, space, clock.topics, ended, beside).items():
+            for line in words.splitlines():
+                display.say(f"{name}: {line}")
         stop.check()
     return clock.simulated, clock.wall
 

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from services.bus import ZenohBus, mesh
 from services.process import ALIVE_KEY, WAITING_KEY
@@ -134,8 +135,9 @@ def launch(
     space: str,
     topics: list[str],
     observe: Callable[[Watch], bool],
-) -> None:
-    """Run the services `names` as processes of this one until the run has ended.
+    beside: Iterable[str] = (),
+) -> dict[str, str]:
+    """Run the services `names` as processes of this one until the run has ended; what those beside had to say.
 
     Args:
         names: the services.
@@ -143,17 +145,20 @@ def launch(
         space: the key space.
         topics: Zenoh keys to follow.
         observe: called about five times a second; says whether to stop.
+        beside: services without which the run goes on.
 
     Raises:
         RunFailed: a service died or froze.
         ValueError: a service refused to start; the text says why.
     """
-    endpoints = loopback_endpoints([*names, WATCHER])
+    beside = list(beside)
+    everybody = [*names, *beside]
+    endpoints = loopback_endpoints([*everybody, WATCHER])
     peers = ",".join(f"{name}={endpoint}" for name, endpoint in endpoints.items())
     children: dict[str, subprocess.Popen] = {}
-    errors = {name: tempfile.TemporaryFile() for name in names}  # noqa: SIM115 (closed below, with the processes)
+    errors: dict[str, Any] = {name: tempfile.TemporaryFile() for name in everybody}  # noqa: SIM115 (closed below, with the processes)
     try:
-        for name in names:
+        for name in everybody:
             arguments = [sys.executable, "-m", "services.cli", *command(name), "--peers", peers, "--with-parent"]
             children[name] = subprocess.Popen(
                 arguments, stdin=subprocess.PIPE, stdout=errors[name], stderr=errors[name], start_new_session=True
@@ -161,27 +166,34 @@ def launch(
         listen, connect = mesh(WATCHER, endpoints)
         with ZenohBus(listen, connect) as bus:
             try:
-                _follow(Watch(bus, space, topics), children, observe, errors)
+                _follow(Watch(bus, space, topics), children, set(names), observe, errors)
             finally:
+                early = {name for name in beside if children[name].poll() is not None}
                 _ask_to_end(children)  # before this session closes, which takes a while
+        _end(children)
+        return {name: _farewell(children[name].returncode if name in early else 0, errors[name]) for name in beside}
     finally:
         _end(children)
         for file in errors.values():
             file.close()
 
 
-def _follow(watch: Watch, children: dict, observe: Callable[[Watch], bool], errors: dict) -> None:
+def _follow(watch: Watch, everybody: dict, needed: set[str], observe: Callable[[Watch], bool], errors: dict) -> None:
     ended_at = None
+    children = {name: child for name, child in everybody.items() if name in needed}
     while any(child.poll() is None for child in children.values()):
         watch.poll(0.2)
+        for name, child in everybody.items():
+            if child.poll() == REFUSED:
+                raise ValueError(f"{name}{_last_words(errors[name])}")
         for name, child in children.items():
             code = child.poll()
-            if code == REFUSED:
-                raise ValueError(f"{name}{_last_words(errors[name])}")
             if code is not None and (code != 0 or (not watch.ended and ended_at is None and not _grace(watch))):
                 raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
         if set(children) <= watch.present and (culprit := watch.frozen(children)):
-            raise RunFailed(culprit)
+            if not _let_go(everybody, needed):
+                raise RunFailed(culprit)
+            watch.last_news = time.monotonic()
         if not watch.present >= set(children):
             watch.last_news = time.monotonic()
         if observe(watch):
@@ -192,6 +204,15 @@ def _follow(watch: Watch, children: dict, observe: Callable[[Watch], bool], erro
                 left = ", ".join(name for name, child in children.items() if child.poll() is None)
                 raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
     observe(watch)
+
+
+def _let_go(everybody: dict, needed: set[str]) -> bool:
+    """Kill those beside the run, one of whom may be frozen and hold it up; says whether there was any."""
+    beside = [child for name, child in everybody.items() if name not in needed and child.poll() is None]
+    for child in beside:
+        child.kill()
+        child.wait()
+    return bool(beside)
 
 
 def _grace(watch: Watch) -> bool:
@@ -212,6 +233,13 @@ def _last_words(file: "tempfile._TemporaryFileWrapper") -> str:  # type: ignore[
     file.seek(0)
     lines = file.read().decode(errors="replace").strip().splitlines()
     return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
+
+
+def _farewell(code: int, file: Any) -> str:
+    if code:
+        return f"ended before the flight ({_reason(code)}){_last_words(file)}"
+    file.seek(0)
+    return file.read().decode(errors="replace").strip()
 
 
 def _ask_to_end(children: dict[str, subprocess.Popen]) -> None:

@@ -12,10 +12,15 @@ from messages.topics import Topic
 
 
 class Input(NamedTuple):
-    """A topic that a service needs, `delay` ticks after it was stamped (at least 1 where it closes a loop)."""
+    """A topic that a service needs, `delay` ticks after it was stamped (at least 1 where it closes a loop).
+
+    One that is `external` comes from outside the lock step: nobody waits for it. When it is due, the service's shell
+    joins what has arrived into one message of that tick, records it, and hands it over.
+    """
 
     topic: Topic
     delay: int = 0
+    external: bool = False
 
 
 class Service(Protocol):
@@ -43,6 +48,12 @@ def due(tick: int, period: int, delay: int = 0) -> bool:
     return stamped >= 0 and stamped % period == 0
 
 
+def published(services: Iterable[Service]) -> set[Topic]:
+    """The topics of a run: what its services give, and what comes from outside."""
+    found = {topic for service in services for topic in service.outputs}
+    return found | {i.topic for service in services for i in service.inputs if i.external}
+
+
 def execution_order(services: dict[str, Service]) -> list[str]:
     """An order in which, within one tick, everybody comes after those whose undelayed messages it needs.
 
@@ -52,10 +63,11 @@ def execution_order(services: dict[str, Service]) -> list[str]:
     producer = {topic: name for name, service in services.items() for topic in service.outputs}
     for name, service in services.items():
         for needed in service.inputs:
-            if needed.topic not in producer:
+            if needed.topic not in producer and not needed.external:
                 raise LockStepError(f"{name} needs {needed.topic.name}, which no service of this scene gives")
     waiting = {
-        name: {producer[i.topic] for i in service.inputs if i.delay == 0} - {name} for name, service in services.items()
+        name: {producer[i.topic] for i in service.inputs if i.delay == 0 and not i.external} - {name}
+        for name, service in services.items()
     }
     order: list[str] = []
     while waiting:

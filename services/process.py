@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 from messages.topics import Topic
 from services.bus import ZenohBus
 from services.journal import Outlets
-from services.lockstep import Input, LockStepError, Service
+from services.lockstep import Input, LockStepError, Service, published
+from services.outside import OPERATOR_KEY, Operator, commands, joined, nobody
 from services.scene import Scene
 from services.sections import Exchange, Vehicle, period
 
@@ -151,8 +152,34 @@ class _Port:
         return f"{self._topic.name} of tick {stamp}"
 
 
-def run_lockstep(process: Process, service: Service) -> None:
+class _Outside:
+    """An external input: what has come on the bus until its tick, as one message that is published and recorded."""
+
+    def __init__(self, process: Process, needed: Input, outlets: Outlets, operator: Operator):
+        self._topic, self._outlets, self._operator = needed.topic, outlets, operator
+        self._period = period(process.scene, needed.topic)
+        self._interval = process.scene[Exchange].interval_ns
+        self._get = process.bus.subscribe(f"{process.space}/{OPERATOR_KEY}").get
+
+    def take(self, tick: int) -> Any:
+        """The message of `tick`, None where none is due."""
+        if tick % self._period:
+            return None
+        given = list(self._operator(tick))
+        while arrived := self._get(0.0):
+            given += commands(arrived[1])
+        message = joined(tick * self._interval, given)
+        self._outlets.publish(tick, [(self._topic, message)])
+        return message
+
+
+def run_lockstep(process: Process, service: Service, operator: Operator = nobody) -> None:
     """Step `service` from tick 0 to the last tick of the run.
+
+    Args:
+        process: the participant.
+        service: what it steps.
+        operator: who speaks to its external input, besides those on the bus.
 
     The service that owns time has `finished`, which says after a step that this tick was the last; it also keeps the
     pace. The end travels along the topics: an empty message says that there will be no other.
@@ -161,8 +188,11 @@ def run_lockstep(process: Process, service: Service) -> None:
         Stopped: asked to end.
         LockStepError: a message did not come, or not the one that was due.
     """
-    ports = [_Port(process, needed) for needed in service.inputs]
-    outlets = Outlets(process, service.outputs)
+    outlets = Outlets(process, published([service]))
+    ports = [
+        _Outside(process, needed, outlets, operator) if needed.external else _Port(process, needed)
+        for needed in service.inputs
+    ]
     owns_time = hasattr(service, "finished")
     interval = process.scene[Exchange].interval_ns
     process.join()

@@ -53,6 +53,10 @@ class Display:
         if self._bar:
             self._bar.reset(self._task, total=self._duration, description="")
 
+    def say(self, line: str) -> None:
+        """Print a line."""
+        self._console.print(line, highlight=False, soft_wrap=True)
+
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
         """Show the state at `time_ns`, from the newest payloads of the pose and status topics."""
         text = []

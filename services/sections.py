@@ -65,6 +65,7 @@ class Rates(Section):
     status: int = Field(default=10, gt=0)
     battery: int = Field(default=10, gt=0)
     bodies: int = Field(default=50, gt=0)  # the single bodies of a vehicle that has several
+    operator: int = Field(default=50, gt=0)  # what comes from outside, and the answers
 
     def check(self, scene: Scene) -> None:
         """Every rate divides the exchange rate."""
@@ -134,6 +135,14 @@ class Published(Section):
     TABLE: ClassVar[str] = "published"
     source: str = "published"
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
+
+
+def follows_trajectory(scene: Scene) -> bool:
+    """Whether the vehicle flies along the scene's `[trajectory]`: there is one, and no operator takes its place."""
+    known = sections()
+    return scene.has(known["trajectory"]) and not (
+        scene.has(known["autopilot"]) and not scene.lookup("autopilot.trajectory")
+    )
 
 
 def needs(scene: Scene, *tables: str) -> None:

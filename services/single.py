@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from messages.topics import Topic
-from services.lockstep import Service, execution_order
+from services.lockstep import Service, execution_order, published
+from services.outside import Operator, joined, nobody
 from services.recorder.collate import Collator
 from services.recorder.service import Sink, Writing
 from services.scene import Scene
@@ -35,6 +36,7 @@ def run_single(
     writer: Sink,
     speed: float | None,
     observe: Callable[[int, dict[Topic, bytes]], bool],
+    operator: Operator = nobody,
 ) -> None:
     """Fly `scene` to its end.
 
@@ -45,11 +47,13 @@ def run_single(
         speed: simulated seconds per second, None for as fast as it goes.
         observe: called now and then with the time [ns] and the newest payload of each topic; says
             whether to stop.
+        operator: who speaks to the external inputs.
     """
     interval = scene[Exchange].interval_ns
-    collator = Collator(scene, {t for service in services.values() for t in service.outputs})
+    collator = Collator(scene, published(services.values()))
     writing = Writing(writer, collator, scene[Vehicle].name, interval)
-    consumers: dict = {topic: [] for service in services.values() for topic in service.outputs}
+    consumers: dict = {topic: [] for topic in published(services.values())}
+    outside = [(i.topic, period(scene, i.topic)) for service in services.values() for i in service.inputs if i.external]
     plan = []
     for name in execution_order(services):
         service = services[name]
@@ -57,18 +61,25 @@ def run_single(
         for needed, port in zip(service.inputs, ports, strict=True):
             consumers[needed.topic].append(port.arrived)
         plan.append((service.step, ports))
+
+    def give(tick: int, topic: Topic, message: Any) -> None:
+        payload = message.encode()
+        for arrived in consumers[topic]:
+            arrived.append(payload)
+        collator.add(topic, tick, payload)
+
     owner = next(service for service in services.values() if hasattr(service, "finished"))
     started = next_look = time.perf_counter()
     tick = 0
     while not owner.finished:
         if speed is not None:
             time.sleep(max(0.0, started + tick * interval * 1e-9 / speed - time.perf_counter()))
+        for topic, every in outside:
+            if tick % every == 0:
+                give(tick, topic, joined(tick * interval, operator(tick)))
         for step, ports in plan:
             for topic, message in step(tick, *[port.take(tick) for port in ports]):
-                payload = message.encode()
-                for arrived in consumers[topic]:
-                    arrived.append(payload)
-                collator.add(topic, tick, payload)
+                give(tick, topic, message)
         writing.write_complete()
         if time.perf_counter() >= next_look:
             next_look += LOOK

@@ -14,7 +14,7 @@ import services
 from services.lockstep import Service
 from services.scene import Scene
 
-RECORDER, ROUTER = "recorder", "router"  # the services that take no part in the lock step
+RECORDER, ROUTER, MAVLINK = "recorder", "router", "mavlink"  # the services that take no part in the lock step
 
 
 @cache

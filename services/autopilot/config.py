@@ -2,6 +2,9 @@
 
 from typing import ClassVar, Literal
 
+from pydantic import Field
+
+from services import parameters
 from services.autopilot.gains import GainSet, load
 from services.scene import Scene, Section
 from services.sections import airframe
@@ -17,6 +20,9 @@ class Autopilot(Section):
     gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
     estimator: Literal["sensors", "truth"] = "sensors"
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
+    operator: bool = False  # whether commands from outside are listened to
+    trajectory: bool = True  # follow the scene's [trajectory]; false: stand disarmed and wait for commands
+    parameters: dict[str, float] = Field(default_factory=dict)  # of services/parameters.py, by name
 
     def gain_set(self, scene: Scene) -> GainSet:
         """The gain set that the scene names; ValueError if there is none."""
@@ -29,6 +35,12 @@ class Autopilot(Section):
             self.gain_set(scene)
         except ValueError as error:
             raise ValueError(f"gains: {error}") from None
+        try:
+            parameters.table(scene)
+        except ValueError as error:
+            raise ValueError(f"parameters: {error}") from None
+        if not self.trajectory and not self.operator:
+            raise ValueError("trajectory: false leaves nobody to say what to fly; set operator = true too")
         if (n := len(airframe(scene).rotors.position)) != 4:
             raise ValueError(f"gains: the controller flies vehicles of 4 rotors, this airframe has {n}")
         if self.estimator == "sensors":

@@ -6,16 +6,23 @@ from typing import Any
 from dynamics.cell import Cell, read
 from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.kernel import kernel
+from dynamics.vector import ZERO
 from dynamics.vehicles.multirotor import STANDARD_DENSITY
-from messages import Actuators, Estimate, Point, Pose, Quaternion, Setpoint, Status, Vector3, header
-from messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, Topic
+from messages import Actuators, Answers, Estimate, Point, Pose, Quaternion, Setpoint, Status, Vector3, header
+from messages.topics import ACTUATORS, ANSWERS, ESTIMATE, OPERATOR, SETPOINT, STATUS, Topic
+from services import parameters
 from services.autopilot import control, estimator, gains, interface, navigation
+from services.autopilot.commander.checks import reasons
+from services.autopilot.commander.orders import obey
+from services.autopilot.commander.pilot import Pilot
 from services.autopilot.config import Autopilot as Config
 from services.autopilot.motor import Motor
-from services.autopilot.stage import FLYING, STANDING
+from services.autopilot.stage import FLYING, LANDED, STANDING
 from services.lockstep import Input
 from services.scene import Scene
-from services.sections import Exchange, Rates, airframe, gravity, start_height, ticks
+from services.sections import Exchange, Rates, airframe, follows_trajectory, gravity, period, start_height, ticks
+
+LOOK = 5  # ticks between two looks of the pilot at the estimate
 
 
 def create(scene: Scene) -> "Autopilot | None":
@@ -34,24 +41,47 @@ def steer(p, s, dt, believed, position_world, velocity_world, acceleration_world
 
 
 class Autopilot:
-    """Estimates, then controls, once a tick."""
-
-    outputs = (ACTUATORS, ESTIMATE, STATUS)
+    """Estimates, asks the pilot what to do, then controls, once a tick."""
 
     def __init__(self, scene: Scene):
         config, exchange = scene[Config], scene[Exchange]
         self._navigation = navigation.Truth(scene) if config.estimator == "truth" else navigation.Filter(scene)
-        self.inputs = (Input(SETPOINT), *self._navigation.inputs)
+        follows = follows_trajectory(scene)
+        self._given = Input(SETPOINT) if follows else None
+        self._operator = Input(OPERATOR, external=True) if config.operator else None
+        optional = [needed for needed in (self._given, self._operator) if needed]
+        self.inputs = (*optional, *self._navigation.inputs)
+        self.outputs = (ACTUATORS, ESTIMATE, STATUS)
+        self.outputs += () if follows else (SETPOINT,)
+        self.outputs += (ANSWERS,) if config.operator else ()
         self._interval, self._interval_ns = exchange.interval, exchange.interval_ns
         self._estimate_every = ticks(scene, scene[Rates].estimate, "estimate")
         self._status_every = ticks(scene, scene[Rates].status, "status")
-        self._parameters = Cell(gains.build(config.gain_set(scene), known_airframe(scene), config.attitude == "so3"))
+        self._answers_every = period(scene, ANSWERS)
+        self._gains, self._geometric, self._airframe = (
+            config.gain_set(scene),
+            config.attitude == "so3",
+            known_airframe(scene),
+        )
+        built = gains.build(self._gains, self._airframe, self._geometric)
+        self._parameters = Cell(built)
         self._state, self._stage = Cell(control.START), STANDING
+        self._weight = self._airframe.mass * self._airframe.gravity
+        share = self._weight / (4.0 * built.thrust_max)
+        self._pilot = Pilot(
+            parameters.table(scene),
+            self._airframe.resting_height,
+            self._airframe.gravity,
+            share,
+            follows,
+            config.operator,
+        )
+        self._thrust = 0.0  # [N] asked for at the last tick
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
         self._navigation.prepare()
-        self._steer(Cell(control.START), Setpoint())
+        self._steer(Cell(control.START), interface.Setpoint(ZERO, ZERO, ZERO, 0.0, 0.0))
         read(self._navigation.believed)
 
     def _steer(self, state: Cell, wanted: Any) -> Any:
@@ -60,37 +90,91 @@ class Autopilot:
             state,
             self._interval,
             self._navigation.believed,
-            tuple(wanted.position),
-            tuple(wanted.velocity),
-            tuple(wanted.acceleration),
-            wanted.yaw,
-            wanted.yaw_rate,
+            *wanted,
         )
 
-    def step(self, tick: int, setpoint: Setpoint, *measured: Any) -> Iterator[tuple[Topic, Any]]:
+    def step(self, tick: int, *messages: Any) -> Iterator[tuple[Topic, Any]]:
         """The command at `tick`."""
-        self._navigation.update(tick, self._stage == STANDING, *measured)
-        command, self._stage = self._steer(self._state, setpoint)
-        time_ns = tick * self._interval_ns
-        armed = self._stage == FLYING
-        finished = command.finished and setpoint.final
+        arrived = iter(messages)
+        setpoint = next(arrived) if self._given else None
+        commands = next(arrived) if self._operator else None
+        self._navigation.update(tick, self._stage == STANDING, *arrived)
+        wanted = self._ask(tick, setpoint, commands)
+        command, self._stage = self._steer(self._state, wanted)
+        self._thrust = sum(command.thrust)
+        yield from self._tell(tick, setpoint, wanted, command)
+
+    def _ask(self, tick: int, setpoint: Any, commands: Any) -> Any:
+        """What the pilot wants, having heard the operator."""
+        pilot = self._pilot
+        if tick % LOOK == 0:
+            pilot.estimate = read(self._navigation.believed)
+            pilot.health = pilot.estimate.health
+        for given in commands.commands if commands else ():
+            obey(pilot, given)
+        if pilot.parameters_changed:
+            pilot.parameters_changed = False
+            changed = parameters.with_gains(self._gains, pilot.parameters)
+            self._parameters = Cell(gains.build(changed, self._airframe, self._geometric))
+        wanted = pilot.step(self._interval, setpoint, self._thrust / self._weight, self._stage == LANDED)
+        if not pilot.on_trajectory and not pilot.flying and self._stage != STANDING:
+            self._state, self._stage = Cell(control.START), STANDING
+        return wanted
+
+    def _tell(self, tick: int, setpoint: Any, wanted: Any, command: Any) -> Iterator[tuple[Topic, Any]]:
+        """The messages of a tick."""
+        time_ns, pilot = tick * self._interval_ns, self._pilot
+        flying = self._stage == FLYING
         yield (
             ACTUATORS,
             Actuators(
                 header(time_ns, "body"),
                 command.motor_voltage,
-                armed,
+                flying,
                 command.thrust,
                 Vector3(command.roll_reference, command.pitch_reference, command.yaw_reference),
             ),
         )
         if tick % self._estimate_every == 0:
             yield ESTIMATE, estimate_message(time_ns, read(self._navigation.believed))
+        if self._given is None:
+            yield SETPOINT, Setpoint(header(time_ns, "world"), *wanted_vectors(wanted), pilot.phase, False)
         if tick % self._status_every == 0:
-            yield (
-                STATUS,
-                Status(header(time_ns, "body"), "mission", setpoint.phase, armed, not armed, finished, ""),
-            )
+            over = command.finished and setpoint.final if pilot.on_trajectory else pilot.finished
+            phase = setpoint.phase if pilot.on_trajectory else pilot.phase
+            yield STATUS, status_message(time_ns, pilot, phase, flying, over)
+        if self._operator and tick % self._answers_every == 0:
+            answers, texts = tuple(pilot.answers), tuple(pilot.texts)
+            pilot.answers.clear()
+            pilot.texts.clear()
+            yield ANSWERS, Answers(header(time_ns, "world"), answers, texts)
+
+
+def wanted_vectors(wanted: interface.Setpoint) -> tuple:
+    """A setpoint as the fields of its message."""
+    p, v, a, yaw, yaw_rate = wanted
+    return Vector3(*p), Vector3(*v), Vector3(*a), yaw, yaw_rate
+
+
+def status_message(time_ns: int, pilot: Pilot, phase: str, flying: bool, finished: bool) -> Any:
+    """What the vehicle is doing, as it is published."""
+    armed = flying if pilot.on_trajectory else pilot.armed
+    return Status(
+        header(time_ns, "body"),
+        pilot.mode_name,
+        phase,
+        armed,
+        not flying,
+        finished,
+        pilot.failsafe,
+        pilot.route.current,
+        len(pilot.route.items),
+        pilot.route.reached,
+        pilot.mission_state,
+        pilot.offboard_fresh,
+        tuple(reasons(pilot)) if pilot.operated and not armed else (),
+        bool(pilot.failsafe),
+    )
 
 
 def known_airframe(scene: Scene) -> gains.Airframe:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from messages import WallTime, header
 from messages.topics import WALL_TIME, Topic
 from services.journal import JOURNAL_KEY, entries
+from services.lockstep import published
 from services.log import LogWriter
 from services.process import Process, Stopped
 from services.provenance import attachments, metadata
@@ -22,7 +23,7 @@ def run(process: Process, log: Path) -> None:
     scene = process.scene
     interval, vehicle = scene[Exchange].interval_ns, scene[Vehicle].name
     flying = lockstep_services(scene)
-    collator = Collator(scene, {topic for service in flying.values() for topic in service.outputs})
+    collator = Collator(scene, published(flying.values()))
     journals = process.bus.subscribe(f"{process.space}/{JOURNAL_KEY}/*")
     ended = 0
     with LogWriter(log, metadata(scene, "processes"), attachments(scene)) as writer:

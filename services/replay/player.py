@@ -20,6 +20,8 @@ def play(
     loop: bool,
     record: Path | None,
     stopping: Callable[[], bool],
+    heard: Callable[[str, int, bytes], None] = lambda topic, time_ns, payload: None,
+    wait: Callable[[float], None] = time.sleep,
 ) -> int:
     """Publish a log; how many messages were published.
 
@@ -32,6 +34,8 @@ def play(
         loop: begin again at the end.
         record: a log to write what is published to, None for none.
         stopping: says whether to end.
+        heard: called with each message, for those who are no subscribers.
+        wait: waits so many seconds, or less.
 
     Raises:
         ValueError: the log cannot be read, or has no message in the cut.
@@ -47,10 +51,11 @@ def play(
             while not stopping():
                 started = time.perf_counter()
                 for due in schedule(source.messages(None, cut.start_ns, cut.end_ns), speed):
-                    _wait(started + due.wait, stopping)
+                    _wait(started + due.wait, stopping, wait)
                     if stopping():
                         break
                     puts[due.topic](due.payload, due.time_ns)
+                    heard(due.topic, due.time_ns, due.payload)
                     count += 1
                     if writer:
                         writer.write(due.topic, types[due.topic], due.payload, due.time_ns, due.topic in deterministic)
@@ -75,6 +80,6 @@ def _await_audience(bus: ZenohBus, keys: list[str], stopping: Callable[[], bool]
         time.sleep(0.02)
 
 
-def _wait(when: float, stopping: Callable[[], bool]) -> None:
+def _wait(when: float, stopping: Callable[[], bool], wait: Callable[[float], None]) -> None:
     while (left := when - time.perf_counter()) > 0.0 and not stopping():
-        time.sleep(min(left, 0.1))
+        wait(min(left, 0.1))

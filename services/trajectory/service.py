@@ -7,7 +7,7 @@ from messages import Clock, Setpoint, Vector3, header
 from messages.topics import CLOCK, SETPOINT, Topic
 from services.lockstep import Input
 from services.scene import Scene
-from services.sections import Exchange, start_height
+from services.sections import Exchange, follows_trajectory, start_height
 from services.trajectory.config import Trajectory as Spec
 from services.trajectory.mission import compile
 from services.trajectory.piece import evaluate
@@ -16,8 +16,8 @@ LEAD = 0.1  # [s] the setpoints are ahead of the clock at the most
 
 
 def create(scene: Scene) -> "Trajectory | None":
-    """The signal builder of the scene's `[trajectory]`; None where there is none."""
-    return Trajectory(scene) if scene.has(Spec) else None
+    """The signal builder of the scene's `[trajectory]`; None where nobody flies along one."""
+    return Trajectory(scene) if follows_trajectory(scene) else None
 
 
 class Trajectory:

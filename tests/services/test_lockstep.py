@@ -2,8 +2,8 @@
 
 import pytest
 
-from messages.topics import ACTUATORS, ESTIMATE, IMU, SETPOINT, STATUS, TRUTH
-from services.lockstep import Input, LockStepError, due, execution_order
+from messages.topics import ACTUATORS, ESTIMATE, IMU, OPERATOR, SETPOINT, STATUS, TRUTH
+from services.lockstep import Input, LockStepError, due, execution_order, published
 
 
 class Fake:
@@ -54,3 +54,9 @@ def test_own_messages_do_not_hold_a_service_up():
 )
 def test_due(period, delay, ticks):
     assert [tick for tick in range(6) if due(tick, period, delay)] == ticks
+
+
+def test_nobody_waits_for_what_comes_from_outside_but_it_belongs_to_the_run():
+    services = {"autopilot": Fake([Input(OPERATOR, external=True)], [ACTUATORS])}
+    assert execution_order(services) == ["autopilot"]
+    assert published(services.values()) == {OPERATOR, ACTUATORS}

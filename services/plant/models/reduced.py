@@ -22,7 +22,9 @@ from services.sections import Exchange, Run, Vehicle, active, airframe, needs, p
 def check(scene: Scene) -> None:
     """The airframe's file is there and sound, and somebody flies it."""
     airframe(scene)
-    needs(scene, "autopilot", "trajectory")
+    needs(scene, "autopilot")
+    if not scene.lookup("autopilot.operator"):
+        needs(scene, "trajectory")
 
 
 def create(scene: Scene) -> "Reduced":

@@ -1,0 +1,145 @@
+"""The MAVLink link: what it costs, how evenly its telemetry leaves, and whether it slows the lock step.
+
+    python -m benchmarks.mavlink [--soak]
+
+Processor time: an adapter with one client at PX4's rates in real time, fed by a process of its own kind of messages.
+Jitter: of ATTITUDE at 50 Hz as a client on UDP sees it, in a run at real time. Lock step: the same scene at top speed
+with and without a link. The soak: a client flies 30 simulated minutes at ten times real time, and counts heartbeats.
+"""
+
+import json
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+from pymavlink import mavutil
+
+MISSION = "scenes/delivery_mission.toml"
+SECONDS = 30.0  # of real time for jitter and processor time
+REPEATS = 3
+SOAK, SOAK_SPEED = 1800.0, 10.0  # [s] simulated, simulated seconds per second
+QUIET = 3.0  # [s] of simulation time: a gap between heartbeats that a client takes for a lost link
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def start(scene, folder, *more):
+    command = [sys.executable, "-m", "services.cli", "run", scene, "--space", "bench-mavlink", *more]
+    command += ["--log", str(folder / "flight.mcap"), "--json", str(folder / "figures.json")]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def adapter_ticks(process):
+    """Processor time that the link's process has used [s], None before it is there."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    for child in children:
+        if "mavlink" in Path(f"/proc/{child}/cmdline").read_text().split("\0"):
+            fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
+            return (int(fields[11]) + int(fields[12])) / 100.0
+    return None
+
+
+def percentile(values, share):
+    return sorted(values)[int(share * (len(values) - 1))]
+
+
+def real_time(folder):
+    """Share of a core, jitter (median, p99, worst) [ms], messages per second, and the link's own report."""
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    with start(MISSION, folder, "--mavlink", f"udpout:127.0.0.1:{port}", "--set", f"run.duration={SECONDS}") as run:
+        station.recv_match(type="HEARTBEAT", blocking=True, timeout=300)
+        time.sleep(2.0)  # past the start
+        while station.recv_msg():
+            pass
+        used, began, arrived, count = adapter_ticks(run), time.monotonic(), [], 0
+        while time.monotonic() < began + SECONDS - 8.0:
+            message = station.recv_match(blocking=True, timeout=1.0)
+            count += message is not None
+            if message and message.get_type() == "ATTITUDE":
+                arrived.append(time.perf_counter())
+        elapsed = time.monotonic() - began
+        share = (adapter_ticks(run) - used) / elapsed
+        said, _ = run.communicate(timeout=120)
+    station.close()
+    jitter = [1e3 * abs(b - a - 0.02) for a, b in pairwise(arrived)]
+    report = next((line for line in said.splitlines() if "telemetry" in line), "")
+    return share, (median(jitter), percentile(jitter, 0.99), max(jitter)), count / elapsed, report
+
+
+def top_speed(folder, *more):
+    """Real-time factor of the mission at top speed."""
+    with start(MISSION, folder, "--speed", "max", "--set", "run.duration=20", *more) as run:
+        run.communicate(timeout=300)
+    return json.loads((folder / "figures.json").read_text())["real_time_factor"]
+
+
+def soak(folder):
+    """A client flies up and down for 30 simulated minutes; (simulated [s], wall [s], longest gap [s], flights)."""
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    more = ["--speed", f"{SOAK_SPEED:g}", "--set", "autopilot.trajectory=false", "--set", f"run.duration={SOAK:g}"]
+    gaps, last, flights, airborne, sent, now, asked = [0.0], None, 0, False, 0.0, 0.0, -1e9
+    with start("scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
+        began = None
+        while run.poll() is None:
+            message = station.recv_match(blocking=True, timeout=1.0)
+            if time.monotonic() - sent > 1.0 and last is not None:
+                sent = time.monotonic()
+                station.mav.heartbeat_send(6, 8, 0, 0, 0)
+            if message is None:
+                continue
+            kind = message.get_type()
+            if kind == "ATTITUDE":
+                now = message.time_boot_ms * 1e-3
+            if kind == "HEARTBEAT":
+                began = began or time.monotonic()
+                gaps += [now - last] if last is not None else []
+                last = now
+            if kind == "EXTENDED_SYS_STATE" and now - asked > 5.0:
+                asked, landed = now, message.landed_state == 1
+                flights += airborne and landed
+                airborne = not landed
+                orders = [(400, 1.0), (22,)] if landed else [(21,)]
+                for number, *params in orders:
+                    fields = [*params, *[0.0] * (4 - len(params)), float("nan"), float("nan"), float("nan")]
+                    station.mav.command_long_send(1, 1, number, 0, *fields)
+        wall = time.monotonic() - (began or time.monotonic())
+    station.close()
+    return now, wall, max(gaps), flights
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        share, (middle, p99, worst), rate, report = real_time(folder)
+        print(f"one client at PX4's rates: {100.0 * share:.1f} % of a core, {rate:.0f} messages/s")
+        print(f"50 Hz as the client sees it: jitter median {middle:.2f} ms, p99 {p99:.2f} ms, worst {worst:.1f} ms")
+        print(f"as the link sees it: {report}")
+        factors = {"without": [], "with": []}
+        for _ in range(REPEATS):
+            factors["without"].append(top_speed(folder))
+            link = ["--mavlink", f"udpout:127.0.0.1:{free_port()}"]
+            factors["with"].append(top_speed(folder, *link))
+        a, b = median(factors["without"]), median(factors["with"])
+        print(f"lock step at top speed: {a:.2f} x real time, with a link {b:.2f}: {100.0 * (b / a - 1):+.1f} %")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--soak"]:
+        with tempfile.TemporaryDirectory() as folder_name:
+            simulated, wall, gap, flights = soak(Path(folder_name))
+        print(
+            f"soak: {simulated:.0f} s simulated in {wall:.0f} s, {flights} flights; longest gap {gap:.2f} s simulated"
+        )
+        sys.exit(gap > QUIET or simulated < 0.99 * SOAK)
+    main()

@@ -1,0 +1,1 @@
+"""What the vehicle is to do now: flight modes, missions, failsafes, and the operator's commands."""

@@ -1,0 +1,65 @@
+"""Where the vehicle may be: polygons and circles to stay in or out of; and rally points to return to."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+_POLYGONS, _CIRCLES = ("fence_inclusion", "fence_exclusion"), ("fence_circle_in", "fence_circle_out")
+
+
+def _inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
+    """Whether a point is inside of a polygon: a ray from it crosses the outline an odd number of times."""
+    odd = False
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
+            odd = not odd
+    return odd
+
+
+class Fence:
+    """The fence as it was uploaded."""
+
+    def __init__(self, items: Sequence[Any] = ()):
+        """From items: a circle each, a polygon as many vertices as its first says; ValueError if they make no fence."""
+        self.count = len(items)
+        self._shapes: list[tuple[bool, Any]] = []  # whether to stay in, (x, y, radius) or corners
+        left = list(items)
+        while left:
+            first = left[0]
+            count = 1
+            if first.action in _POLYGONS:
+                count = int(first.values[0]) if first.values else 0
+                if count < 3 or len(left) < count or any(i.action != first.action for i in left[:count]):
+                    raise ValueError(f"fence: expected a polygon of {count} (at least 3) vertices in a row")
+                shape: Any = [(i.position.x, i.position.y) for i in left[:count]]
+            elif first.action in _CIRCLES:
+                if not first.radius > 0.0:
+                    raise ValueError(f"fence: expected a circle of a radius above 0 m, got {first.radius:g}")
+                shape = (first.position.x, first.position.y, first.radius)
+            else:
+                raise ValueError(
+                    f"fence: unknown action {first.action}; expected one of {', '.join(_POLYGONS + _CIRCLES)}"
+                )
+            if not all(map(math.isfinite, [p for i in left[:count] for p in (i.position.x, i.position.y)])):
+                raise ValueError("fence: a place is not finite")
+            self._shapes.append((first.action in ("fence_inclusion", "fence_circle_in"), shape))
+            del left[:count]
+
+    def allows(self, x: float, y: float) -> bool:
+        """Whether the vehicle may be at (x, y) [m] of the world."""
+        for stay_in, shape in self._shapes:
+            if isinstance(shape, tuple):
+                within = math.hypot(x - shape[0], y - shape[1]) <= shape[2]
+            else:
+                within = _inside(x, y, shape)
+            if within != stay_in:
+                return False
+        return True
+
+
+def rally_points(items: Sequence[Any]) -> tuple[tuple[float, float, float], ...]:
+    """Places [m] to return to, from uploaded items; ValueError if one is none."""
+    points = tuple((i.position.x, i.position.y, i.position.z) for i in items)
+    if not all(math.isfinite(v) for point in points for v in point):
+        raise ValueError("rally: a place is not finite")
+    return points

@@ -1,0 +1,30 @@
+"""What all modes have in common."""
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from services.autopilot.commander.pilot import Pilot
+
+HERE = math.nan  # a value that was not given
+
+
+class FlightMode:
+    """One way to lead the guide."""
+
+    needs_flight = False  # whether it can only be entered in the air
+    fresh = False  # whether setpoints from outside have come lately
+    next: str | None = None  # the mode to go on with, once this one has done its work
+
+    @property
+    def phase(self) -> str:
+        """What it does now, for people."""
+        return ""
+
+    def step(self, pilot: "Pilot", dt: float) -> None:
+        """Lead the guide for one tick of dt [s]."""
+
+
+def value(values: tuple[float, ...], index: int) -> float:
+    """A value of a command, NaN where it was not given."""
+    return values[index] if index < len(values) else math.nan

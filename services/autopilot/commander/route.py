@@ -1,0 +1,69 @@
+"""The mission's list of items, and where it stands."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+NONE_REACHED = 65535
+MISSING, WAITING, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
+
+ACTIONS = ("waypoint", "takeoff", "land", "return", "loiter_time", "delay", "jump", "speed", "yaw")
+_PLACED = ("waypoint",)
+
+
+def check(items: Sequence[Any]) -> None:
+    """ValueError (one line) for the first item that cannot be flown."""
+    for number, item in enumerate(items):
+        if item.action not in ACTIONS:
+            raise ValueError(f"item {number}: unknown action {item.action}; expected one of {', '.join(ACTIONS)}")
+        if item.action in _PLACED and not all(map(math.isfinite, item.position)):
+            raise ValueError(f"item {number}: {item.action} needs a place")
+        if math.isinf(item.yaw) or not (math.isfinite(item.hold) and item.hold >= 0.0):
+            raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
+        if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
+            raise ValueError(f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and how often")
+        if item.action == "speed" and not (item.values and item.values[0] > 0.0):
+            raise ValueError(f"item {number}: expected a speed above 0 m/s")
+
+
+class Route:
+    """The items, the one that is flown, and how often each jump was taken."""
+
+    def __init__(self, items: Sequence[Any] = ()):
+        """At the beginning of a mission; ValueError if it cannot be flown."""
+        check(items)
+        self.items = tuple(items)
+        self.current, self.reached = 0, NONE_REACHED
+        self._jumped: dict[int, int] = {}
+
+    @property
+    def item(self) -> Any:
+        """The item that is flown, None after the last."""
+        return self.items[self.current] if self.current < len(self.items) else None
+
+    def select(self, number: int) -> None:
+        """Go on with another item; ValueError if there is none of this number."""
+        if not 0 <= number < len(self.items):
+            raise ValueError(f"no item {number}; the mission has {len(self.items)}")
+        self.current = number
+        self._jumped.clear()
+
+    def advance(self) -> None:
+        """The current item is done: on to the next, or to where a jump leads."""
+        self.reached = self.current
+        self.current += 1
+        for _ in self.items:  # as many jumps in a row as there are items: a ring of jumps must end
+            item = self.item
+            if item is None or item.action != "jump":
+                return
+            taken = self._jumped.get(self.current, 0)
+            if taken < item.values[1]:
+                self._jumped[self.current] = taken + 1
+                self.current = int(item.values[0])
+            else:
+                self.current += 1
+
+    def restart(self) -> None:
+        """From the first item again."""
+        self.current, self.reached = 0, NONE_REACHED
+        self._jumped.clear()

@@ -1,0 +1,4 @@
+"""The link of a real autopilot: MAVLink 2 on one side, the run's topics on the other; nobody else knows MAVLink.
+
+Foreign units and frames (NED, FRD, degrees, millimetres) end here.
+"""

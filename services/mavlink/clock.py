@@ -1,0 +1,25 @@
+"""The two clocks of a link: simulation time, which the vehicle keeps, and wall time, which its partners keep."""
+
+from typing import NamedTuple
+
+
+class Instant(NamedTuple):
+    """A moment on both clocks."""
+
+    time_ns: int = 0  # of the simulation
+    wall: float = 0.0  # [s] monotonic
+
+
+class Clock:
+    """The present moment, and how long ago others were."""
+
+    def __init__(self) -> None:
+        self.now = Instant()
+
+    def since(self, then: Instant) -> float:
+        """Seconds that a partner has had since `then`: by the clock on which fewer have passed.
+
+        In a slow run the partner waits for the simulation, in a fast one it still needs its own wall time: nobody is
+        late before he is late by both.
+        """
+        return min((self.now.time_ns - then.time_ns) * 1e-9, self.now.wall - then.wall)

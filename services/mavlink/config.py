@@ -1,0 +1,15 @@
+"""The `[mavlink]` of a scene: who the vehicle says it is on a MAVLink link."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from services.scene import Section
+
+
+class Mavlink(Section):
+    """How the vehicle presents itself to ground stations."""
+
+    TABLE: ClassVar[str] = "mavlink"
+    system: int = Field(default=1, ge=1, le=250)  # system id; each vehicle of a network needs its own
+    flavour: Literal["px4", "ardupilot"] = "px4"  # whose modes, parameters and mission habits

@@ -1,0 +1,71 @@
+"""World ENU and body FLU to and from MAVLink's NED and FRD, and floats to its whole numbers.
+
+NED is (north, east, down): C = [[0, 1, 0], [1, 0, 0], [0, 0, -1]] of ENU; FRD is D = diag(1, -1, -1) of FLU. Both are
+half turns, so the same functions lead there and back.
+"""
+
+import math
+
+from dynamics.vector import Vec3
+
+Quaternion = tuple[float, float, float, float]  # w, x, y, z
+_S = math.sqrt(0.5)
+
+
+def swap_world(v: Vec3) -> Vec3:
+    """ENU to NED, or NED to ENU."""
+    return v[1], v[0], -v[2]
+
+
+def swap_body(v: Vec3) -> Vec3:
+    """FLU to FRD, or FRD to FLU."""
+    return v[0], -v[1], -v[2]
+
+
+def swap_yaw(yaw: float) -> float:
+    """Angle from east, to the left [rad] to heading from north, to the right, or back; within (-pi, pi]."""
+    return wrap(0.5 * math.pi - yaw)
+
+
+def wrap(angle: float) -> float:
+    """The same angle [rad] within (-pi, pi]; NaN stays NaN."""
+    if not math.isfinite(angle):
+        return math.nan
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+def swap_attitude(q: Quaternion) -> Quaternion:
+    """Body FLU to world ENU as body FRD to world NED, or back; the scalar part is not negative."""
+    w, x, y, z = q
+    # (0, s, s, 0) * q * (0, 1, 0, 0), s = sqrt(1/2): C before, D behind
+    a, b, c, d = -_S * (x + y), _S * (w + z), _S * (w - z), _S * (y - x)
+    turned = (-b, a, d, -c)
+    return tuple(-e for e in turned) if turned[0] < 0.0 else turned  # type: ignore[return-value]
+
+
+def euler(q: Quaternion) -> Vec3:
+    """Roll, pitch, yaw [rad] of a quaternion, in whatever frames it joins."""
+    w, x, y, z = q
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def compass(angle: float) -> int:
+    """Angle from north, to the right [rad] as hundredths of a degree, 0 to 35999; not known: 65535."""
+    return round(math.degrees(angle) * 100.0) % 36000 if math.isfinite(angle) else 0xFFFF
+
+
+def whole(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
+    """The nearest whole number that a field of so many bits holds.
+
+    Args:
+        value: in the field's unit; what does not fit is cut off at the limit.
+        bits: width of the field.
+        unsigned: whether it has no sign.
+        unknown: what stands for a value that is not finite; None: the greatest.
+    """
+    least, most = (0, (1 << bits) - 1) if unsigned else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    if not math.isfinite(value):
+        return most if unknown is None else unknown
+    return max(least, min(most, round(value)))

@@ -1,0 +1,70 @@
+"""What all links have in common."""
+
+import ipaddress
+import re
+import socket
+import time
+from selectors import BaseSelector
+from typing import ClassVar
+
+from services.mavlink.adapter import Adapter
+
+ROUND = 64  # pieces of bytes read from one socket before others get their turn
+PIECE = 2048  # [bytes] a piece is no longer
+LEAST_RATE = 2000.0  # [1/s] pieces that a link always takes; what comes faster is dropped unread
+
+
+class Budget:
+    """How many pieces of bytes a link may read: so many a second, and a second's worth at once."""
+
+    def __init__(self, rate: float = LEAST_RATE):
+        self._rate, self._left, self._then = rate, rate, time.monotonic()
+
+    def take(self) -> bool:
+        """Whether there is one more."""
+        now = time.monotonic()
+        self._left = min(self._rate, self._left + (now - self._then) * self._rate)
+        self._then = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class Link:
+    """A socket or a device that partners are behind. Subclasses read it when the selector says so."""
+
+    SCHEME: ClassVar[str] = ""
+    FORM: ClassVar[str] = ""
+
+    def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
+        """Open it. `rest` is the URL behind its first word; raises OSError."""
+        self.adapter, self.selector, self.budget = adapter, selector, Budget()
+
+    @staticmethod
+    def fits(rest: str) -> bool:
+        """Whether the rest of a URL has this link's form: host and port."""
+        match = re.fullmatch(r"[\w.-]+:(\d+)", rest, re.ASCII)
+        return match is not None and int(match[1]) < 65536
+
+    def affords(self) -> bool:
+        """Whether one more piece may be read; counts it where not."""
+        if self.budget.take():
+            return True
+        self.adapter.counts["faster than a link takes"] += 1
+        return False
+
+    def close(self) -> None:
+        """Close it."""
+        raise NotImplementedError
+
+
+def endpoint(rest: str) -> tuple[str, int]:
+    """Host, as a number, and port; raises OSError for a host that nobody knows."""
+    host, _, port = rest.rpartition(":")
+    return socket.gethostbyname(host), int(port)
+
+
+def is_local(host: str) -> bool:
+    """Whether an address is this machine's own."""
+    return ipaddress.ip_address(host).is_loopback

@@ -1,0 +1,51 @@
+"""A serial line, as a telemetry radio has it. Whoever is at its other end counts as another machine."""
+
+import os
+import re
+import termios
+import tty
+from selectors import BaseSelector
+from typing import ClassVar
+
+from services.mavlink.adapter import Adapter
+from services.mavlink.links.link import Link
+from services.mavlink.links.stream import ByteStream
+
+
+class Serial(Link):
+    """A character device in raw mode."""
+
+    SCHEME: ClassVar[str] = "serial"
+    FORM: ClassVar[str] = "serial:DEVICE:BAUD"
+
+    def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
+        super().__init__(rest, adapter, selector)
+        path, _, baud = rest.rpartition(":")
+        self._descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            tty.setraw(self._descriptor)
+            settings = termios.tcgetattr(self._descriptor)
+            settings[4] = settings[5] = getattr(termios, f"B{baud}")
+            termios.tcsetattr(self._descriptor, termios.TCSANOW, settings)
+        except termios.error as error:
+            os.close(self._descriptor)
+            raise OSError(error.args[0], "is no serial line") from None
+        self._stream: ByteStream | None = ByteStream(
+            self._descriptor, False, adapter, selector, self.affords, self._gone
+        )
+
+    @staticmethod
+    def fits(rest: str) -> bool:
+        """A device and a speed that the system knows."""
+        match = re.fullmatch(r"/.+:(\d+)", rest, re.ASCII)
+        return match is not None and hasattr(termios, f"B{match[1]}")
+
+    def _gone(self) -> None:
+        self._stream = None
+        os.close(self._descriptor)
+
+    def close(self) -> None:
+        """Close the device."""
+        if self._stream:
+            self._stream.end()
+            self._gone()

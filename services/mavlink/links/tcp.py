@@ -1,0 +1,53 @@
+"""TCP: a server that clients connect to."""
+
+import socket
+from selectors import EVENT_READ, BaseSelector
+from typing import ClassVar
+
+from services.mavlink.adapter import Adapter
+from services.mavlink.links.link import Link, endpoint, is_local
+from services.mavlink.links.stream import ByteStream
+
+MOST_CLIENTS = 8
+
+
+class TcpIn(Link):
+    """A listening socket and those who have come."""
+
+    SCHEME: ClassVar[str] = "tcpin"
+    FORM: ClassVar[str] = "tcpin:HOST:PORT"
+
+    def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
+        super().__init__(rest, adapter, selector)
+        self._server = socket.create_server(endpoint(rest))
+        self._server.setblocking(False)
+        self._streams: dict[socket.socket, ByteStream] = {}
+        selector.register(self._server, EVENT_READ, self._accept)
+
+    def _accept(self) -> None:
+        try:
+            connection, address = self._server.accept()
+        except OSError:  # gone again meanwhile
+            return
+        if len(self._streams) >= MOST_CLIENTS:
+            self.adapter.counts["no room for another client"] += 1
+            connection.close()
+            return
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+        def gone() -> None:
+            del self._streams[connection]
+            connection.close()
+
+        self._streams[connection] = ByteStream(
+            connection.fileno(), is_local(address[0]), self.adapter, self.selector, self.affords, gone
+        )
+
+    def close(self) -> None:
+        """Close the server and every connection."""
+        for connection, stream in self._streams.items():
+            stream.end()
+            connection.close()
+        self.selector.unregister(self._server)
+        self._server.close()

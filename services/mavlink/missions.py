@@ -1,0 +1,145 @@
+"""The missions, fences and rally points that the vehicle holds, and uploads on their way."""
+
+from collections import Counter
+from typing import Any
+
+from services.mavlink.client import Client
+from services.mavlink.clock import Clock
+from services.mavlink.dialect import mavlink
+from services.mavlink.mission_items import MOST_ITEMS, Refused, convert
+from services.mavlink.requests import Requests
+
+RETRY, RETRIES = 0.25, 8  # [s] before an item is asked for again, and how often that is done
+KINDS = {  # what the autopilot is asked to take
+    mavlink.MAV_MISSION_TYPE_MISSION: "mission_upload",
+    mavlink.MAV_MISSION_TYPE_FENCE: "fence_upload",
+    mavlink.MAV_MISSION_TYPE_RALLY: "rally_upload",
+}
+_RESULTS = {
+    mavlink.MAV_RESULT_ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED: mavlink.MAV_MISSION_DENIED,
+    mavlink.MAV_RESULT_DENIED: mavlink.MAV_MISSION_DENIED,
+    mavlink.MAV_RESULT_UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
+}
+
+
+class _Upload:
+    """Items that a client is about to hand over, one after the other."""
+
+    def __init__(self, client: Client, kind: int, count: int, clock: Clock):
+        self.client, self.kind, self.count = client, kind, count
+        self.items: list[Any] = []
+        self.asked, self.tries = clock.now, 0
+        self.complete = False
+
+
+class Missions:
+    """What is held of each kind, and who is uploading."""
+
+    def __init__(self, clock: Clock, requests: Requests, home_first: bool, counts: Counter[str]):
+        """`home_first`: the first item of a mission is home, as ArduPilot has it."""
+        self._clock, self._requests, self._home_first, self._counts = clock, requests, home_first, counts
+        self.held: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as they came
+        self._uploads: dict[int, _Upload] = {}
+        self._finished: dict[int, tuple[Client, int]] = {}  # whose the last upload was, and how it ended
+
+    def begin(self, client: Client, kind: int, count: int) -> None:
+        """A client has that many items to hand over."""
+        upload = self._uploads.get(kind)
+        if upload and upload.client is not client:
+            self._counts["upload while another client uploads"] += 1
+            self._acknowledge(client, kind, mavlink.MAV_MISSION_DENIED)
+        elif upload and upload.complete:
+            return  # said twice: the acknowledgement is on its way
+        elif kind not in KINDS:
+            self._acknowledge(client, kind, mavlink.MAV_MISSION_UNSUPPORTED)
+        elif count > MOST_ITEMS:
+            self._counts["too many items"] += 1
+            self._acknowledge(client, kind, mavlink.MAV_MISSION_NO_SPACE)
+        else:
+            upload = self._uploads[kind] = _Upload(client, kind, count, self._clock)
+            self._go_on(upload)
+
+    def take(self, client: Client, m: Any) -> None:
+        """The next item has come, or another one, or one again."""
+        upload = self._uploads.get(m.mission_type)
+        if upload is None or upload.client is not client:
+            self._counts["item that nobody asked for"] += 1
+            whose, result = self._finished.get(m.mission_type, (None, 0))
+            if whose is client:  # it has missed the acknowledgement
+                self._acknowledge(client, m.mission_type, result)
+        elif upload.complete or m.seq < len(upload.items):
+            self._counts["item again"] += 1
+        elif m.seq > len(upload.items):
+            self._counts["item out of order"] += 1
+            self._ask(upload)
+        else:
+            upload.items.append(m)
+            upload.tries = 0
+            self._go_on(upload)
+
+    def cancel(self, client: Client, kind: int) -> None:
+        """A client gives up its upload."""
+        upload = self._uploads.get(kind)
+        if upload and upload.client is client and not upload.complete:
+            del self._uploads[kind]
+
+    def clear(self, client: Client, kind: int) -> None:
+        """Forget what is held."""
+        if kind == mavlink.MAV_MISSION_TYPE_ALL:
+            for other in KINDS:
+                if other not in self._uploads:
+                    self._hand_over(_Upload(client, other, 0, self._clock), told=kind)
+        else:
+            self.begin(client, kind, 0)
+
+    def step(self) -> None:
+        """Ask again for what does not come; give up at last."""
+        for upload in list(self._uploads.values()):
+            if upload.complete or self._clock.since(upload.asked) < RETRY:
+                continue
+            upload.tries += 1
+            if upload.tries > RETRIES:
+                self._counts["upload that stopped"] += 1
+                self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
+            else:
+                self._ask(upload)
+
+    def _go_on(self, upload: _Upload) -> None:
+        if len(upload.items) < upload.count:
+            self._ask(upload)
+            return
+        self._hand_over(upload)
+
+    def _ask(self, upload: _Upload) -> None:
+        upload.asked = self._clock.now
+        to = upload.client.system, upload.client.component
+        upload.client.send(mavlink.MAVLink_mission_request_int_message(*to, len(upload.items), upload.kind))
+
+    def _hand_over(self, upload: _Upload, told: int | None = None) -> None:
+        """All items are there: the autopilot takes them, or they are refused."""
+        try:
+            items = convert(upload.items, self._home_first)
+        except Refused as refused:
+            self._counts["item that cannot be flown"] += 1
+            self._end(upload, refused.result)
+            return
+        upload.complete = True
+
+        def answered(answer: Any) -> None:
+            if answer.result == mavlink.MAV_RESULT_IN_PROGRESS:
+                return
+            if answer.result == mavlink.MAV_RESULT_ACCEPTED:
+                self.held[upload.kind] = upload.items
+            self._end(upload, _RESULTS.get(answer.result, mavlink.MAV_MISSION_ERROR), told)
+
+        self._requests.ask(KINDS[upload.kind], upload.client.name, answered, items=items)
+
+    def _end(self, upload: _Upload, result: int, told: int | None = None) -> None:
+        self._uploads.pop(upload.kind, None)
+        self._finished[upload.kind] = upload.client, result
+        if told is None or upload.kind == max(KINDS):  # of a clearing of everything once, at its end
+            self._acknowledge(upload.client, upload.kind if told is None else told, result)
+
+    def _acknowledge(self, client: Client, kind: int, result: int) -> None:
+        client.send(mavlink.MAVLink_mission_ack_message(client.system, client.component, result, kind))

@@ -1,0 +1,55 @@
+"""Where the vehicle started, and how well it knows where it is."""
+
+import math
+from typing import Any
+
+from messages.topics import ESTIMATE
+from services.mavlink.dialect import mavlink
+from services.mavlink.frames import whole
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import HOME
+
+# What the estimator gives: attitude, velocities, position relative and absolute, height; nothing over terrain.
+_GIVEN = (
+    mavlink.ESTIMATOR_ATTITUDE
+    | mavlink.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink.ESTIMATOR_VELOCITY_VERT
+    | mavlink.ESTIMATOR_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_POS_HORIZ_ABS
+    | mavlink.ESTIMATOR_POS_VERT_ABS
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+)
+
+
+@stream("HOME_POSITION", 0.5)
+def home_position(v: Vehicle) -> Any:
+    """Where it started, and where it returns to."""
+    return mavlink.MAVLink_home_position_message(
+        whole(HOME.latitude_deg * 1e7, 32),
+        whole(HOME.longitude_deg * 1e7, 32),
+        whole(HOME.height * 1e3, 32),
+        *(0.0, 0.0, 0.0),
+        [1.0, 0.0, 0.0, 0.0],
+        *(0.0, 0.0, 0.0),
+        time_usec=v.boot_us,
+    )
+
+
+@stream("GPS_GLOBAL_ORIGIN")
+def global_origin(v: Vehicle) -> Any:
+    """The origin of local positions."""
+    return mavlink.MAVLink_gps_global_origin_message(*v.origin, time_usec=v.boot_us)
+
+
+@stream("ESTIMATOR_STATUS", 0.5, 1.0)
+def estimator_status(v: Vehicle) -> Any:
+    """How far the estimate is to be trusted."""
+    e = v.view.get(ESTIMATE)
+    if e is None:
+        return None
+    spread = math.hypot(e.position_std.x, e.position_std.y)
+    return mavlink.MAVLink_estimator_status_message(
+        v.boot_us, 0 if e.health else _GIVEN, *(0.0,) * 6, spread, e.position_std.z
+    )

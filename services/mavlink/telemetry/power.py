@@ -1,0 +1,67 @@
+"""Motors and battery."""
+
+import math
+from typing import Any
+
+from messages.topics import ACTUATORS, BATTERY
+from services.mavlink.dialect import mavlink
+from services.mavlink.frames import whole
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.vehicle import Vehicle
+
+PULSE_LEAST, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
+OUTPUTS = 8
+CELLS = 10  # that BATTERY_STATUS has room for
+EMPTY = 0xFFFF  # a cell that is not there
+
+
+def motor_shares(v: Vehicle) -> list[float]:
+    """Voltage of each motor as a share of the greatest, 0 to 1."""
+    actuators = v.view.get(ACTUATORS)
+    if actuators is None or v.full_voltage is None:
+        return []
+    return [min(1.0, max(0.0, u / v.full_voltage)) for u in actuators.motor_voltage]
+
+
+@stream("SERVO_OUTPUT_RAW", 5.0, 10.0)
+def servo_output(v: Vehicle) -> Any:
+    """Motor commands as pulse widths."""
+    pulses = [round(PULSE_LEAST + PULSE_SPAN * share) for share in motor_shares(v)[:OUTPUTS]]
+    if not pulses:
+        return None
+    return mavlink.MAVLink_servo_output_raw_message(v.boot_us & 0xFFFFFFFF, 0, *pulses, *[0] * (OUTPUTS - len(pulses)))
+
+
+def remaining(battery: Any) -> int:
+    """Charge that is left [%], -1 for not known."""
+    return whole(100.0 * battery.percentage, 8, unknown=-1)
+
+
+@stream("BATTERY_STATUS", 0.5, 0.5)
+def battery_status(v: Vehicle) -> Any:
+    """The battery, cell by cell."""
+    b = v.view.get(BATTERY)
+    if b is None:
+        return None
+    cells = [whole(1e3 * u, 16, unsigned=True) for u in b.cell_voltage[:CELLS]] or [whole(1e3 * b.voltage, 16, True)]
+    used = 1e3 * (b.design_capacity - b.charge)  # [mA h]
+    return mavlink.MAVLink_battery_status_message(
+        0,
+        mavlink.MAV_BATTERY_FUNCTION_ALL,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        whole(1e2 * b.temperature, 16),
+        cells + [EMPTY] * (CELLS - len(cells)),
+        whole(-1e2 * b.current, 16, unknown=-1),
+        whole(used, 32, unknown=-1),
+        -1,
+        remaining(b),
+        charge_state=mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+    )
+
+
+def power(v: Vehicle) -> tuple[int, int, int]:
+    """Voltage [mV], current [0.01 A] and remaining charge [%] for SYS_STATUS."""
+    b = v.view.get(BATTERY)
+    if b is None or not math.isfinite(b.voltage):
+        return 0xFFFF, -1, -1
+    return whole(1e3 * b.voltage, 16, unsigned=True), whole(-1e2 * b.current, 16, unknown=-1), remaining(b)

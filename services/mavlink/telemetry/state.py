@@ -1,0 +1,127 @@
+"""What the vehicle is doing, and whether it is well."""
+
+import time
+from typing import Any
+
+from messages.topics import ESTIMATE
+from services.mavlink.dialect import mavlink
+from services.mavlink.telemetry.power import power
+from services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.vehicle import Vehicle
+
+NONE = 0xFFFF  # no item of a mission
+
+_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_LOGGING
+)
+_SENSORS = {
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: good_imu,
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: good_mag,
+    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: good_baro,
+    mavlink.MAV_SYS_STATUS_SENSOR_GPS: good_gps,
+}
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+)
+VERSION = (1 << 24) | (16 << 16) | (0 << 8) | 255  # of the PX4 that is passed for: 1.16.0, a release
+
+
+@stream("HEARTBEAT", 1.0)
+def heartbeat(v: Vehicle) -> Any:
+    """I am here, in this mode."""
+    s = v.status
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+    if s.armed:
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    if s.mode == "position_control":
+        base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+    else:
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+    state = mavlink.MAV_STATE_ACTIVE if s.armed else mavlink.MAV_STATE_STANDBY
+    if s.failsafe:
+        state = mavlink.MAV_STATE_CRITICAL
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_QUADROTOR, v.flavour.AUTOPILOT, base, v.flavour.mode_number(s.mode), state, 3
+    )
+
+
+def healthy(v: Vehicle) -> bool:
+    """Whether the estimate is to be trusted."""
+    e = v.view.get(ESTIMATE)
+    return e is not None and e.health == 0
+
+
+@stream("SYS_STATUS", 1.0, 5.0)
+def sys_status(v: Vehicle) -> Any:
+    """Which sensors are there and sound, whether it may be armed, and the battery."""
+    present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
+    sound = _CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_GEOFENCE
+    for bits, good in _SENSORS.items():
+        sound |= bits if (healthy(v) if v.on_truth else good(v)) else 0
+    sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
+    sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)
+
+
+@stream("EXTENDED_SYS_STATE", 1.0, 5.0)
+def extended_state(v: Vehicle) -> Any:
+    """On the ground, in the air, or between."""
+    s = v.status
+    if s.landed:
+        state = mavlink.MAV_LANDED_STATE_ON_GROUND
+    else:
+        between = {"takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF, "land": mavlink.MAV_LANDED_STATE_LANDING}
+        state = between.get(s.mode, mavlink.MAV_LANDED_STATE_IN_AIR)
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
+
+
+@stream("MISSION_CURRENT", 1.0)
+def mission_current(v: Vehicle) -> Any:
+    """How far the mission is."""
+    s = v.status
+    item = 0 if s.mission_current == NONE else s.mission_current
+    flying = 1 if s.mode == "mission" else 2
+    return mavlink.MAVLink_mission_current_message(item, s.mission_count, s.mission_state, flying)
+
+
+@stream("SYSTEM_TIME", 1.0)
+def system_time(v: Vehicle) -> Any:
+    """Time of day, and since the start."""
+    return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, v.boot_ms)
+
+
+@stream("AUTOPILOT_VERSION")
+def autopilot_version(v: Vehicle) -> Any:
+    """What it can do."""
+    nobody = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        _CAPABILITIES, VERSION, VERSION, VERSION, 0, nobody, nobody, nobody, 0, 0, v.system
+    )
+
+
+@stream("TIMESYNC", 10.0)
+def timesync(v: Vehicle) -> Any:
+    """What is your clock?"""
+    return mavlink.MAVLink_timesync_message(0, v.time_ns)
+
+
+@stream("EKF_STATUS_REPORT")
+def ekf_status(v: Vehicle) -> Any:
+    """ArduPilot's word for a sound estimate."""
+    # attitude, velocities, absolute and relative positions: bits 0 to 5 and 8, 9 of EKF_STATUS_FLAGS
+    return mavlink.MAVLink_ekf_status_report_message(0x33F if healthy(v) else 0, *(0.0,) * 5)

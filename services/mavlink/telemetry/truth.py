@@ -1,0 +1,59 @@
+"""What is really so, for clients that test estimators and log analyses."""
+
+import math
+from typing import Any
+
+from messages.topics import TRUTH
+from services.mavlink.dialect import mavlink
+from services.mavlink.frames import swap_world, whole
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.vehicle import Vehicle
+
+MILLI_G = 9.80665e-3  # [m/s^2]
+
+
+@stream("HIL_STATE_QUATERNION", 15.0)
+def true_state(v: Vehicle) -> Any:
+    """The true state; the acceleration is dv/dt along the body's axes."""
+    m, truth = v.view.motion(TRUTH), v.view.get(TRUTH)
+    if m is None:
+        return None
+    latitude, longitude, altitude = m.geodetic
+    air_speed = whole(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
+    acceleration = _to_body(m.attitude, swap_world(tuple(truth.acceleration)))
+    return mavlink.MAVLink_hil_state_quaternion_message(
+        v.boot_us,
+        list(m.attitude),
+        *m.omega_frd,
+        whole(latitude * 1e7, 32),
+        whole(longitude * 1e7, 32),
+        whole(altitude * 1e3, 32),
+        *[whole(u * 1e2, 16) for u in m.velocity_ned],
+        air_speed,
+        air_speed,
+        *[whole(a / MILLI_G, 16) for a in acceleration],
+    )
+
+
+@stream("WIND_COV", 0.5, 1.0)
+def wind(v: Vehicle) -> Any:
+    """The wind that blows."""
+    truth = v.view.get(TRUTH)
+    if truth is None:
+        return None
+    return mavlink.MAVLink_wind_cov_message(
+        v.boot_us, *swap_world(tuple(truth.wind)), 0.0, 0.0, truth.pose.position.z, 0.0, 0.0
+    )
+
+
+def _to_body(q: tuple[float, float, float, float], a: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Components along the body's axes of a vector given along the world's."""
+    w, x, y, z = q
+    # v' = v - 2 u x (w v - u x v) with u the vector part: the inverse rotation
+    c = (y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0])
+    d = (w * a[0] - c[0], w * a[1] - c[1], w * a[2] - c[2])
+    return (
+        a[0] - 2.0 * (y * d[2] - z * d[1]),
+        a[1] - 2.0 * (z * d[0] - x * d[2]),
+        a[2] - 2.0 * (x * d[1] - y * d[0]),
+    )

@@ -1,0 +1,140 @@
+"""Commands: what the autopilot is asked, and what the client hears of its answer."""
+
+import math
+
+import pytest
+from bench import Bench
+
+from messages import Answer
+from services.mavlink.dialect import mavlink
+from services.mavlink.flavours import ardupilot, px4
+
+NAN = math.nan
+
+
+def asked(bench, kind):
+    bench.step(2)
+    return bench.vehicle.kinds[kind].values
+
+
+def test_a_takeoff_above_the_sea_is_one_above_home():
+    bench = Bench()
+    bench.vehicle.armed = True
+    assert bench.partner().command(22, 0.0, 0.0, 0.0, NAN, NAN, NAN, 292.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert asked(bench, "takeoff")[0] == pytest.approx(12.0)  # home lies at 280 m
+
+
+def test_a_takeoff_without_a_height_leaves_it_to_the_parameter():
+    bench = Bench()
+    bench.vehicle.armed = True
+    bench.partner().command(22, NAN, NAN, NAN, NAN, NAN, NAN, NAN)
+    assert math.isnan(asked(bench, "takeoff")[0])
+
+
+def test_ardupilot_counts_a_takeoff_from_home():
+    bench = Bench("mavlink.flavour=ardupilot")
+    bench.vehicle.armed = True
+    bench.partner().command(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0)
+    assert asked(bench, "takeoff")[0] == pytest.approx(12.0)
+
+
+def test_what_a_reposition_does_not_say_stays():
+    bench = Bench()
+    bench.vehicle.armed, bench.vehicle.position = True, [3.0, 4.0, 5.0]
+    bench.step()
+    partner = bench.partner()
+    partner.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, 290.0)
+    x, y, z, yaw, speed = asked(bench, "goto")
+    assert (x, y, z) == pytest.approx((3.0, 4.0, 10.0))
+    assert math.isnan(yaw)
+    assert math.isnan(speed)
+    partner.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, NAN)
+    assert bench.vehicle.mode == "hold"
+
+
+@pytest.mark.parametrize("number", [21, 20, 17])
+def test_what_the_autopilot_refuses_is_refused(number):
+    bench = Bench()
+    bench.vehicle.do_return = bench.vehicle.enter
+    assert bench.partner().command(number) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+def test_progress_is_passed_on_before_the_end():
+    bench = Bench()
+    results = iter([Answer(result=Answer.IN_PROGRESS, progress=0.4)])
+    bench.vehicle.obey = lambda c: next(results)._replace(id=c.id)
+    partner = bench.partner()
+    partner.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
+    bench.step(2)
+    ack = partner.last("COMMAND_ACK")
+    assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
+    number = bench.vehicle.kinds["mission"].id
+    bench.vehicle.answers = [Answer(id=number, result=Answer.ACCEPTED)]
+    bench.step()
+    assert partner.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_an_autopilot_that_does_not_answer_is_answered_for():
+    bench = Bench()
+    bench.vehicle.deaf = {"arm"}
+    partner = bench.partner()
+    assert partner.command(400, 1.0, seconds=1.5) is None
+    bench.step(50)
+    assert partner.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+def test_a_recorded_flight_takes_no_commands():
+    bench = Bench(recorded=True)
+    assert bench.partner().command(400, 1.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+@pytest.mark.parametrize("flavour", [px4, ardupilot])
+def test_every_mode_that_is_shown_can_be_entered(flavour):
+    for mode in ("hold", "mission", "return", "land", "position_control"):
+        assert flavour.mode_kind(flavour.mode_number(mode)) == mode
+
+
+def test_px4s_numbers():
+    assert px4.mode_number("offboard") == 6 << 16
+    assert px4.mode_number("return") == 4 << 16 | 5 << 24
+    assert px4.mode_kind(px4.custom_mode(4.0, 6.0)) == "land"
+    assert px4.mode_kind(1 << 16) is None  # manual
+
+
+def test_velocities_along_the_vehicles_axes_are_turned():
+    bench = Bench()
+    bench.vehicle.yaw = 0.5 * math.pi  # north
+    bench.step()
+    partner = bench.partner()
+    mask = 0b0000_1101_1100_0111  # velocities only
+    partner.send("set_position_target_local_ned", 0, 1, 1, 8, mask, 0, 0, 0, 2.0, 1.0, -0.5, 0, 0, 0, 0, 0)
+    values = asked(bench, "offboard_position")
+    assert values[3:6] == pytest.approx((1.0, 2.0, 0.5))  # forward is north, right is east
+    assert all(map(math.isnan, (*values[:3], *values[6:])))
+
+
+def test_offsets_count_from_the_vehicle():
+    bench = Bench()
+    bench.vehicle.position, bench.vehicle.yaw = [1.0, 2.0, 3.0], 0.0  # east
+    bench.step()
+    partner = bench.partner()
+    mask = 0b0000_1101_1111_1000
+    partner.send("set_position_target_local_ned", 0, 1, 1, 12, mask, 5.0, 0, -1.0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert asked(bench, "offboard_position")[:3] == pytest.approx((6.0, 2.0, 4.0))
+
+
+def test_sticks_point_where_the_pilot_pushes():
+    bench = Bench()
+    bench.partner().send("manual_control", 1, 500, 1000, 750, -1000, 0)
+    assert asked(bench, "manual") == pytest.approx((0.5, -1.0, 0.5, 1.0))
+
+
+def test_a_heartbeat_keeps_the_link_for_a_while():
+    bench = Bench()
+    partner = bench.partner()
+    partner.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    links = []
+    bench.vehicle.do_link = lambda c: links.append(bench.vehicle.seconds)
+    bench.step(500)
+    assert len(links) == 4
+    assert links[-1] < 4.0

@@ -1,0 +1,67 @@
+"""Frames: against rotation matrices written out, and the words of the compass."""
+
+import math
+
+import numpy as np
+import pytest
+
+from services.mavlink.frames import euler, swap_attitude, swap_body, swap_world, swap_yaw, whole, wrap
+
+C = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
+D = np.diag([1, -1, -1.0])
+
+
+def matrix(q):
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def test_vectors_are_permuted_as_the_matrices_say():
+    v = (1.0, 2.0, 3.0)
+    np.testing.assert_array_equal(swap_world(v), C @ v)
+    np.testing.assert_array_equal(swap_body(v), D @ v)
+
+
+def test_attitude_is_the_product_of_the_matrices():
+    for seed in range(20):
+        q = np.random.default_rng(seed).normal(size=4)
+        q /= np.linalg.norm(q)
+        turned = swap_attitude(tuple(q))
+        np.testing.assert_allclose(matrix(turned), C @ matrix(q) @ D, atol=1e-14)
+        assert turned[0] >= 0.0
+        np.testing.assert_allclose(matrix(swap_attitude(turned)), matrix(q), atol=1e-14)
+
+
+def test_facing_east_is_heading_90_degrees():
+    assert math.degrees(euler(swap_attitude((1.0, 0.0, 0.0, 0.0)))[2]) == pytest.approx(90.0)
+    assert math.degrees(swap_yaw(0.0)) == pytest.approx(90.0)
+    assert swap_yaw(swap_yaw(0.3)) == pytest.approx(0.3)
+
+
+def test_nose_up_is_positive_pitch_and_right_side_down_positive_roll():
+    up = swap_attitude((math.cos(-0.1), 0.0, math.sin(-0.1), 0.0))  # FLU: a turn about y to the left lifts by -0.2
+    assert euler(up)[1] == pytest.approx(0.2)
+    right = swap_attitude((math.cos(0.1), math.sin(0.1), 0.0, 0.0))
+    assert euler(right)[0] == pytest.approx(0.2)
+
+
+def test_angles_are_wrapped():
+    assert wrap(3.5 * math.pi) == pytest.approx(-0.5 * math.pi)
+    assert wrap(math.pi) == math.pi
+    assert math.isnan(wrap(math.nan))
+    assert math.isnan(wrap(math.inf))
+
+
+def test_whole_numbers_are_cut_off_at_the_limits_of_their_field():
+    assert whole(1.6, 8) == 2
+    assert whole(1e9, 16) == 32767
+    assert whole(-1e9, 16) == -32768
+    assert whole(-1.0, 16, unsigned=True) == 0
+    assert whole(math.nan, 16, unsigned=True) == 65535
+    assert whole(math.inf, 8, unknown=-1) == -1

@@ -1,0 +1,228 @@
+"""What nobody should send: refused as the protocol says, counted, and the vehicle undisturbed."""
+
+import random
+import socket
+import time
+
+import pytest
+from bench import Bench, item
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from stand_in import flying, free_port, until
+
+from services.mavlink.dialect import mavlink
+from services.mavlink.protocols import HANDLERS
+from services.mavlink.protocols.commands import RULES
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.fixture(scope="module")
+def shared():
+    return Bench()
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.binary(max_size=600))
+def test_random_bytes_do_nothing(shared, data):
+    partner = shared.partner()
+    partner.raw(data)
+    partner.raw(b"\xfd" + data)
+    shared.adapter.disconnect(partner.client)
+    shared.partners.clear()
+    assert set(shared.vehicle.kinds) <= {"link"}
+
+
+def frames(bench):
+    """A sound frame of every kind of message the dialect has, all fields zero."""
+    codec = mavlink.MAVLink(None, 255, 190)
+    for cls in mavlink.mavlink_map.values():
+        fields = []
+        for field, kind in zip(cls.fieldnames, cls.fieldtypes, strict=True):
+            length = cls.array_lengths[cls.ordered_fieldnames.index(field)]
+            fields.append(b"" if kind == "char" else [0] * length if length > 1 else 0)
+        yield cls(*fields).pack(codec)
+
+
+def test_every_message_there_is_with_zeros_and_cut_short_and_damaged():
+    bench = Bench()
+    partner = bench.partner()
+    chance = random.Random(1)
+    for frame in frames(bench):
+        partner.raw(frame)
+        partner.raw(frame[: chance.randrange(len(frame))])
+        damaged = bytearray(frame)
+        damaged[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
+        partner.raw(bytes(damaged))
+    bench.step(5)
+    assert bench.counts["wrong checksum"] > 50
+    assert not bench.vehicle.armed
+
+
+ODD = {
+    "float": [0.0, 1.0, -1.0, NAN, INF, -INF, 1e38, -1e38, 40.7, 400.0],
+    "double": [0.0, NAN, INF],
+    "int": [0, 1, 2, 3, 16, 255, 2**15, 2**31 - 1, 2**63 - 1, -1, -(2**31)],
+}
+
+
+def test_every_message_that_is_answered_with_odd_values():
+    bench = Bench()
+    partner = bench.partner()
+    bench.step(2)
+    chance = random.Random(2)
+    for _ in range(150):
+        for number in HANDLERS:
+            partner.raw(odd(mavlink.mavlink_map[number], chance).pack(partner.codec))
+        bench.step()
+    assert bench.counts["received"] > 3000
+
+
+def odd(cls, chance):
+    """A message for us whose other fields are unusual."""
+
+    def value(kind):
+        if kind in ODD:
+            return chance.choice(ODD[kind])
+        bits, signed = int(kind.removeprefix("u").removeprefix("int").partition("_")[0]), not kind.startswith("u")
+        picked = chance.choice(ODD["int"]) & (1 << bits) - 1
+        return picked - (1 << bits) if signed and picked >> bits - 1 else picked
+
+    fields = []
+    for field, kind in zip(cls.fieldnames, cls.fieldtypes, strict=True):
+        length = cls.array_lengths[cls.ordered_fieldnames.index(field)]
+        if kind == "char":
+            fields.append(chance.choice([b"", b"MPC_XY_P", b"\xff\xfe", b"X" * length]))
+        elif field in ("target", "target_system", "target_component"):
+            fields.append(chance.choice([0, 1]))
+        elif field == "command":
+            fields.append(chance.choice(list(RULES)))
+        else:
+            fields.append([value(kind) for _ in range(length)] if length > 1 else value(kind))
+    return cls(*fields)
+
+
+def test_a_vehicle_that_has_lost_its_mind_is_still_reported():
+    bench = Bench()
+    partner = bench.partner()
+    bench.vehicle.armed, bench.vehicle.mode = True, "offboard"
+    for bad in (NAN, INF, 1e30):
+        bench.vehicle.setpoint = (bad,) * 11
+        bench.vehicle.position, bench.vehicle.yaw = [bad] * 3, NAN
+        bench.step(60)
+    assert partner.last("HEARTBEAT")
+
+
+def test_a_wrong_checksum_costs_only_its_own_frame():
+    bench = Bench()
+    partner = bench.partner()
+    good = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(partner.codec)
+    bad = good[:-1] + bytes([good[-1] ^ 1])
+    partner.raw(bad + good)
+    assert partner.last("PARAM_VALUE").param_id == "MPC_XY_P"
+    assert bench.counts["wrong checksum"] == 1
+
+
+def test_others_commands_are_not_ours():
+    bench = Bench()
+    partner = bench.partner()
+    for system, component in ((2, 1), (1, 100)):
+        partner.send("command_long", system, component, 400, 0, 1.0, *(0.0,) * 6)
+    bench.step(3)
+    assert not bench.vehicle.armed
+    assert partner.last("COMMAND_ACK") is None
+    assert bench.counts["for another vehicle"] == 2
+
+
+@pytest.mark.parametrize("count", [1001, 10_000, 65_535])  # -1 is 65 535 on the wire
+def test_missions_of_too_many_items_are_refused_at_once(count):
+    bench = Bench()
+    partner = bench.partner()
+    partner.send("mission_count", 1, 1, count, 0)
+    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_NO_SPACE
+    assert partner.last("MISSION_REQUEST_INT") is None
+
+
+def test_a_mission_of_a_kind_that_is_none():
+    bench = Bench()
+    partner = bench.partner()
+    partner.send("mission_count", 1, 1, 3, 77)
+    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
+    partner.send("mission_item_int", *item(0, kind=77))
+    partner.send("mission_request_int", 1, 1, 5, 0)
+    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+
+
+@pytest.mark.parametrize(
+    ("number", "params", "result"),
+    [
+        (400, (NAN,), mavlink.MAV_RESULT_DENIED),
+        (400, (7.0,), mavlink.MAV_RESULT_DENIED),
+        (22, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, INF), mavlink.MAV_RESULT_DENIED),
+        (192, (-1.0, 0.0, 0.0, NAN, 1e9, 0.0, 10.0), mavlink.MAV_RESULT_DENIED),
+        (176, (NAN, 4.0, 3.0), mavlink.MAV_RESULT_DENIED),
+        (176, (1.0, 99.0, 0.0), mavlink.MAV_RESULT_UNSUPPORTED),
+        (511, (NAN, 1e5), mavlink.MAV_RESULT_DENIED),
+        (511, (99_999.0, 1e5), mavlink.MAV_RESULT_UNSUPPORTED),
+        (511, (30.0, NAN), mavlink.MAV_RESULT_UNSUPPORTED),
+        (511, (30.0, INF), mavlink.MAV_RESULT_DENIED),
+        (510, (-1.0,), mavlink.MAV_RESULT_DENIED),
+        (512, (INF,), mavlink.MAV_RESULT_DENIED),
+        (224, (1e30,), mavlink.MAV_RESULT_DENIED),
+        (60_000, (), mavlink.MAV_RESULT_UNSUPPORTED),
+        (203, (), mavlink.MAV_RESULT_UNSUPPORTED),
+    ],
+)
+def test_senseless_commands_are_answered(number, params, result):
+    assert Bench().partner().command(number, *params) == result
+
+
+@pytest.mark.parametrize("bad", [NAN, INF, -INF, 1e38])
+def test_senseless_setpoints_leave_the_vehicle_where_it_is(bad):
+    bench = Bench()
+    partner = bench.partner()
+    bench.vehicle.armed = True
+    partner.send("set_attitude_target", 0, 1, 1, 0, [bad] * 4, bad, bad, bad, bad)
+    partner.send("set_position_target_local_ned", 0, 1, 1, 99, 0, *(bad,) * 11)
+    partner.send("set_position_target_global_int", 0, 1, 1, 6, 0, 2**31 - 1, -(2**31), *(bad,) * 9)
+    bench.step(5)
+    assert bench.vehicle.position == [0.0, 0.0, 0.0]
+
+
+def test_intervals_that_are_too_short_do_not_flood_the_client():
+    bench = Bench()
+    partner = bench.partner()
+    assert partner.command(511, 30.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # ATTITUDE each microsecond
+    partner.got.clear()
+    bench.step(50)
+    assert len(partner.all("ATTITUDE")) == 50
+
+
+def test_a_flood_is_bounded_and_the_vehicle_flies_on():
+    port = free_port()
+    frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
+    with flying(f"udpin:127.0.0.1:{port}") as running, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as attacker:
+        attacker.connect(("127.0.0.1", port))
+        before, end = running.vehicle.time_ns, time.monotonic() + 1.5
+        sent = 0
+        while time.monotonic() < end:
+            for _ in range(50):
+                attacker.send(frame)
+            sent += 50
+        assert running.vehicle.time_ns > before + 2e8
+        assert until(lambda: running.counts["faster than a link takes"] > 0 or sent < 5000)
+        assert running.counts["received"] < 8000
+
+
+def test_many_strangers_get_no_room():
+    port = free_port()
+    with flying(f"udpin:127.0.0.1:{port}") as running:
+        sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(12)]
+        for k, s in enumerate(sockets):
+            heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(mavlink.MAVLink(None, 200 + k, 1))
+            s.sendto(b"nonsense", ("127.0.0.1", port))
+            s.sendto(heartbeat, ("127.0.0.1", port))
+        assert until(lambda: running.counts["no room for another client"] >= 4)
+        assert len(running.hub.adapter.clients) == 8
+        for s in sockets:
+            s.close()

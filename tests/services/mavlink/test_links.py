@@ -1,0 +1,73 @@
+"""Links: frames in pieces over TCP and a serial line; and the measure of their evenness."""
+
+import os
+import pty
+import socket
+import time
+
+import pytest
+from stand_in import flying, free_port, until
+
+from services.mavlink.dialect import mavlink
+from services.mavlink.lateness import Lateness
+from services.mavlink.links.link import Budget
+
+
+def frame():
+    return mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(mavlink.MAVLink(None, 255, 190))
+
+
+def heard(read):
+    codec, found = mavlink.MAVLink(None), []
+    codec.robust_parsing = True
+
+    def look():
+        found.extend(m.get_type() for m in codec.parse_buffer(read()) or ())
+        return "PARAM_VALUE" in found
+
+    return until(look)
+
+
+def test_frames_in_pieces_over_tcp_and_a_client_that_goes():
+    port = free_port(socket.SOCK_STREAM)
+    with flying(f"tcpin:127.0.0.1:{port}") as running:
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            for byte in frame():
+                client.sendall(bytes([byte]))
+                time.sleep(0.001)
+            assert heard(lambda: client.recv(4096))
+        assert until(lambda: not running.hub.adapter.clients)
+
+
+def test_a_serial_line_is_watched_but_not_obeyed():
+    master, slave = pty.openpty()
+    with flying(f"serial:{os.ttyname(slave)}:57600") as running:
+        os.write(master, frame())
+        assert heard(lambda: os.read(master, 4096))
+        arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1.0, *(0.0,) * 6).pack(mavlink.MAVLink(None, 255, 190))
+        os.write(master, arm)
+        assert until(lambda: running.counts["command from another machine"])
+        assert not running.vehicle.armed
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_port_that_is_taken_is_named():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        url = f"tcpin:127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(ValueError, match=f"--mavlink {url}: address already in use"), flying(url):
+            pass
+
+
+def test_a_budget_is_a_seconds_worth():
+    budget = Budget(100.0)
+    assert 100 <= sum(budget.take() for _ in range(1000)) < 200
+
+
+def test_jitter_is_the_step_beyond_its_due_and_lateness_the_widest_lag():
+    lateness = Lateness(2.0)
+    for simulated, wall in ((0.0, 10.0), (0.02, 10.01), (0.04, 10.025), (0.06, 10.03)):
+        lateness.note(simulated, wall)
+    assert lateness.jitter() == pytest.approx([0.0, 0.005, 0.005])
+    assert lateness.behind() == pytest.approx(0.005)
+    assert "no pace" in Lateness(None).report()

@@ -1,0 +1,205 @@
+"""MAVSDK, a client that we did not write, flies the vehicle through the link."""
+
+import asyncio
+import math
+import socket
+import time
+
+import pytest
+from stand_in import PARAMETERS, flying, free_port
+
+mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
+from mavsdk.action import ActionError  # noqa: E402
+from mavsdk.mission import MissionItem, MissionPlan  # noqa: E402
+from mavsdk.mission_raw import MissionItem as RawItem  # noqa: E402
+from mavsdk.mission_raw import MissionRawError  # noqa: E402
+from mavsdk.offboard import (  # noqa: E402
+    Attitude,
+    OffboardError,
+    PositionNedYaw,
+    VelocityBodyYawspeed,
+    VelocityNedYaw,
+)
+from mavsdk.param import ParamError  # noqa: E402
+
+END = 60.0  # [s] a session is held to have failed after
+SPEED = 2.0  # simulated seconds per second
+
+
+async def first(stream, true):
+    """The first value of a stream of which something is so."""
+    async for value in stream:
+        if true(value):
+            return value
+
+
+async def connected(port):
+    drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
+    await drone.connect(system_address=f"udpin://127.0.0.1:{port}")
+    await first(drone.core.connection_state(), lambda state: state.is_connected)
+    await first(drone.telemetry.health_all_ok(), bool)
+    return drone
+
+
+def session(story):
+    """Tell a story, of a drone and the vehicle behind it, against the clock."""
+    port = free_port()
+
+    async def tell(running):
+        drone = await connected(port)
+        try:
+            await story(drone, running.vehicle)
+        finally:
+            drone._stop_mavsdk_server()
+
+    with flying(f"udpout:127.0.0.1:{port}", speed=SPEED) as running:
+        asyncio.run(asyncio.wait_for(tell(running), END))
+    return running
+
+
+def test_arm_take_off_go_to_return_land_disarm():
+    async def story(drone, vehicle):
+        await drone.action.set_takeoff_altitude(4.0)
+        assert await drone.action.get_takeoff_altitude() == 4.0
+        await drone.action.arm()
+        await drone.action.takeoff()
+        up = await first(drone.telemetry.position(), lambda p: p.relative_altitude_m > 3.8)
+        assert await first(drone.telemetry.in_air(), bool)
+        north = up.latitude_deg + 10.0 / 111_000
+        await drone.action.goto_location(north, up.longitude_deg, up.absolute_altitude_m + 2.0, 90.0)
+        await first(drone.telemetry.position(), lambda p: abs(p.latitude_deg - north) < 5e-6)
+        assert vehicle.kinds["goto"].values[3] == pytest.approx(0.0, abs=1e-6)  # east
+        await drone.action.hold()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await drone.action.return_to_launch()
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+        await drone.action.arm()
+        await drone.action.takeoff()
+        await first(drone.telemetry.in_air(), bool)
+        await drone.action.land()
+        await first(drone.telemetry.landed_state(), lambda state: str(state) == "ON_GROUND")
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+    assert session(story).vehicle.kinds["link"].source.startswith("245/")
+
+
+def test_a_refused_command_is_told_with_its_reason():
+    async def story(drone, vehicle):
+        vehicle.prearm = ("no GPS fix",)
+        await first(drone.telemetry.health(), lambda health: not health.is_armable)
+        told = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "no GPS fix" in s.text))
+        await asyncio.sleep(0.3)
+        with pytest.raises(ActionError, match="DENIED"):
+            await drone.action.arm()
+        assert "cannot arm" in (await told).text
+        with pytest.raises(ActionError):
+            await drone.action.takeoff()
+        assert not vehicle.armed
+
+    session(story)
+
+
+def test_missions_go_up_and_down_are_flown_paused_and_cleared():
+    def item(north, up):
+        return MissionItem(
+            40.7686 + north / 111_000, 14.7907, up, 5.0, True, math.nan, math.nan, MissionItem.CameraAction.NONE,
+            math.nan, math.nan, math.nan, math.nan, math.nan, MissionItem.VehicleAction.NONE,
+        )  # fmt: skip
+
+    async def story(drone, vehicle):
+        plan = MissionPlan([item(5.0, 5.0), item(25.0, 8.0), item(0.0, 3.0)])
+        await drone.mission.upload_mission(plan)
+        down = await drone.mission.download_mission()
+        assert [(i.latitude_deg, i.relative_altitude_m) for i in down.mission_items] == [
+            (pytest.approx(i.latitude_deg, abs=1e-7), i.relative_altitude_m) for i in plan.mission_items
+        ]
+        assert {i.action for i in vehicle.items} <= {"waypoint", "speed", "delay"}
+        await drone.action.arm()
+        await drone.mission.start_mission()
+        await first(drone.mission.mission_progress(), lambda p: p.current >= 1)
+        await drone.mission.pause_mission()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await drone.mission.start_mission()
+        await first(drone.mission.mission_progress(), lambda p: p.current == p.total == 3)
+        assert await drone.mission.is_mission_finished()
+        await drone.mission.clear_mission()
+        assert vehicle.items == ()
+        fence = RawItem(0, 3, 5003, 0, 1, 50.0, 0.0, 0.0, 0.0, 407686000, 147907000, 0.0, 1)
+        await drone.mission_raw.upload_geofence([fence])
+        assert vehicle.fences[0].action == "fence_circle_in"
+        await drone.mission_raw.upload_rally_points(
+            [RawItem(0, 3, 5100, 0, 1, *(0.0,) * 4, 407687000, 147907000, 5.0, 2)]
+        )
+        assert vehicle.rally[0].position.y == pytest.approx(11.1, abs=0.1)
+        with pytest.raises(MissionRawError):
+            await drone.mission_raw.upload_mission([RawItem(0, 3, 18, 1, 1, *(0.0,) * 4, 407687000, 147907000, 5.0, 0)])
+
+    session(story)
+
+
+def test_offboard_flight_by_position_velocity_and_attitude():
+    async def story(drone, vehicle):
+        await drone.action.arm()
+        with pytest.raises(OffboardError):
+            await drone.offboard.start()
+        await drone.offboard.set_position_ned(PositionNedYaw(3.0, 2.0, -4.0, 90.0))
+        await asyncio.sleep(0.2)
+        await drone.offboard.start()
+        await first(
+            drone.telemetry.position_velocity_ned(),
+            lambda o: math.dist((o.position.north_m, o.position.east_m, o.position.down_m), (3.0, 2.0, -4.0)) < 0.1,
+        )
+        assert vehicle.setpoint[9] == pytest.approx(0.0, abs=1e-6)
+        await drone.offboard.set_velocity_ned(VelocityNedYaw(0.0, 1.0, -1.0, 0.0))
+        await first(drone.telemetry.position_velocity_ned(), lambda o: o.velocity.down_m_s < -0.5)
+        assert vehicle.velocity == pytest.approx((1.0, 0.0, 1.0))
+        await drone.offboard.set_velocity_body(VelocityBodyYawspeed(2.0, 0.0, 0.0, 10.0))  # the nose points east
+        await first(drone.telemetry.position_velocity_ned(), lambda o: o.velocity.east_m_s > 1.5)
+        assert vehicle.setpoint[10] == pytest.approx(-math.radians(10.0))
+        await drone.offboard.set_attitude(Attitude(10.0, 0.0, 90.0, 0.6))
+        deadline = time.monotonic() + 5.0
+        while len(vehicle.setpoint) != 8 and time.monotonic() < deadline:
+            await asyncio.sleep(0.02)
+        assert vehicle.setpoint[:2] == pytest.approx(
+            (math.cos(math.radians(5.0)), math.sin(math.radians(5.0))), abs=1e-6
+        )
+        assert vehicle.setpoint[7] == pytest.approx(0.6)
+        await drone.offboard.stop()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+
+    session(story)
+
+
+def test_parameters_rates_and_sticks():
+    async def story(drone, vehicle):
+        assert await drone.param.get_param_float("MPC_XY_P") == pytest.approx(0.95)
+        await drone.param.set_param_float("MPC_XY_P", 1.25)
+        assert vehicle.parameters["MPC_XY_P"] == 1.25
+        await drone.param.set_param_int("NAV_DLL_ACT", 3)
+        assert await drone.param.get_param_int("NAV_DLL_ACT") == 3
+        with pytest.raises(ParamError):
+            await drone.param.get_param_float("NO_SUCH")
+        everything = await drone.param.get_all_params()
+        assert len(everything.float_params) + len(everything.int_params) == len(PARAMETERS)
+
+        await drone.telemetry.set_rate_position(2.0)
+        stamps = []
+        async for _ in drone.telemetry.position():
+            stamps.append(vehicle.seconds)
+            if len(stamps) == 5:
+                break
+        assert (stamps[-1] - stamps[1]) / 3.0 == pytest.approx(0.5, abs=0.25)  # simulated seconds
+
+        await drone.action.arm()
+        for _ in range(5):
+            await drone.manual_control.set_manual_control_input(0.5, 0.0, 0.75, 0.0)
+            await asyncio.sleep(0.05)
+        await drone.manual_control.start_position_control()
+        for _ in range(30):
+            await drone.manual_control.set_manual_control_input(0.5, 0.0, 0.75, 0.0)
+            await asyncio.sleep(0.02)
+        assert vehicle.mode == "position_control"
+        assert vehicle.stick == pytest.approx((0.5, 0.0, 0.5, 0.0))
+        assert vehicle.position[0] > 0.3
+
+    session(story)

@@ -1,0 +1,136 @@
+"""The link beside a run: what it tells and what it asks, and that it can neither stop nor slow the flight."""
+
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+from stand_in import StandIn, free_port, until
+
+from services.launcher import loopback_endpoints
+from services.log import LogReader, LogWriter
+from services.mavlink.dialect import mavlink
+from services.mavlink.links import check
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+HOVER = "scenes/hover.toml"
+
+
+def run(tmp_path, space, *more, **options):
+    command = [sys.executable, "-m", "services.cli", "run", HOVER, "--space", space, *more]
+    command += ["--log", str(tmp_path / f"{space}.mcap")]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+
+
+def adapter_of(process):
+    """Process id of the link of a run, once it is there."""
+    found = []
+
+    def look():
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        found.extend(c for c in children if "mavlink" in Path(f"/proc/{c}/cmdline").read_text().split("\0"))
+        return found
+
+    assert until(look, 120.0)
+    return int(found[0])
+
+
+def heard(connection, kind, seconds=120.0):
+    message = connection.recv_match(type=kind, blocking=True, timeout=seconds)
+    assert message, f"no {kind}"
+    return message
+
+
+def test_a_client_flies_the_autopilot_of_a_live_run(tmp_path):
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+
+    def order(number, *params):
+        station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
+        while (ack := heard(station, "COMMAND_ACK")).command != number:
+            pass
+        return ack.result
+
+    sets = ("autopilot.trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=60")
+    more = [part for each in sets for part in ("--set", each)]
+    url = f"udpout:127.0.0.1:{port}"
+    with run(tmp_path, "test-mavlink", "--mavlink", url, "--speed", "5", *more) as process:
+        heard(station, "HEARTBEAT")
+        station.mav.heartbeat_send(6, 8, 0, 0, 0)
+        assert heard(station, "SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_GPS
+        station.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
+        assert heard(station, "PARAM_VALUE").param_value == 1.5
+        assert order(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED  # no setpoints come
+        assert order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert order(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
+        while heard(station, "GLOBAL_POSITION_INT").relative_alt < 1400:
+            pass
+        assert order(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
+        while heard(station, "HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
+            pass
+        said, _ = process.communicate(timeout=120)
+    station.close()
+    assert process.returncode == 0, said
+    assert re.search(r"mavlink: telemetry: jitter median [\d.]+ ms, p99 [\d.]+ ms", said)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds processes in /proc")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
+    port, space = free_port(), f"test-mavlink-{how.name.lower()}"
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", "4"]
+    with run(tmp_path, space, *more) as process:
+        adapter = adapter_of(process)
+        heard(station, "ATTITUDE")
+        os.kill(adapter, how)
+        said, _ = process.communicate(timeout=120)
+    station.close()
+    assert process.returncode == 0, said
+    if how == signal.SIGKILL:
+        assert "mavlink: ended before the flight (signal 9)" in said
+    with LogReader(tmp_path / f"{space}.mcap") as log:
+        assert log.complete
+
+
+@pytest.mark.parametrize(
+    ("url", "fault"),
+    [
+        ("udpout:nowhere", "expected one of serial:DEVICE:BAUD, tcpin:HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT"),
+        ("pigeon:127.0.0.1:1", "expected one of serial"),
+        ("udpin:127.0.0.1", "expected one of serial"),
+        ("udpin:127.0.0.1:99999", "expected one of serial"),
+    ],
+)
+def test_a_url_that_cannot_be_is_refused_with_the_forms_there_are(url, fault):
+    with pytest.raises(ValueError, match=re.escape(f"--mavlink {url}: {fault}")):
+        check(url)
+
+
+def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
+    log = tmp_path / "flight.mcap"
+    vehicle = StandIn()
+    vehicle.armed, vehicle.mode, vehicle.target = True, "takeoff", [0.0, 0.0, 30.0]
+    with LogWriter(log, {}, {"scene.toml": b"[vehicle]\nname = 'drone1'\n"}) as writer:
+        for _ in range(300):
+            for topic, message in vehicle.messages():
+                writer.write(topic.key("drone1"), topic.message, message.encode(), vehicle.time_ns)
+    port, (endpoint,) = free_port(), loopback_endpoints(["a"]).values()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    command = [sys.executable, "-m", "services.cli", "replay", str(log), "--space", "test-mavlink-replay"]
+    command += ["--listen", endpoint, "--mavlink", f"udpout:127.0.0.1:{port}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        heard(station, "HEARTBEAT")
+        station.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+        assert heard(station, "COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+        while heard(station, "GLOBAL_POSITION_INT").relative_alt < 500:
+            pass
+        process.terminate()
+        process.communicate(timeout=30)
+    station.close()

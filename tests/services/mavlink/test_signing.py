@@ -1,0 +1,93 @@
+"""Signed links: only the key's holder is heard, and only once; without a key only this machine commands."""
+
+import hashlib
+
+import pytest
+from bench import Bench
+
+from services.mavlink.channel import read_key
+from services.mavlink.dialect import mavlink
+
+KEY = hashlib.sha256(b"correct horse").digest()
+REFUSED = "unsigned, forged or replayed"
+ARM = (1, 1, 400, 0, 1.0, *(0.0,) * 6)
+
+
+def test_signed_commands_are_taken_and_answered_signed():
+    bench = Bench(key=KEY)
+    partner = bench.partner(key=KEY, local=False)
+    partner.send("command_long", *ARM)
+    bench.step(3)
+    assert bench.vehicle.armed
+    assert partner.last("COMMAND_ACK").get_signed()
+
+
+@pytest.mark.parametrize("key", [None, hashlib.sha256(b"wrong").digest()])
+def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
+    bench = Bench(key=KEY)
+    partner = bench.partner(key=key)
+    partner.send("command_long", *ARM)
+    bench.step(3)
+    assert not bench.vehicle.armed
+    assert bench.counts[REFUSED] == 1
+
+
+def test_a_replayed_packet_is_refused_also_by_another_way():
+    bench = Bench(key=KEY)
+    partner, thief = bench.partner(key=KEY), bench.partner(local=False)
+    partner.send("command_long", *ARM)
+    bench.step(3)
+    bench.vehicle.armed = False
+    partner.raw(partner.sent[0])
+    thief.raw(partner.sent[0])
+    bench.step(3)
+    assert not bench.vehicle.armed
+    assert bench.counts[REFUSED] == 2
+
+
+def test_a_forged_time_stamp_does_not_shut_out_the_keys_holder():
+    bench = Bench(key=KEY)
+    partner = bench.partner(key=KEY)
+    partner.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    forger = bench.partner(key=hashlib.sha256(b"wrong").digest())
+    forger.codec.signing.timestamp += 10**12
+    forger.send("command_long", *ARM)
+    partner.send("command_long", *ARM)
+    bench.step(3)
+    assert bench.counts[REFUSED] == 1
+    assert bench.vehicle.armed
+
+
+def test_without_a_key_other_machines_watch_but_do_not_command():
+    bench = Bench()
+    stranger = bench.partner(local=False)
+    assert stranger.command(400, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert stranger.command(512, 242.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert stranger.last("HOME_POSITION")
+    stranger.send("param_set", 1, 1, b"MPC_XY_P", 3.0, mavlink.MAV_PARAM_TYPE_REAL32)
+    stranger.send("mission_count", 1, 1, 1, 0)
+    stranger.send("mission_clear_all", 1, 1, 0)
+    stranger.send("set_mode", 1, 1, 4 << 16 | 5 << 24)
+    stranger.send("manual_control", 1, 1000, 0, 500, 0, 0)
+    stranger.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    bench.step(60)
+    assert bench.vehicle.kinds == {}
+    assert stranger.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED
+    assert {m.type for m in stranger.all("MISSION_ACK")} == {mavlink.MAV_MISSION_DENIED}
+
+
+def test_insecure_takes_commands_from_anywhere():
+    bench = Bench(insecure=True)
+    assert bench.partner(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_a_key_file_holds_one_passphrase(tmp_path):
+    path = tmp_path / "key"
+    path.write_text("correct horse\n")
+    assert read_key(path) == KEY
+    for text in ("", "short", "two lines of\ntext"):
+        path.write_text(text)
+        with pytest.raises(ValueError, match=r"--mavlink-key .*: expected one line"):
+            read_key(path)
+    with pytest.raises(ValueError, match="cannot be read"):
+        read_key(tmp_path / "none")

@@ -1,0 +1,120 @@
+"""Telemetry: units, frames and rates, against what was put in."""
+
+import math
+
+import pytest
+from bench import Bench
+
+from messages import Vector3, VehicleState
+from messages.topics import TRUTH
+from services.mavlink.dialect import mavlink
+
+
+def shown(bench, kind, steps=60):
+    partner = bench.partner()
+    bench.step(steps)
+    return partner.last(kind)
+
+
+def moved():
+    bench = Bench()
+    bench.vehicle.position, bench.vehicle.yaw = [30.0, 40.0, 12.0], math.radians(30.0)
+    return bench
+
+
+def test_position_on_the_earth():
+    m = shown(moved(), "GLOBAL_POSITION_INT")
+    assert (m.lat - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)  # metres to a degree there
+    assert (m.lon - 147907000) * 1e-7 * 84_418 == pytest.approx(30.0, rel=2e-3)
+    assert (m.alt, m.relative_alt) == (292_000, 12_000)
+    assert m.hdg == 6000  # 30 degrees north of east
+
+
+def test_local_position_is_north_east_down():
+    m = shown(moved(), "LOCAL_POSITION_NED")
+    assert (m.x, m.y, m.z) == (40.0, 30.0, -12.0)
+
+
+def test_rates_are_those_of_the_table_and_partners_may_change_them():
+    bench = Bench()
+    ground, onboard = bench.partner(), bench.partner(system=2)
+    onboard.send("heartbeat", mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 0, 3)
+    ground.send("command_long", 1, 1, 511, 0, 30.0, 100_000.0, *(0.0,) * 5)
+    bench.step(500)
+    counts = {kind: (len(ground.all(kind)), len(onboard.all(kind))) for kind in ("SYS_STATUS", "ATTITUDE", "HEARTBEAT")}
+    assert counts["SYS_STATUS"] == (11, 51)  # at 0 s and at 10 s too
+    assert counts["ATTITUDE"][0] == pytest.approx(100, abs=2)
+    assert counts["ATTITUDE"][1] == 500
+    assert counts["HEARTBEAT"] == (12, 12)  # one of them at the first status
+
+
+def test_another_mode_is_told_at_once():
+    bench = Bench()
+    partner = bench.partner()
+    bench.step(60)
+    partner.got.clear()
+    bench.vehicle.armed = True
+    bench.step(2)
+    assert partner.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_what_hinders_arming_is_shown_and_long_texts_come_in_pieces():
+    bench = Bench()
+    partner = bench.partner()
+    bench.vehicle.prearm = ("no GPS fix",)
+    bench.vehicle.text = ["x" * 60 + "y" * 60]
+    bench.step(60)
+    assert not partner.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    pieces = partner.all("STATUSTEXT")
+    assert [m.chunk_seq for m in pieces] == [0, 1, 2]
+    assert "".join(m.text for m in pieces) == "x" * 60 + "y" * 60
+    assert len({m.id for m in pieces}) == 1
+
+
+def test_a_vehicle_that_falls_freely_feels_its_acceleration_along_its_axes():
+    bench = Bench()
+    half = 0.5 * math.radians(90.0)
+    truth = VehicleState(acceleration=Vector3(0.0, 9.80665, 0.0))
+    q = truth.pose.orientation._replace(w=math.cos(half), z=math.sin(half))  # the nose points north
+    truth = truth._replace(pose=truth.pose._replace(orientation=q))
+    bench.adapter.take(TRUTH, 0, truth.encode(), 0.0)
+    m = shown(bench, "HIL_STATE_QUATERNION")
+    assert (m.xacc, m.yacc, m.zacc) == (1000, 0, 0)
+
+
+def test_progress_of_a_mission():
+    bench = Bench()
+    bench.vehicle.items, bench.vehicle.current, bench.vehicle.reached, bench.vehicle.state = (), 1, 0, 3
+    partner = bench.partner()
+    bench.step(60)
+    assert partner.last("MISSION_CURRENT").seq == 1
+    assert partner.last("MISSION_ITEM_REACHED") is None  # there is no mission
+
+
+def test_the_origin_is_echoed_exactly():
+    bench = Bench()
+    partner = bench.partner()
+    partner.send("set_gps_global_origin", 1, 473977418, 85455939, 488123)
+    m = partner.last("GPS_GLOBAL_ORIGIN")
+    assert (m.latitude, m.longitude, m.altitude) == (473977418, 85455939, 488123)
+
+
+def test_clocks_are_compared():
+    bench = Bench()
+    partner = bench.partner()
+    bench.step(10)
+    partner.send("timesync", 0, 12345)
+    answers = [m for m in partner.all("TIMESYNC") if m.tc1]
+    assert (answers[0].tc1, answers[0].ts1) == (bench.vehicle.time_ns, 12345)
+    partner.send("ping", 7, 3, 0, 0)
+    m = partner.last("PING")
+    assert (m.time_usec, m.seq, m.target_system, m.target_component) == (7, 3, 255, 190)
+
+
+def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
+    bench = Bench()
+    partner = bench.partner()
+    partner.send("file_transfer_protocol", 0, 1, 1, [5, 0, 2, 3] + [0] * 247)
+    assert partner.last("FILE_TRANSFER_PROTOCOL").payload[:6] == [6, 0, 2, 129, 1, 3]
+    partner.send("log_request_list", 1, 1, 0, 0xFFFF)
+    assert partner.last("LOG_ENTRY").num_logs == 0

@@ -1,0 +1,287 @@
+"""Missions and parameters over a bad line: one in ten lost both ways, one in ten twice."""
+
+import socket
+import struct
+import threading
+
+import pytest
+from bench import Bench, Partner, item
+from stand_in import PARAMETERS, flying, free_port, until
+
+from services.mavlink.dialect import mavlink
+
+BAD = {"loss": 0.1, "twice": 0.1}
+
+
+class Station(Partner):
+    """Asks again after half a second, as ground stations do."""
+
+    def step(self):
+        self.age = getattr(self, "age", 0) + 1
+        if self.age % 25 == 0:
+            self.again()
+
+    def again(self):
+        pass
+
+    def upload(self, items):
+        def answer(m):
+            self.age = 0
+            if m.get_type() == "MISSION_REQUEST_INT":
+                self.send("mission_item_int", *items[m.seq])
+
+        def again():
+            if not self.all("MISSION_REQUEST_INT"):
+                self.send("mission_count", 1, 1, len(items), 0)
+
+        self.watch, self.again = answer, again
+        self.send("mission_count", 1, 1, len(items), 0)
+        assert self.bench.until(lambda: self.last("MISSION_ACK"), 60.0)
+        return self.last("MISSION_ACK").type
+
+    def download(self):
+        found = {}
+
+        def ask():
+            if (count := self.last("MISSION_COUNT")) is None:
+                self.send("mission_request_list", 1, 1, 0)
+            elif len(found) < count.count:
+                self.send("mission_request_int", 1, 1, len(found), 0)
+
+        def answer(m):
+            if m.get_type() == "MISSION_ITEM_INT" and m.seq == len(found):
+                found[m.seq] = m
+            if m.get_type() in ("MISSION_COUNT", "MISSION_ITEM_INT"):
+                ask()
+
+        self.watch, self.again = answer, ask
+        ask()
+        assert self.bench.until(
+            lambda: self.last("MISSION_COUNT") and len(found) == self.last("MISSION_COUNT").count, 60
+        )
+        return list(found.values())
+
+    def parameters(self):
+        found = {}
+
+        def answer(m):
+            if m.get_type() == "PARAM_VALUE":
+                found[m.param_index] = m
+
+        def again():
+            for index in set(range(len(PARAMETERS))) - set(found) if found else ():
+                self.send("param_request_read", 1, 1, b"", index)
+            if not found:
+                self.send("param_request_list", 1, 1)
+
+        self.watch, self.again = answer, again
+        self.send("param_request_list", 1, 1)
+        assert self.bench.until(lambda: len(found) == len(PARAMETERS), 60.0)
+        return found
+
+
+def station(bench, **more):
+    found = Station(bench, **more)
+    bench.partners.append(found)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_transfers_complete_over_a_bad_line(seed):
+    bench = Bench()
+    client = station(bench, seed=seed, **BAD)
+    items = [item(k, north=float(k), up=2.0 + k) for k in range(60)]
+    assert client.upload(items) == mavlink.MAV_MISSION_ACCEPTED
+    assert [i.position.z for i in bench.vehicle.items] == pytest.approx([2.0 + k for k in range(60)], abs=1e-3)
+    client.got.clear()
+    assert [(m.x, m.z) for m in client.download()] == [(i[11], i[13]) for i in items]
+    assert {m.param_id for m in client.parameters().values()} == {p.name for p in PARAMETERS}
+
+
+def test_items_arrive_in_any_order_and_more_than_once():
+    bench = Bench()
+    client = bench.partner()
+    client.send("mission_count", 1, 1, 3, 0)
+    for seq in (2, 1, 0, 0, 2, 1, 1, 2, 0):
+        client.send("mission_item_int", *item(seq, up=float(seq)))
+    bench.step(3)
+    assert client.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+    assert [i.position.z for i in bench.vehicle.items] == pytest.approx([0.0, 1.0, 2.0], abs=1e-3)
+    assert len(client.all("MISSION_ACK")) == 1
+
+
+def test_of_two_who_upload_at_once_the_second_is_refused_and_the_first_completes():
+    bench = Bench()
+    one, two = bench.partner(), bench.partner(system=254)
+    one.send("mission_count", 1, 1, 2, 0)
+    two.send("mission_count", 1, 1, 5, 0)
+    assert two.last("MISSION_ACK").type == mavlink.MAV_MISSION_DENIED
+    two.send("mission_item_int", *item(0, up=99.0))
+    one.send("mission_item_int", *item(0))
+    one.send("mission_item_int", *item(1))
+    bench.step(3)
+    assert one.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+    assert [i.position.z for i in bench.vehicle.items] == pytest.approx([5.0, 5.0], abs=1e-3)
+    two.send("mission_count", 1, 1, 1, 0)
+    assert two.last("MISSION_REQUEST_INT").seq == 0
+
+
+def test_an_upload_that_stops_is_asked_for_again_and_given_up():
+    bench = Bench()
+    client = bench.partner()
+    client.send("mission_count", 1, 1, 2, 0)
+    bench.step(200)
+    assert 5 <= len(client.all("MISSION_REQUEST_INT")) <= 10
+    assert client.last("MISSION_ACK").type == mavlink.MAV_MISSION_OPERATION_CANCELLED
+    assert bench.counts["upload that stopped"] == 1
+
+
+def test_the_acknowledgement_is_repeated_to_who_missed_it():
+    bench = Bench()
+    client = bench.partner()
+    client.send("mission_count", 1, 1, 1, 0)
+    client.send("mission_item_int", *item(0))
+    bench.step(3)
+    client.got.clear()
+    client.send("mission_item_int", *item(0))
+    assert client.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("changed", "result"),
+    [
+        ({"command": 18}, mavlink.MAV_MISSION_UNSUPPORTED),
+        ({"frame": 1}, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
+        ({"up": float("nan")}, mavlink.MAV_MISSION_INVALID_PARAM7),
+        ({"up": float("inf")}, mavlink.MAV_MISSION_INVALID),
+        ({"north": 1e7}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+        ({"params": (-1.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"params": (float("inf"), 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID),
+        ({"command": 5001, "params": (2.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+    ],
+)
+def test_an_item_that_cannot_be_flown_leaves_the_old_mission(changed, result):
+    bench = Bench()
+    client = bench.partner()
+    for up, more in ((7.0, {}), (9.0, changed)):
+        client.send("mission_count", 1, 1, 1, 0)
+        client.send("mission_item_int", *item(0, **{"up": up} | more))
+        bench.step(3)
+    assert client.last("MISSION_ACK").type == result
+    assert bench.vehicle.items[0].position.z == pytest.approx(7.0, abs=1e-3)
+
+
+def test_cameras_keep_their_number_in_the_mission_but_do_nothing():
+    bench = Bench()
+    client = bench.partner()
+    client.send("mission_count", 1, 1, 3, 0)
+    for seq, command in enumerate((16, mavlink.MAV_CMD_IMAGE_START_CAPTURE, 16)):
+        client.send("mission_item_int", *item(seq, command))
+    bench.step(3)
+    assert [(i.action, i.hold) for i in bench.vehicle.items] == [("waypoint", 0.0), ("delay", 0.0), ("waypoint", 0.0)]
+
+
+def test_everything_is_cleared_with_one_acknowledgement():
+    bench = Bench()
+    client = bench.partner()
+    client.send("mission_clear_all", 1, 1, mavlink.MAV_MISSION_TYPE_ALL)
+    bench.step(3)
+    assert [m.type for m in client.all("MISSION_ACK")] == [mavlink.MAV_MISSION_ACCEPTED]
+
+
+def test_ardupilots_first_item_is_home_and_not_flown_to():
+    bench = Bench("mavlink.flavour=ardupilot")
+    client = bench.partner()
+    client.send("mission_count", 1, 1, 2, 0)
+    client.send("mission_item_int", *item(0, frame=0, up=280.0))
+    client.send("mission_item_int", *item(1))
+    bench.step(3)
+    assert [i.action for i in bench.vehicle.items] == ["delay", "waypoint"]
+
+
+def test_whole_parameters_travel_as_bytes_or_by_value():
+    for overrides, wire in (((), struct.unpack("<f", struct.pack("<i", 3))[0]), (("mavlink.flavour=ardupilot",), 3.0)):
+        bench = Bench(*overrides)
+        client = bench.partner()
+        client.send("param_set", 1, 1, b"NAV_DLL_ACT", wire, mavlink.MAV_PARAM_TYPE_INT32)
+        bench.step(3)
+        assert bench.vehicle.parameters["NAV_DLL_ACT"] == 3.0
+        assert client.last("PARAM_VALUE").param_value == wire
+
+
+@pytest.mark.parametrize("value", [1e9, float("nan"), float("inf"), -5.0])
+def test_a_parameter_out_of_bounds_is_refused_and_its_value_told(value):
+    bench = Bench()
+    client = bench.partner()
+    client.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", value, mavlink.MAV_PARAM_TYPE_REAL32)
+    bench.step(3)
+    assert client.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert client.last("PARAM_VALUE").param_value == 2.5
+    client.send("param_request_read", 1, 1, b"NO_SUCH", -1)
+    assert client.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
+
+
+def test_over_udp_with_losses_mavsdk_still_gets_its_mission_through():
+    mission_raw = pytest.importorskip("mavsdk.mission_raw", reason="mavsdk is not installed: pip install -e .[clients]")
+    import asyncio
+
+    import mavsdk
+
+    near, far, over = free_port(), free_port(), threading.Event()
+    relay = threading.Thread(target=lossy_relay, args=(near, far, over), daemon=True)
+
+    async def tell(running):
+        drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
+        await drone.connect(system_address=f"udpin://127.0.0.1:{far}")
+        async for state in drone.core.connection_state():
+            if state.is_connected:
+                break
+        items = [
+            mission_raw.MissionItem(
+                k,
+                *item(k)[3:5],
+                int(k == 0),
+                1,
+                *item(k)[7:],
+            )
+            for k in range(20)
+        ]
+        await drone.mission_raw.upload_mission(items)
+        down = await drone.mission_raw.download_mission()
+        assert [(i.x, i.z) for i in down] == [(i.x, i.z) for i in items]
+        drone._stop_mavsdk_server()
+
+    with flying(f"udpout:127.0.0.1:{near}") as running:
+        relay.start()
+        asyncio.run(asyncio.wait_for(tell(running), 60.0))
+        assert until(lambda: len(running.vehicle.items) == 20)
+    over.set()
+    relay.join(5.0)
+
+
+def lossy_relay(near, far, over):
+    """Datagrams from one port to another and back; some are lost, some come twice."""
+    partner = Partner.__new__(Partner)
+    import random
+
+    partner.random, partner.loss, partner.twice = random.Random(1), 0.1, 0.1
+    inner, outer = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+    inner.bind(("127.0.0.1", near))
+    vehicle = None
+    for s in (inner, outer):
+        s.settimeout(0.002)
+    while not over.is_set():
+        for source in (inner, outer):
+            try:
+                data, address = source.recvfrom(2048)
+            except OSError:
+                continue
+            if source is inner:
+                vehicle = address
+            for _ in range(partner._times()):
+                if source is inner:
+                    outer.sendto(data, ("127.0.0.1", far))
+                elif vehicle:
+                    inner.sendto(data, vehicle)
+    inner.close()
+    outer.close()
