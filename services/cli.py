@@ -35,6 +35,11 @@ Peers = Annotated[
     typer.Option(metavar="TABLE", help="name=endpoint,... of all participants, when they are started separately"),
 ]
 
+PlanFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="fly this mission (.plan, .waypoints) instead of the scene's trajectory"),
+]
+
 USER_ERROR = 2
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
@@ -112,11 +117,15 @@ def run(
     open_: Annotated[
         str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
     ] = None,
+    plan: PlanFile = None,
 ) -> None:
     """Fly a scene, record it, and report."""
     from services import flight
     from services.launcher import WATCHER
+    from services.plan import OPERATED
+    from services.plan import read as read_plan
     from services.scene import load
+    from services.sections import Run
     from services.table import RECORDER, lockstep_services
 
     with user_errors():
@@ -126,14 +135,18 @@ def run(
             raise ValueError("--mode single: has no network; leave out --peers and --open")
         if open_ is not None:
             flight.check_endpoint("--open", open_)
-        loaded = load(scene, set_ or [])
+        set_ = [*(set_ or []), *(OPERATED if plan else [])]
+        loaded = load(scene, set_)
+        if plan:
+            read_plan(plan)
+        speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else None)
         pace = parse_speed(speed)
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]
         table = None if peers is None else flight.parse_peers(peers, needed)
         _check_distinct({"SCENE": scene, "--log": log, "--json": json})
         path = _log_path(loaded, log, exists=table is not None)
         _check_writable(json)
-        _fly(loaded, set_ or [], mode, speed, pace, path, space, table, json, open_)
+        _fly(loaded, set_, mode, speed, pace, path, space, table, json, open_, plan)
 
 
 def _fly(
@@ -147,10 +160,12 @@ def _fly(
     peers: dict[str, str] | None,
     json: Path | None,
     door: str | None,
+    plan: Path | None,
 ) -> None:
     from rich.console import Console
 
     from services import flight, summary
+    from services.plan import operator
     from services.progress import Display
     from services.sections import Run
     from studies.flown import Flown
@@ -160,6 +175,7 @@ def _fly(
 
     def command(name: str) -> list[str]:
         extra = ["--log", str(log)] if name == "recorder" else ["--open", str(door)] if name == "router" else []
+        extra += ["--plan", str(plan)] if plan else []
         pacing = ["--speed", speed] if speed else []
         pacing += ["--core", str(core)] if core is not None else []
         return ["service", name, *flight.scene_arguments(scene.path, overrides), "--space", space, *pacing, *extra]
@@ -169,7 +185,7 @@ def _fly(
         flight.prepare(scene, console.print)
     with _left_as_it_was(log), Display(console, scene[Run].duration) as display:
         if mode == "single":
-            simulated, wall = flight.fly_single(scene, log, pace, display)
+            simulated, wall = flight.fly_single(scene, log, pace, display, operator(plan))
         elif peers:
             simulated, wall = flight.fly_joined(scene, peers, space, display)
         else:
@@ -265,11 +281,13 @@ def service(
     core: Annotated[int | None, typer.Option(metavar="N", help="the core that all lock-step services share")] = None,
     open_: Annotated[list[str] | None, typer.Option("--open", metavar="ENDPOINT", help="the router's door")] = None,
     with_parent: Annotated[bool, typer.Option("--with-parent", help="end when standard input closes")] = False,
+    plan: PlanFile = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
     from services.bus import ZenohBus, mesh
     from services.flight import parse_peers
     from services.launcher import WATCHER, check_space
+    from services.plan import operator
     from services.process import Process, Stopped, run_lockstep
     from services.scene import load
     from services.table import RECORDER, lockstep_services, modules
@@ -295,7 +313,7 @@ def service(
             try:
                 if name in flying:
                     flying[name].prepare()
-                    run_lockstep(process, flying[name])
+                    run_lockstep(process, flying[name], operator(plan))
                 else:
                     modules()[name].run(process, log)
             except Stopped:
@@ -444,6 +462,20 @@ def replay(
             count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None)
             stop.check()
         typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
+
+
+@app.command()
+def refly(log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]) -> None:
+    """Fly a log's scene again with the recorded commands at their ticks: the same digest, or exit code 1."""
+    from rich.console import Console
+
+    from services import refly as again
+
+    with user_errors():
+        before, after = again.refly(log, Console())
+        if before != after:
+            _fail(f"{log}: digest {before}, flown again {after}: not the same", 1)
+        typer.echo(f"{log}: flown again, the same digest {after}")
 
 
 def main() -> None:

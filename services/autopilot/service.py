@@ -22,7 +22,6 @@ from services.lockstep import Input
 from services.scene import Scene
 from services.sections import Exchange, Rates, airframe, follows_trajectory, gravity, period, start_height, ticks
 
-
 LOOK = 5  # ticks between two looks of the pilot at the estimate
 
 
@@ -59,7 +58,11 @@ class Autopilot:
         self._estimate_every = ticks(scene, scene[Rates].estimate, "estimate")
         self._status_every = ticks(scene, scene[Rates].status, "status")
         self._answers_every = period(scene, ANSWERS)
-        self._gains, self._geometric, self._airframe = config.gain_set(scene), config.attitude == "so3", known_airframe(scene)
+        self._gains, self._geometric, self._airframe = (
+            config.gain_set(scene),
+            config.attitude == "so3",
+            known_airframe(scene),
+        )
         built = gains.build(self._gains, self._airframe, self._geometric)
         self._parameters = Cell(built)
         self._state, self._stage = Cell(control.START), STANDING

@@ -4,9 +4,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from dynamics.vector import ZERO, norm, subtract
+from services.autopilot.commander.guide import turn
 from services.autopilot.commander.modes import land, return_, takeoff
 from services.autopilot.commander.modes.base import FlightMode, value
-from services.autopilot.commander.guide import turn
 
 if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
