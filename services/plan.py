@@ -50,7 +50,7 @@ def read(path: Path) -> list[OperatorCommand]:
         raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
     try:
         if text.startswith(HEADER):
-            items, fence, rally = _waypoints(text), [], []
+            items, fence, rally = _waypoints(text)
         else:
             items, fence, rally = _plan(json.loads(text))
     except (KeyError, TypeError, IndexError) as error:
@@ -83,7 +83,7 @@ def operator(path: Path | None) -> Operator:
     return lambda tick: commands if tick == 0 else ()
 
 
-def _waypoints(text: str) -> list[Any]:
+def _waypoints(text: str) -> tuple[list[Any], list[Any], list[Any]]:
     rows = [line.split() for line in text.splitlines()[1:] if line.strip()]
     items = []
     for number, row in enumerate(rows):
@@ -93,7 +93,7 @@ def _waypoints(text: str) -> list[Any]:
         if number == 0 and row[3] == "16" and row[2] == "0":
             continue  # by custom the first row is home
         items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place))
-    return [_jump_back(item, len(rows) - len(items)) for item in items]
+    return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
 
 
 def _jump_back(item: Any, left_out: int) -> Any:
