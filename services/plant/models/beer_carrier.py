@@ -9,7 +9,7 @@ from pydantic import Field
 from dynamics.effects._types import Motion
 from dynamics.lie.quaternion import exp
 from dynamics.vector import Vec3, add, scale
-from dynamics.vehicles import beer_carrier
+from dynamics.vehicles import beer_carrier, beer_places
 from dynamics.vehicles.beer_carrier import BeerCarrierParameters, BeerCarrierState, Surface
 from messages import Vector3, VehicleState, header
 from messages.topics import BODIES, CLOCK, POSE, TF, TRUTH, Topic
@@ -116,7 +116,7 @@ class Unloading:
         self._pose_every, self._bodies_every = period(scene, POSE), period(scene, BODIES)
         self._p, start = system(scene)
         self._marched = Marched(scene, self._p, start)
-        self._names = ("pack", "door", *[f"roller{i + 1}" for i in range(beer_carrier.ROLLERS)], "ground")
+        self._names = ("pack", "door", *[f"roller{i + 1}" for i in range(beer_places.ROLLERS)], "ground")
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
@@ -148,11 +148,11 @@ class Unloading:
         rollers, door, ground, walls = beer_carrier.forces_on_pack(p, t, state)
         forward, upward = (math.cos(tilt), 0.0, -math.sin(tilt)), (math.sin(tilt), 0.0, math.cos(tilt))
         hinge = (0.0, 0.0, p.floor_height)
-        turning = (0.0, beer_carrier.roller_speed(p, t), 0.0)
+        turning = (0.0, beer_places.roller_speed(p, t), 0.0)
         motions, forces = [pack], [_sum(*rollers, door, ground, walls)]
         motions.append(Motion(hinge, exp((0.0, tilt + state.door[0], 0.0)), NOTHING, (0.0, state.door[1], 0.0), ()))
         forces.append(scale(-1.0, door))
-        for i in range(beer_carrier.ROLLERS):
+        for i in range(beer_places.ROLLERS):
             behind = scale(-(i + 0.5) * p.roller_spacing, forward)
             place = add(hinge, add(behind, scale(p.roller_radius, upward)))
             motions.append(Motion(place, exp((0.0, tilt, 0.0)), NOTHING, turning, ()))

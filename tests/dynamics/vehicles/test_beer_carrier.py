@@ -9,7 +9,8 @@ import pytest
 from dynamics.integrators import get, march, rate
 from dynamics.lie.quaternion import Quaternion, exp
 from dynamics.tree import retract, scale
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters, energy, initial_state, roller_speed
+from dynamics.vehicles.beer_carrier import BeerCarrierParameters, energy, initial_state
+from dynamics.vehicles.beer_places import roller_speed
 
 RK4 = get("rk4_renormalised").Method()
 G, H = 9.81, 2.5e-4
