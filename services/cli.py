@@ -45,6 +45,10 @@ MavlinkKey = Annotated[
     typer.Option("--mavlink-key", metavar="FILE", help="a passphrase: sign, and take only what is signed with it"),
 ]
 Insecure = Annotated[bool, typer.Option("--insecure", help="take unsigned MAVLink commands from other machines")]
+PlanFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="fly this mission (.plan, .waypoints) instead of the scene's trajectory"),
+]
 
 USER_ERROR = 2
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
@@ -126,11 +130,15 @@ def run(
     mavlink: MavlinkUrls = None,
     mavlink_key: MavlinkKey = None,
     insecure: Insecure = False,
+    plan: PlanFile = None,
 ) -> None:
     """Fly a scene, record it, and report."""
     from services import flight
     from services.launcher import WATCHER
+    from services.plan import OPERATED
+    from services.plan import read as read_plan
     from services.scene import load
+    from services.sections import Run
     from services.table import RECORDER, lockstep_services
 
     with user_errors():
@@ -143,16 +151,19 @@ def run(
         if open_ is not None:
             flight.check_endpoint("--open", open_)
         link = _mavlink_arguments(mavlink, mavlink_key, insecure)
-        if mavlink:
-            set_, speed = [*(set_ or []), "autopilot.operator=true"], speed or "1"
-        loaded = load(scene, set_ or [])
+        implied = OPERATED if plan else ["autopilot.operator=true"] if mavlink else []
+        set_ = [*(set_ or []), *implied]
+        loaded = load(scene, set_)
+        if plan:
+            read_plan(plan)
+        speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else None) or ("1" if mavlink else None)
         pace = parse_speed(speed)
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]
         table = None if peers is None else flight.parse_peers(peers, needed)
         _check_distinct({"SCENE": scene, "--log": log, "--json": json})
         path = _log_path(loaded, log, exists=table is not None)
         _check_writable(json)
-        _fly(loaded, set_ or [], mode, speed, pace, path, space, table, json, open_, link)
+        _fly(loaded, set_, mode, speed, pace, path, space, table, json, open_, plan, link)
 
 
 def _mavlink_arguments(urls: list[str] | None, key: Path | None, insecure: bool) -> list[str]:
@@ -183,11 +194,13 @@ def _fly(
     peers: dict[str, str] | None,
     json: Path | None,
     door: str | None,
+    plan: Path | None,
     link: list[str],
 ) -> None:
     from rich.console import Console
 
     from services import flight, summary
+    from services.plan import operator
     from services.progress import Display
     from services.sections import Run
     from services.table import MAVLINK
@@ -198,7 +211,7 @@ def _fly(
 
     def command(name: str) -> list[str]:
         own = {"recorder": ["--log", str(log)], "router": ["--open", str(door)], MAVLINK: link}
-        extra = own.get(name, [])
+        extra = [*own.get(name, []), *(["--plan", str(plan)] if plan else [])]
         pacing = ["--speed", speed] if speed else []
         pacing += ["--core", str(core)] if core is not None else []
         return ["service", name, *flight.scene_arguments(scene.path, overrides), "--space", space, *pacing, *extra]
@@ -208,7 +221,7 @@ def _fly(
         flight.prepare(scene, console.print)
     with _left_as_it_was(log), Display(console, scene[Run].duration) as display:
         if mode == "single":
-            simulated, wall = flight.fly_single(scene, log, pace, display)
+            simulated, wall = flight.fly_single(scene, log, pace, display, operator(plan))
         elif peers:
             simulated, wall = flight.fly_joined(scene, peers, space, display)
         else:
@@ -309,11 +322,13 @@ def service(
     mavlink_key: MavlinkKey = None,
     insecure: Insecure = False,
     with_parent: Annotated[bool, typer.Option("--with-parent", help="end when standard input closes")] = False,
+    plan: PlanFile = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
     from services.bus import ZenohBus, mesh
     from services.flight import parse_peers
     from services.launcher import WATCHER, check_space
+    from services.plan import operator
     from services.process import Process, Stopped, run_lockstep
     from services.scene import load
     from services.table import MAVLINK, RECORDER, lockstep_services, modules
@@ -339,7 +354,7 @@ def service(
             try:
                 if name in flying:
                     flying[name].prepare()
-                    run_lockstep(process, flying[name])
+                    run_lockstep(process, flying[name], operator(plan))
                 elif name == MAVLINK:
                     modules()[name].run(process, _mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed)))
                 else:
@@ -522,6 +537,20 @@ def replay(
                 typer.echo(f"mavlink: {line}")
             stop.check()
         typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
+
+
+@app.command()
+def refly(log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]) -> None:
+    """Fly a log's scene again with the recorded commands at their ticks: the same digest, or exit code 1."""
+    from rich.console import Console
+
+    from services import refly as again
+
+    with user_errors():
+        before, after = again.refly(log, Console())
+        if before != after:
+            _fail(f"{log}: digest {before}, flown again {after}: not the same", 1)
+        typer.echo(f"{log}: flown again, the same digest {after}")
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from messages.topics import POSE, STATUS, Topic
 from services.bus import ZenohBus, mesh
 from services.launcher import WATCHER, RunFailed, Watch, check_space, key_space, launch
 from services.log import LogWriter
+from services.outside import Operator, nobody
 from services.process import ALIVE_KEY
 from services.progress import Display
 from services.provenance import attachments, metadata
@@ -142,8 +143,23 @@ def fly_joined(scene: Scene, peers: dict[str, str], space: str, display: Display
     return clock.simulated, clock.wall
 
 
-def fly_single(scene: Scene, log: Path, speed: float | None, display: Display) -> tuple[float, float]:
+def fly_single(
+    scene: Scene,
+    log: Path,
+    speed: float | None,
+    display: Display,
+    operator: Operator = nobody,
+    last: int | None = None,
+) -> tuple[float, float]:
     """Fly with all services in this process; (simulated, wall) seconds.
+
+    Args:
+        scene: what to fly.
+        log: where to record it.
+        speed: simulated seconds per second, None for as fast as it goes.
+        display: shows how far the run is.
+        operator: who gives commands, where the scene listens to them.
+        last: the tick after which to stop, None for the end of the run.
 
     Raises:
         Interrupted: ended by a signal.
@@ -163,7 +179,7 @@ def fly_single(scene: Scene, log: Path, speed: float | None, display: Display) -
 
         display.begin()
         started = time.perf_counter()
-        run_single(scene, services, writer, speed, observe)
+        run_single(scene, services, writer, speed, observe, operator, last)
         wall = time.perf_counter() - started
         stop.check()
     return simulated * 1e-9, wall

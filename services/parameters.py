@@ -53,12 +53,8 @@ _FAILSAFES = (
     Parameter("NAV_DLL_ACT", "", RETURN, 0, 3, f"when it is: {_ACTION}", True),
     Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which the battery is low, fraction"),
     Parameter("FS_BATTERY_ACT", "", LAND, 0, 3, f"when it is: {_ACTION}", True),
-    Parameter(
-        "COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position so long, the estimate is lost"
-    ),
+    Parameter("COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position for so long it is lost"),
     Parameter("FS_ESTIMATE_ACT", "", LAND, 0, 3, f"when it is: {_ACTION}", True),
-    Parameter("FD_MOTOR_THR", "", 0.4, 0.1, 1.0, "loss of thrust that counts as a failed motor, fraction"),
-    Parameter("FS_MOTOR_ACT", "", LAND, 0, 3, f"when a motor has failed: {_ACTION}; yaw is given up", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 3, f"outside of the fence: {_ACTION}", True),
 )
 _LOOPS = {

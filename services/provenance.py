@@ -14,6 +14,7 @@ def metadata(scene: Scene, mode: str) -> dict[str, str]:
     solver = scene[sections()["solver"]].model_dump()  # the plant's table; what it holds is the plant's affair
     return {
         "scene": scene.name,
+        "folder": str(scene.path.parent),
         "seed": str(scene[Run].seed),
         "mode": mode,
         "model": scene[Vehicle].model,

@@ -128,8 +128,11 @@ def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
     Raises:
         SceneError: one line that says what is wrong and what would be right.
     """
-    path = Path(path)
-    text = _read(path)
+    return parse(Path(path), _read(Path(path)), overrides)
+
+
+def parse(path: Path, text: str, overrides: Iterable[str] = ()) -> Scene:
+    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -151,6 +154,18 @@ def recorded_data(text: str) -> dict[str, Any]:
         if line.startswith(OVERRIDE_MARK):
             _override(data, line.removeprefix(OVERRIDE_MARK))
     return data
+
+
+def recorded_scene(name: str, folder: Path, text: str) -> Scene:
+    """The scene that a log carries, with the overrides of its run; what it names beside it is in `folder`.
+
+    Raises:
+        SceneError: it is no longer a sound scene.
+    """
+    lines = text.splitlines()
+    overrides = [line.removeprefix(OVERRIDE_MARK) for line in lines if line.startswith(OVERRIDE_MARK)]
+    plain = "\n".join(line for line in lines if not line.startswith(OVERRIDE_MARK))
+    return parse(folder / f"{name}.toml", plain, overrides)
 
 
 def _read(path: Path) -> str:

@@ -23,6 +23,7 @@ class Run(Section):
     seed: int = Field(default=1, ge=0, lt=2**63)
     duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
     settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
+    speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
 
 
 class Exchange(Section):

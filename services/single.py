@@ -37,6 +37,7 @@ def run_single(
     speed: float | None,
     observe: Callable[[int, dict[Topic, bytes]], bool],
     operator: Operator = nobody,
+    last: int | None = None,
 ) -> None:
     """Fly `scene` to its end.
 
@@ -48,6 +49,7 @@ def run_single(
         observe: called now and then with the time [ns] and the newest payload of each topic; says
             whether to stop.
         operator: who speaks to the external inputs.
+        last: the tick after which to stop, None for the end of the run.
     """
     interval = scene[Exchange].interval_ns
     collator = Collator(scene, published(services.values()))
@@ -71,7 +73,7 @@ def run_single(
     owner = next(service for service in services.values() if hasattr(service, "finished"))
     started = next_look = time.perf_counter()
     tick = 0
-    while not owner.finished:
+    while not owner.finished and (last is None or tick <= last):
         if speed is not None:
             time.sleep(max(0.0, started + tick * interval * 1e-9 / speed - time.perf_counter()))
         for topic, every in outside:

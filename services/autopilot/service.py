@@ -51,7 +51,7 @@ class Autopilot:
         self._operator = Input(OPERATOR, external=True) if config.operator else None
         optional = [needed for needed in (self._given, self._operator) if needed]
         self.inputs = (*optional, *self._navigation.inputs)
-        self.outputs = (ACTUATORS, ESTIMATE, STATUS)
+        self.outputs: tuple[Topic, ...] = (ACTUATORS, ESTIMATE, STATUS)
         self.outputs += () if follows else (SETPOINT,)
         self.outputs += (ANSWERS,) if config.operator else ()
         self._interval, self._interval_ns = exchange.interval, exchange.interval_ns

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from dynamics.lie.quaternion import to_roll_pitch_yaw
-from dynamics.vector import ZERO, norm
+from dynamics.vector import ZERO, Vec3
 from messages import Answer
 from services.autopilot.commander import checks, failsafes
 from services.autopilot.commander.fence import Fence
@@ -53,22 +53,26 @@ class Pilot:
             trajectory: whether it begins along the scene's own trajectory.
             operator: whether somebody may give commands.
         """
-        self.table, self.parameters = table, {p.name: p.default for p in table.values()}
+        self.table = table
+        self.parameters: dict[str, float] = {p.name: p.default for p in table.values()}
         self.ground, self.gravity, self.hover_share = ground, gravity, hover_share
-        self.operated = operator
+        self.operated: bool = operator
         self.home = (0.0, 0.0)
         self.estimate: Any = None
-        self.health = 0
-        self.charge = math.nan  # of the battery, fraction; NaN: nobody knows
-        self.mode_name = PHASES if trajectory else "hold"
+        self.health: int = 0
+        self.charge: float = math.nan  # of the battery, fraction; NaN: nobody knows
+        self.mode_name: str = PHASES if trajectory else "hold"
         self.mode: FlightMode | None = None if trajectory else modes()["hold"].Mode(self)
         self.guide = Guide((0.0, 0.0, ground), 0.0)
         self.armed = self.flying = self.flown = False
         self.speed = math.nan  # [m/s] asked for in this flight
-        self.route, self.fence, self.rally = Route(), Fence(), ()
+        self.route = Route()
+        self.fence: Fence = Fence()
+        self.rally: tuple[Vec3, ...] = ()
         self.offboard: tuple[str, tuple[float, ...]] = ("", ())
-        self.offboard_age = self.link_age = math.inf  # [s]
-        self.linked = False  # a ground station has been heard
+        self.offboard_age: float = math.inf  # [s]
+        self.link_age: float = math.inf  # [s]
+        self.linked: bool = False  # a ground station has been heard
         self.failsafe = ""  # the reason of the failsafe in force
         self.last_flight = False  # the run is over with the next disarming
         self.answers: list[Answer] = []
@@ -240,8 +244,3 @@ class Pilot:
         if self.mode_name == "mission" and self.armed and not self.on_trajectory:
             return ACTIVE
         return PAUSED if self.flying or self.route.current > 0 else WAITING
-
-    @property
-    def moving(self) -> bool:
-        """Whether the setpoint moves."""
-        return norm(self.guide.velocity) > 0.0

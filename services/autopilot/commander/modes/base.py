@@ -3,10 +3,10 @@
 import math
 from typing import TYPE_CHECKING
 
+from dynamics.vector import Vec3
+
 if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
-
-HERE = math.nan  # a value that was not given
 
 
 class FlightMode:
@@ -23,6 +23,12 @@ class FlightMode:
 
     def step(self, pilot: "Pilot", dt: float) -> None:
         """Lead the guide for one tick of dt [s]."""
+
+
+def tuple_of(here: Vec3, asked: Vec3) -> Vec3:
+    """The place asked for; a coordinate that was not given (NaN) is that of `here`."""
+    x, y, z = (h if math.isnan(a) else a for h, a in zip(here, asked, strict=True))
+    return x, y, z
 
 
 def value(values: tuple[float, ...], index: int) -> float:

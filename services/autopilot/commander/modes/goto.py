@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from services.autopilot.commander.modes.base import FlightMode, value
+from services.autopilot.commander.modes.base import FlightMode, tuple_of, value
 
 if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
@@ -19,7 +19,7 @@ class Mode(FlightMode):
     def __init__(self, pilot: "Pilot", *values: float):
         here = pilot.guide.position
         x, y, z = (value(values, k) for k in range(3))
-        self._target = tuple(h if math.isnan(v) else v for h, v in zip(here, (x, y, z), strict=True))
+        self._target = tuple_of(here, (x, y, z))
         if not all(map(math.isfinite, self._target)) or self._target[2] <= pilot.ground:
             raise ValueError("go to: expected a place above the ground")
         if not pilot.fence.allows(self._target[0], self._target[1]):

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from dynamics.vector import ZERO, norm
+from dynamics.vector import ZERO, Vec3, norm
 from services.autopilot.commander.modes.base import FlightMode
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ class Mode(FlightMode):
     """Brake first, then hold the place where the guide has come to rest."""
 
     def __init__(self, pilot: "Pilot", *values: float):
-        self._place = None
+        self._place: Vec3 | None = None
 
     def step(self, pilot: "Pilot", dt: float) -> None:
         """Brake or stay."""

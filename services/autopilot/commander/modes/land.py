@@ -17,7 +17,7 @@ class Mode(FlightMode):
     """Sink until the ground is felt: how high the vehicle is may be wrong."""
 
     def __init__(self, pilot: "Pilot", *values: float):
-        self._place = None
+        self._place: tuple[float, float] | None = None
 
     def step(self, pilot: "Pilot", dt: float) -> None:
         """Stop where it is, and sink."""

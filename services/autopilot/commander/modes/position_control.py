@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from dynamics.vector import ZERO, norm
+from dynamics.vector import ZERO, Vec3, norm
 from services.autopilot.commander.modes.base import FlightMode, value
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ class Mode(FlightMode):
     def __init__(self, pilot: "Pilot", *values: float):
         self._sticks = (0.0, 0.0, 0.0, 0.0)
         self._age = math.inf
-        self._place = None
+        self._place: Vec3 | None = None
 
     def take(self, values: tuple[float, ...]) -> None:
         """The sticks as they are now."""

@@ -42,7 +42,7 @@ def test_velocity_and_acceleration_are_the_derivatives():
 
 
 def test_it_stops_from_full_speed():
-    p, v, _ = led((0.0, 0.0, 10.0), 20.0, velocity=(5.0, 0.0, 0.0))
+    p, _, _ = led((0.0, 0.0, 10.0), 20.0, velocity=(5.0, 0.0, 0.0))
     assert p[-1] == pytest.approx((0.0, 0.0, 10.0), abs=1e-3)
     assert p[:, 0].max() < 25.0 / 2.0 / 2.0 + 5.0
 

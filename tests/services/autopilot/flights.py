@@ -1,0 +1,90 @@
+"""Short flights on the true state with scripted commands, without wind."""
+
+import os
+from pathlib import Path
+
+from rich.console import Console
+
+from messages import Answer, MissionItem, OperatorCommand, Vector3
+from services.flight import fly_single
+from services.progress import Display
+from services.scene import load
+from studies.flown import Flown
+
+SCENE = Path("scenes/hover.toml")
+OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]
+RATE = 250  # [Hz] of this scene
+NAN = float("nan")
+
+
+def command(kind, *values, text="", items=(), id=0):
+    return OperatorCommand(kind, "test", id, tuple(map(float, values)), text, tuple(items))
+
+
+def item(action, x=NAN, y=NAN, z=NAN, yaw=NAN, radius=NAN, hold=0.0, values=()):
+    return MissionItem(action, Vector3(float(x), float(y), float(z)), yaw, radius, hold, tuple(map(float, values)))
+
+
+def scripted(script):
+    """An operator of {time [s]: commands}; a key (start, end) repeats them at 10 Hz."""
+
+    def operator(tick):
+        found = []
+        for when, commands in script.items():
+            start, end = when if isinstance(when, tuple) else (when, None)
+            first = round(start * RATE)
+            if end is None:
+                found += commands if tick == first else []
+            elif first <= tick <= round(end * RATE) and (tick - first) % 25 == 0:
+                found += commands
+        return found
+
+    return operator
+
+
+def fly(tmp_path, seconds, script, *overrides, operated=True):
+    """The recorded flight."""
+    log = tmp_path / "flight.mcap"
+    sets = [*(OPERATED if operated else []), f"run.duration={seconds}", *overrides]
+    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
+        fly_single(load(SCENE, sets), log, None, display, scripted(script))
+    return Flown(log)
+
+
+def at(flown, topic, t, value):
+    """`value` of the last message of a topic at or before t [s]."""
+    times = flown.times(topic)
+    return flown.column(topic, value)[times <= t + 1e-9][-1]
+
+
+def height(flown, t):
+    """True height [m] of the vehicle's origin at t [s]."""
+    return at(flown, "truth", t, lambda m: m.pose.position.z)
+
+
+def place(flown, t):
+    """True position [m] at t [s]."""
+    return tuple(at(flown, "truth", t, lambda m: tuple(m.pose.position)))
+
+
+def mode(flown, t):
+    """Mode at t [s]."""
+    return at(flown, "status", t, lambda m: m.mode)
+
+
+def said(flown):
+    """Everything that was told to the pilot."""
+    return [text for texts in _all(flown, lambda m: m.text) for text in texts]
+
+
+def results(flown):
+    """Results of the answers, by id."""
+    return {a.id: a.result for answers in _all(flown, lambda m: m.answers) for a in answers}
+
+
+def _all(flown, value):
+    return [value(m) for m in flown._messages("answers")]
+
+
+ACCEPTED, REJECTED, DENIED = Answer.ACCEPTED, Answer.TEMPORARILY_REJECTED, Answer.DENIED
+UP = {0.04: [command("takeoff", 3.0), command("arm")]}

@@ -1,0 +1,105 @@
+"""Flights by command: the modes do what they are called after, and what is lost is noticed."""
+
+import pytest
+from flights import (
+    ACCEPTED,
+    DENIED,
+    REJECTED,
+    UP,
+    at,
+    command,
+    fly,
+    height,
+    item,
+    mode,
+    place,
+    results,
+    said,
+)
+
+
+def test_takeoff_goto_land_and_disarm_by_itself(tmp_path):
+    script = UP | {8: [command("goto", 4.0, 0.0, 3.0, 1.0, id=1)], 14: [command("land", id=2)]}
+    flown = fly(tmp_path, 25, script)
+    assert height(flown, 7.9) == pytest.approx(3.0, abs=0.1)
+    assert mode(flown, 7.9) == "hold"
+    assert place(flown, 14.0) == pytest.approx((4.0, 0.0, 3.0), abs=0.1)
+    assert at(flown, "estimate", 14.0, lambda m: m.pose.orientation.z) == pytest.approx(0.479, abs=0.01)  # sin(1/2)
+    assert place(flown, 25.0) == pytest.approx((4.0, 0.0, 0.35), abs=0.1)
+    assert not at(flown, "status", 25.0, lambda m: m.armed)
+    assert said(flown) == ["armed", "landed", "disarmed: landed"]
+    assert results(flown) == {0: ACCEPTED, 1: ACCEPTED, 2: ACCEPTED}
+
+
+def test_a_mission_with_speed_jump_delay_and_return(tmp_path):
+    items = [
+        item("takeoff", z=3.0),
+        item("speed", values=(3.0,)),
+        item("waypoint", 4.0, 0.0, 3.0),
+        item("waypoint", 4.0, 4.0, 3.0, hold=0.5),
+        item("jump", values=(2.0, 1.0)),
+        item("delay", hold=0.5),
+        item("return"),
+    ]
+    script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
+    flown = fly(tmp_path, 60, {**script, 0.08: [command("finish")]}, "autopilot.parameters.RTL_RETURN_ALT=4.0")
+    reached = [int(r) for r in flown.column("status", lambda m: m.mission_reached)]
+    order = [r for i, r in enumerate(reached) if r != 65535 and (i == 0 or r != reached[i - 1])]
+    assert order[:2] in ([0, 1], [1, 2])
+    assert order.count(2) + order.count(3) >= 3  # the jump led back once
+    assert flown.landed
+    assert flown.times("truth")[-1] < 60.0
+    assert place(flown, 60.0) == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
+    assert max(flown.column("truth", lambda m: m.pose.position.z)) == pytest.approx(4.0, abs=0.2)
+
+
+def test_refusals_say_why(tmp_path):
+    script = {
+        0.04: [
+            command("goto", 1.0, 1.0, 1.0, id=1),
+            command("mission", id=2),
+            command("offboard", id=3),
+            command("mission_upload", items=[item("loop")], id=4),
+            command("dance", id=5),
+            command("parameter", 1e9, text="MPC_XY_CRUISE", id=6),
+            command("parameter", 3.0, text="MPC_XY_CRUISE", id=7),
+        ],
+    }
+    flown = fly(tmp_path, 0.5, script)
+    assert results(flown) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
+    assert "mission: there is none; upload one first" in said(flown)
+    assert any("MPC_XY_CRUISE: expected a number from 0.1 to 15" in text for text in said(flown))
+
+
+def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost(tmp_path):
+    velocity = command("offboard_position", *[float("nan")] * 3, 1.0, 0.0, 0.0)
+    flown = fly(tmp_path, 14, UP | {(6, 9): [velocity], 6.2: [command("offboard", id=1)]})
+    assert results(flown)[1] == ACCEPTED
+    assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(1.0, abs=0.05)
+    assert mode(flown, 9.5) == "offboard"
+    assert mode(flown, 10.3) == "hold"
+    assert at(flown, "truth", 14.0, lambda m: m.velocity.x) == pytest.approx(0.0, abs=0.05)
+    assert "the offboard setpoints are lost: hold" in said(flown)
+
+
+def test_a_lost_ground_station_brings_it_home_in_simulation_time(tmp_path):
+    script = UP | {6: [command("goto", 4.0, 0.0, 3.0)], (0.5, 7): [command("link")]}
+    flown = fly(tmp_path, 14, script, "autopilot.parameters.COM_DL_LOSS_T=2.0")
+    assert mode(flown, 8.5) == "goto"
+    assert mode(flown, 9.3) == "return"
+    assert at(flown, "status", 9.3, lambda m: m.failsafe)
+
+
+def test_sticks_ask_for_velocities_along_the_heading(tmp_path):
+    script = UP | {5.9: [command("position_control")], (6, 9): [command("manual", 0.2, 0.0, 0.0, 0.0)]}
+    flown = fly(tmp_path, 9, script)
+    assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
+
+
+def test_a_fence_turns_it_back(tmp_path):
+    ring = [item("fence_circle_in", 0.0, 0.0, 0.0, radius=5.0)]
+    sticks = command("manual", 0.6, 0.0, 0.0, 0.0)
+    script = UP | {5: [command("fence_upload", items=ring), command("position_control")], (5.1, 12): [sticks]}
+    flown = fly(tmp_path, 12, script, "autopilot.parameters.FS_FENCE_ACT=1")
+    assert "the vehicle has left the fence: hold" in said(flown)
+    assert 5.0 < place(flown, 12.0)[0] < 9.0
