@@ -200,6 +200,8 @@ def _follow(watch: Watch, everybody: dict, needed: set[str], observe: Callable[[
             return
         if watch.ended:
             ended_at = ended_at or time.monotonic()
+            if time.monotonic() - ended_at > STALL:
+                _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
             if time.monotonic() - ended_at > FAREWELL:
                 left = ", ".join(name for name, child in children.items() if child.poll() is None)
                 raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
