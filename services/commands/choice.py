@@ -1,0 +1,24 @@
+"""A scene with everything decided: integrator and step where it asks for an accuracy."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from services.scene import Scene
+
+
+def decided(path: Path, overrides: list[str]) -> tuple["Scene", list[str]]:
+    """The scene and its overrides, with integrator and step chosen where it asks for an accuracy instead."""
+    from services.plant.config import Solver
+    from services.scene import load
+
+    scene = load(path, overrides)
+    if not scene[Solver].undecided:
+        return scene, overrides
+    from studies.accuracy import choice
+
+    chosen = choice.overrides(scene, typer.echo)
+    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: chosen {', '.join(chosen)}")
+    return load(path, [*overrides, *chosen]), [*overrides, *chosen]

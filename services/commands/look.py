@@ -1,0 +1,83 @@
+"""What there is to fly, whether it is valid, what a log shows; and kernels compiled ahead."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from services.commands.app import app
+from services.commands.choice import decided
+from services.commands.errors import user_errors
+from services.commands.options import (
+    Overrides,
+    SceneFile,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@app.command()
+def scenes(folder: Annotated[Path, typer.Argument(help="where to look")] = Path("scenes")) -> None:
+    """List the scenes, a line each."""
+    from services.scene import SceneError, load
+    from services.sections import Run
+
+    with user_errors():
+        paths = sorted(folder.glob("*.toml"))
+        if not paths:
+            raise ValueError(f"{folder}: no scenes there; expected a folder with .toml files")
+        width = max(len(str(path)) for path in paths)
+        for path in paths:
+            try:
+                line = load(path)[Run].title
+            except SceneError as error:
+                line = f"(broken: {error})"
+            typer.echo(f"{path!s:<{width}}  {line}")
+
+
+@app.command()
+def check(scene: SceneFile, set_: Overrides = None) -> None:
+    """Validate a scene."""
+    from services.sections import Exchange, Run, Vehicle
+    from services.table import lockstep_services
+
+    with user_errors():
+        loaded, _ = decided(scene, set_ or [])
+        vehicle, exchange = loaded[Vehicle], loaded[Exchange]
+        typer.echo(f"{scene}: ok")
+        for label, line in {
+            "title": loaded[Run].title or loaded.name,
+            "vehicle": f"{vehicle.name}, {vehicle.airframe}",
+            "effects": ", ".join(sorted(loaded.tables("effects"))) or "none",
+            "sensors": ", ".join(sorted(loaded.tables("sensors"))) or "none",
+            "services": f"{', '.join(lockstep_services(loaded))}; {exchange.rate} Hz, {exchange.coupling}",
+        }.items():
+            typer.echo(f"  {label:<9} {line}")
+
+
+@app.command()
+def warm(
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(metavar="[SCENE]...", help="[scenes/delivery_mission.toml]")
+    ] = None,
+) -> None:
+    """Compile what scenes need, so that their first run starts at once."""
+    import time
+
+    from services import flight
+
+    with user_errors():
+        for path in scenes or [Path("scenes/delivery_mission.toml")]:
+            started = time.perf_counter()
+            flight.prepare(decided(path, [])[0], typer.echo)
+            typer.echo(f"{path}: ready after {time.perf_counter() - started:.1f} s")
+
+
+@app.command()
+def report(log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]) -> None:
+    """Write an HTML report with plots beside a log."""
+    from studies import report as study
+
+    with user_errors():
+        typer.echo(study.write(log))
