@@ -417,6 +417,39 @@ def effects(
 
 
 @app.command()
+def tune(
+    scene: SceneFile,
+    set_: Overrides = None,
+    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = 13.0,
+    yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = 22.0,
+    attitude: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the inner roll and pitch loops")
+    ] = 26.0,
+    position: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")] = 4.9,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML), for a scene to name")
+    ] = None,
+) -> None:
+    """Design gains about hover for given bandwidths, slowed down until 45 degrees and 6 dB hold in every loop."""
+    from rich.console import Console
+
+    from services.scene import load
+    from studies.tune import study
+    from studies.tune.design import Bandwidths
+
+    with user_errors():
+        _check_distinct({"SCENE": scene, "--out": out})
+        _check_writable(out)
+        if out and out.suffix != ".toml":
+            raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        wanted = Bandwidths(lift, yaw, attitude, position)
+        found = study.tune(load(scene, set_ or []), wanted, typer.echo)
+        Console().print(study.table(found))
+        if out:
+            study.write(out, found.gains)
+
+
+@app.command()
 def replay(
     log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
     speed: Speed = "1",
