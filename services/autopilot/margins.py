@@ -79,5 +79,16 @@ def margins(loop: np.ndarray) -> Margins:
     )
 
 
+def stable(loop: np.ndarray) -> bool:
+    """Whether the closed loop is stable, by Nyquist's criterion; the open loop's poles lie at 0 or to the left.
+
+    1 + L turns by a quarter for each integrator on the way up the frequencies, and by a full turn less for each
+    pair of unstable poles.
+    """
+    integrators = round(-np.log(np.abs(loop[1] / loop[0])) / np.log(FREQUENCIES[1] / FREQUENCIES[0]))
+    angle = np.unwrap(np.angle(1.0 + loop))
+    return bool(abs(angle[-1] - angle[0] - 0.5 * np.pi * integrators) < np.pi)
+
+
 def _pid(g: Pid, s: np.ndarray) -> np.ndarray:
     return g.p + g.i / s + g.d * s

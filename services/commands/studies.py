@@ -1,4 +1,4 @@
-"""The studies: performance, effects, accuracy."""
+"""The studies: performance, effects, accuracy, tune."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -80,3 +80,37 @@ def accuracy(
         check_writable(json)
         check_plot(plot)
         command.run(target, set_ or [], goal, json, plot)
+
+
+@app.command()
+def tune(
+    scene: SceneFile,
+    set_: Overrides = None,
+    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = 13.0,
+    yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = 22.0,
+    attitude: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the inner roll and pitch loops")
+    ] = 26.0,
+    position: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")] = 4.9,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML), for a scene to name")
+    ] = None,
+) -> None:
+    """Design gains about hover for given bandwidths, slowed down until 45 degrees and 6 dB hold in every loop."""
+    from rich.console import Console
+
+    from services.scene import load
+    from studies.tune import study
+    from studies.tune.design import Bandwidths
+
+    with user_errors():
+        check_distinct({"SCENE": scene, "--out": out})
+        if out and out.suffix != ".toml":
+            raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        check_writable(out)
+        wanted = Bandwidths(lift, yaw, attitude, position)
+        found = study.tune(load(scene, set_ or []), wanted, typer.echo)
+        Console().print(study.table(found))
+        if out:
+            study.write(out, found.gains)
+            typer.echo(f'{out}: a scene names it with [autopilot] gains = "{out.name}"')

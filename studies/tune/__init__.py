@@ -1,0 +1,1 @@
+"""`lapwing tune`: the plant linearised about hover, and a gain set designed for it."""

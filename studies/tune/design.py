@@ -1,0 +1,132 @@
+"""A gain set for given bandwidths, slowed down loop by loop until every margin holds."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from services.autopilot.gains import Airframe, GainSet, build
+from services.autopilot.margins import Margins, margins, open_loops, stable
+from studies.tune.linearise import Hover
+
+PHASE, GAIN = 45.0, 6.0  # [deg], [dB] the least margins
+CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each 20 % wrong in the worse direction
+DELAY = 1  # [ticks] that of the parallel coupling, the later of the two
+BACK_OFF = 0.95
+ATTEMPTS = 60
+
+
+class Bandwidths(NamedTuple):
+    """What each loop is to reach: its high-frequency gain, which is nearly its crossover [rad/s]."""
+
+    lift: float = 13.0
+    yaw: float = 22.0
+    attitude: float = 26.0
+    position: float = 4.9
+
+
+def believed(airframe: Airframe, model: Hover) -> Airframe:
+    """The airframe with the mass, inertia and lag that the linear model shows."""
+    arms = (
+        sum(abs(y) for y in airframe.rotor_y),
+        sum(abs(x) for x in airframe.rotor_x),
+        4.0 * airframe.torque_per_thrust,
+    )
+    x, y, z = (arm / k for arm, k in zip(arms, (model.roll, model.pitch, model.yaw), strict=True))
+    return airframe._replace(
+        mass=4.0 / model.lift, inertia_body=(x, y, z), motor=airframe.motor._replace(time_constant=model.lag)
+    )
+
+
+def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
+    """Gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
+
+    def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
+        d = w / effect
+        return _rounded(p * w * d), _rounded(i * w * p * w * d), _rounded(d)
+
+    roll = loop(model.roll, wanted.attitude, 0.12, 0.024)
+    outer = loop(model.tilt, wanted.position, 0.39, 0.032)
+    return GainSet(
+        description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in wanted._asdict().items())} rad/s",
+        lift=loop(model.lift, wanted.lift, 0.39, 0.06),
+        yaw=loop(model.yaw, wanted.yaw, 0.21, 0.017),
+        roll_inner=(-roll[0], -roll[1], -roll[2]),
+        pitch_inner=loop(model.pitch, wanted.attitude, 0.12, 0.024),
+        roll_outer=outer,
+        pitch_outer=outer,
+        tilt_limit=0.6,
+        reference_bandwidth=_rounded(4.1 * wanted.position),
+        reference_damping=0.55,
+        feed_forward=True,
+    )
+
+
+def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
+    """What is wrong with each loop that is unstable, has too small a margin, or is unstable at a corner."""
+    found = {}
+    for name, response in loops.items():
+        m = margins(response)
+        # Only the single loops and the cuts at the motors scale with the vehicle's gain.
+        scaled = CORNERS if name in ("lift", "yaw", "x_motors", "y_motors") else ()
+        if not stable(response):
+            found[name] = "unstable"
+        elif math.degrees(m.phase) < PHASE:
+            found[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
+        elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN:
+            found[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN:g}"
+        elif not all(stable(k * response) for k in scaled):
+            found[name] = "unstable with mass, inertia or thrust 20 % wrong"
+    return found
+
+
+def design(
+    model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]
+) -> tuple[GainSet, dict[str, Margins]]:
+    """The fastest gain set at or below the bandwidths `wanted` whose margins hold, and its margins.
+
+    Args:
+        model: the plant about hover.
+        airframe: what the controller is told of the vehicle.
+        tick: the controller's period [s].
+        wanted: bandwidths to begin with.
+        say: told of every loop that had to be slowed down, and why.
+
+    Raises:
+        ValueError: no bandwidth down to a twentieth of what was wanted holds the margins.
+    """
+    plant, now = believed(airframe, model), wanted
+    first: dict[str, str] = {}
+    for _ in range(ATTEMPTS):
+        gains = gain_set(model, now)
+        loops = open_loops(build(gains, airframe), plant, tick, DELAY)
+        wrong = shortfalls(loops)
+        if not wrong:
+            for loop, was in wanted._asdict().items():
+                if (value := getattr(now, loop)) < was:
+                    say(f"{loop}: backed off from {was:.3g} to {value:.3g} rad/s ({first[loop]})")
+            return gains, {name: margins(response) for name, response in loops.items()}
+        slower = {}
+        for name, why in wrong.items():
+            loop = _owner(name, wrong)
+            first.setdefault(loop, f"{name}: {why}")
+            slower[loop] = BACK_OFF * getattr(now, loop)
+        now = now._replace(**slower)
+    name, why = next(iter(wrong.items()))
+    raise ValueError(f"no gains with {PHASE:g} deg and {GAIN:g} dB found: {name}: {why}; ask for lower bandwidths")
+
+
+def _owner(name: str, wrong: dict[str, str]) -> str:
+    """The bandwidth that is to blame for a loop: of a cascade the inner one first."""
+    if name in ("lift", "yaw"):
+        return name
+    return "attitude" if {"roll", "pitch"} & wrong.keys() else "position"
+
+
+def _decibel(factor: float) -> float:
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")

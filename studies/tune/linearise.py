@@ -1,0 +1,80 @@
+"""The plant about hover, by central differences of the compiled model."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import fsolve
+
+from dynamics import effects
+from dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
+from dynamics.vehicles.multirotor import initial_state, observe, parameters
+from services.scene import Scene
+from services.sections import Effects, airframe
+
+HEIGHT = 50.0  # [m] clear of the ground and of its effect
+INTERVAL = 0.004  # [s] only scales the tick number, which is 0
+STEP = 1e-3  # relative to the rotor speed and to a radian; the model is smooth and nearly quadratic
+
+
+class Hover(NamedTuple):
+    """The linear model about hover in still air."""
+
+    rotor_speed: float  # [rad/s] at which the weight is carried
+    voltage: float  # [V] that holds it
+    lag: float  # [s] of the rotors' speed behind the voltage
+    thrust_slope: float  # [N s/rad] of one rotor over its speed
+    lift: float  # [m/s^2 / N] acceleration upwards over the force quota of every rotor
+    roll: float  # [rad/s^2 / N]
+    pitch: float  # [rad/s^2 / N]
+    yaw: float  # [rad/s^2 / N]
+    tilt: float  # [m/s^2 / rad] acceleration ahead over the pitch
+
+
+def hover(scene: Scene) -> Hover:
+    """Linearise the scene's plant about hover, its winds left out.
+
+    Raises:
+        ValueError: the vehicle cannot hover.
+    """
+    frame = airframe(scene)
+    still = {name: table for name, table in scene[Effects].tables.items() if not name.startswith("wind")}
+    p = parameters(frame, effects.from_scene(still, frame))
+    signs = np.sign(np.array([[y, -x, 0.0] for x, y, _ in frame.rotors.position]))
+    signs[:, 2] = frame.rotors.yaw_sign
+
+    def seen(speeds: np.ndarray, voltage: float, attitude=NO_ROTATION):
+        state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)
+        motion = state.motion._replace(rotor_speed=tuple(float(v) for v in speeds))
+        return observe(p, 0, INTERVAL, state._replace(motion=motion), (float(voltage),) * len(signs))
+
+    def unbalance(x: np.ndarray) -> tuple[float, float]:
+        o = seen(np.full(len(signs), x[0]), x[1])
+        return o.acceleration_world[2], o.rotor_acceleration[0]
+
+    top = frame.motor.max_voltage
+    guess = 0.7 * top / frame.motor.rotor_constant, 0.7 * top
+    (speed, voltage), _, solved, _ = fsolve(unbalance, guess, full_output=True)
+    if solved != 1 or not 0.0 < voltage < top:
+        raise ValueError(f"{scene.path}: no hover found within {top:g} V; expected a vehicle that carries its weight")
+
+    rotors = np.full(len(signs), speed)
+    d = STEP * speed
+
+    def slope(direction: np.ndarray, value):
+        return (value(seen(rotors + d * direction, voltage)) - value(seen(rotors - d * direction, voltage))) / (2.0 * d)
+
+    one = np.ones(len(signs))
+    thrust = slope(one, lambda o: o.thrust[0])
+    ahead = [
+        seen(rotors, voltage, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
+    ]
+    turning = [slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3)]
+    return Hover(
+        float(speed),
+        float(voltage),
+        float(-1.0 / slope(one, lambda o: o.rotor_acceleration[0])),
+        float(thrust),
+        float(slope(one, lambda o: o.acceleration_world[2]) / thrust),
+        *(float(v) for v in turning),
+        float((ahead[1] - ahead[0]) / (2.0 * STEP)),
+    )

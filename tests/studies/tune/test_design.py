@@ -1,0 +1,72 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from services.autopilot.gains import build, load
+from services.autopilot.margins import margins, open_loops, stable
+from services.autopilot.service import known_airframe
+from services.scene import load as load_scene
+from studies.tune.design import GAIN, PHASE, Bandwidths, believed, design, shortfalls
+from studies.tune.linearise import hover
+
+SCENE = load_scene(Path(__file__).parents[3] / "scenes" / "hover.toml")
+TICK = 0.004
+
+
+@pytest.fixture(scope="module")
+def model():
+    return hover(SCENE)
+
+
+@pytest.fixture(scope="module")
+def airframe():
+    return known_airframe(SCENE)
+
+
+def test_the_linear_model_is_the_one_derived_by_hand(model, airframe):
+    """Theory, eqs. (1.13) and (4.30): 4/m, 4 l/J, 4 b/J_z, the motors' lag, and g over the tilt."""
+    arm = sum(abs(x) for x in airframe.rotor_x)
+    i_x, i_y, i_z = airframe.inertia_body
+    assert model.lift == pytest.approx(4.0 / airframe.mass, rel=1e-6)
+    assert model.roll == pytest.approx(arm / i_x, rel=1e-6)
+    assert model.pitch == pytest.approx(arm / i_y, rel=1e-6)
+    assert model.yaw == pytest.approx(4.0 * airframe.torque_per_thrust / i_z, rel=1e-6)
+    assert model.lag == pytest.approx(airframe.motor.time_constant, rel=1e-6)
+    assert model.tilt == pytest.approx(airframe.gravity, rel=1e-5)
+    weight = 0.25 * airframe.mass * airframe.gravity
+    assert model.rotor_speed == pytest.approx(math.sqrt(weight / airframe.motor.thrust_coefficient), rel=1e-6)
+    assert model.thrust_slope == pytest.approx(2.0 * weight / model.rotor_speed, rel=1e-6)
+
+
+def test_a_loop_is_stable_up_to_its_margins_and_no_further(airframe):
+    for name in ("paper", "tuned"):
+        loops = open_loops(build(load(name), airframe), airframe, TICK)
+        for loop in ("lift", "yaw", "x_motors", "y_motors"):
+            m, response = margins(loops[loop]), loops[loop]
+            assert stable(response), loop
+            assert stable(0.97 * m.gain * response), loop
+            assert not stable(1.03 * m.gain * response), loop
+            assert stable(1.03 * m.reduction * response), loop
+            assert not stable(0.97 * m.reduction * response), loop
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airframe, factor):
+    said = []
+    wanted = Bandwidths(*(factor * w for w in Bandwidths()))
+    gains, reached = design(model, airframe, TICK, wanted, said.append)
+    for m in reached.values():
+        assert math.degrees(m.phase) >= PHASE
+        assert m.gain >= 10.0 ** (GAIN / 20.0)
+        assert m.reduction <= 10.0 ** (-GAIN / 20.0)
+    assert not shortfalls(open_loops(build(gains, airframe), believed(airframe, model), TICK))
+    if factor > 1.0:
+        assert any("backed off" in line for line in said)
+
+
+def test_unstable_and_weak_gains_are_named(airframe):
+    fast = load("tuned").model_copy(update={"lift": (160.0, 120.0, 3200.0)})
+    assert shortfalls(open_loops(build(fast, airframe), airframe, TICK))["lift"] == "unstable"
+    assert "phase margin 2" in shortfalls(open_loops(build(load("paper"), airframe), airframe, TICK))["roll"]
+    assert shortfalls(open_loops(build(load("tuned"), airframe), airframe, TICK)) == {}
