@@ -68,13 +68,15 @@ def hover(scene: Scene) -> Hover:
     ahead = [
         seen(rotors, voltage, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
     ]
-    turning = [slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3)]
+    roll, pitch, yaw = (slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3))
     return Hover(
         float(speed),
         float(voltage),
         float(-1.0 / slope(one, lambda o: o.rotor_acceleration[0])),
         float(thrust),
         float(slope(one, lambda o: o.acceleration_world[2]) / thrust),
-        *(float(v) for v in turning),
+        float(roll),
+        float(pitch),
+        float(yaw),
         float((ahead[1] - ahead[0]) / (2.0 * STEP)),
     )
