@@ -26,10 +26,10 @@ def cache_folder(package: str) -> str:
     """Where the machine code of a package is kept: a folder for each state of the sources that can be in it.
 
     Numba stamps a cached function with its own file only; an edited import would keep the old machine code. The
-    sources of `dynamics` can be in any kernel, those of a service only in its own.
+    sources of `dynamics` can be in any kernel, those of a service or a study only in its own.
 
     Args:
-        package: "dynamics", or a service's "services.NAME".
+        package: "dynamics", a service's "services.NAME", or a study's "studies.NAME".
     """
     digest = hashlib.blake2b(digest_size=8)
     for folder in sorted({"dynamics", package.replace(".", "/")}):
@@ -59,8 +59,8 @@ numba.core.caching.IndexDataCacheFile._load_index = _readable_index
 def _compile(function: Callable, **options: bool) -> Any:
     if not FIXED:
         first, _, rest = function.__module__.partition(".")
-        package = first if first != "services" else f"{first}.{rest.partition('.')[0]}"
-        numba.config.CACHE_DIR = cache_folder(package if first in ("dynamics", "services") else "dynamics")
+        package = f"{first}.{rest.partition('.')[0]}" if first in ("services", "studies") else "dynamics"
+        numba.config.CACHE_DIR = cache_folder(package)
     return numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
 
 
