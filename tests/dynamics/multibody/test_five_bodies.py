@@ -6,6 +6,7 @@ from test_augmented import PAPER
 
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import Quaternion
+from dynamics.multibody import augmented
 from dynamics.multibody.augmented import accelerations
 from dynamics.multibody.delivery_drone import delivery_drone
 from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate, solve
@@ -32,8 +33,8 @@ def scene(rng, driven):
     return drone, p, together(p, chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds)), wrench, speeds, drive
 
 
-def general(drone, x, wrench, speeds, drive, driven):
-    """The same by the general engine; a motor torque acts on propeller and chassis."""
+def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):
+    """The same by the general engine; a motor torque acts on propeller and chassis. `feedback` is Baumgarte's [1/s]."""
     q, v = arrays(x)
     if driven == "speed":
         system, imposed = drone_system(drone), np.stack([speeds, drive], axis=1)
@@ -44,7 +45,11 @@ def general(drone, x, wrench, speeds, drive, driven):
         wrench[k + 1, 5] += drive[k]
         R0, R = (rotation(q[b, 3:]) for b in (0, k + 1))
         wrench[0, 3:] -= drive[k] * R0.T @ R[:, 2]
-    return system, accelerations(system, q, v, wrench), None
+    none = np.zeros((0, 2))
+    found, _ = augmented.solve(
+        system.arrays, q, v, wrench, none, 2.0 * feedback, feedback * feedback, augmented.RANK_TOLERANCE, augmented.ANY
+    )
+    return system, found, None
 
 
 def rotation(q):
@@ -64,8 +69,9 @@ def test_identical_to_the_general_path(driven):
         np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-12)
 
 
-def test_identical_off_the_constraints_too():
-    """Index-1 equations hold wherever the integration has drifted to: hinges apart by 1 %."""
+@pytest.mark.parametrize("feedback", [0.0, 50.0])
+def test_identical_off_the_constraints_too(feedback):
+    """Index-1 equations hold wherever the integration has drifted to: hinges apart by 1 %; so does feedback of that."""
     rng = np.random.default_rng(32)
     for _ in range(20):
         drone, p, x, wrench, speeds, drive = scene(rng, "torque")
@@ -76,8 +82,8 @@ def test_identical_off_the_constraints_too():
             for a, b in zip(q.tolist(), v.tolist(), strict=True)
         ]
         x = FiveBodies(bodies[0], tuple(bodies[1:]))
-        _, expected, _ = general(drone, x, wrench, speeds, drive, "torque")
-        _, ours = arrays(rate(p, 0.0, x))
+        _, expected, _ = general(drone, x, wrench, speeds, drive, "torque", feedback)
+        _, ours = arrays(rate(p._replace(feedback=feedback), 0.0, x))
         scale = np.abs(expected.acceleration).max()
         np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-11)
 
