@@ -116,7 +116,8 @@ class Autopilot:
             pilot.parameters_changed = False
             changed = parameters.with_gains(self._gains, pilot.parameters)
             self._parameters = Cell(gains.build(changed, self._airframe, self._geometric))
-        wanted = pilot.step(self._interval, setpoint, self._thrust / self._weight, self._stage == LANDED)
+        carried = self._thrust / self._weight if self._weight > 0.0 else 1.0  # without gravity nothing falls
+        wanted = pilot.step(self._interval, setpoint, carried, self._stage == LANDED)
         if not pilot.on_trajectory and not pilot.flying and self._stage != STANDING:
             self._state, self._stage = Cell(control.START), STANDING
         return wanted
