@@ -113,4 +113,4 @@ def tune(
         Console().print(study.table(found))
         if out:
             study.write(out, found.gains)
-            typer.echo(f'{out}: a scene names it with [autopilot] gains = "{out.name}"')
+            typer.echo(f'{out}: a scene beside it names it with [autopilot] gains = "{out.name}"')
