@@ -6,15 +6,16 @@ what is looked for: the autopilot gets the true state, and winds their mean.
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from messages.topics import TRUTH, Topic
+from messages.topics import TRUTH
 from services.scene import Scene, load, sections
-from services.sections import Exchange, Rates, Run, Vehicle
+from services.sections import Exchange, Rates, Run
 from services.single import run_single
 from services.table import lockstep_services
+from studies.flight import Messages
 
 LONGEST = 20.0  # [s] of a flight that is flown so often
 MOST_TICKS = 5000  # of it, at the scene's own rate
@@ -107,30 +108,12 @@ def _exchange(scene: Scene, rate: int) -> list[str]:
     return [f"exchange.rate={rate}", *bodies]
 
 
-class _Truth:
-    """Takes the place of a log: keeps the true states."""
-
-    def __init__(self, key: str):
-        self._key = key
-        self.poses: list[Any] = []
-
-    def write(self, name: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
-        """A message of any topic."""
-        if name == self._key:
-            self.poses.append(message.decode(payload).pose)
-
-
 def fly(scene: Scene) -> Track:
     """Fly a scene in memory, as fast as it goes."""
-    kept = _Truth(TRUTH.key(scene[Vehicle].name))
-    services = lockstep_services(scene)
-
-    def go_on(time_ns: int, newest: dict[Topic, bytes]) -> bool:
-        return False
-
-    run_single(scene, services, kept, None, go_on)  # type: ignore[arg-type]
-    position = np.array([p.position for p in kept.poses])
-    attitude = np.array([p.orientation for p in kept.poses])
+    messages = Messages(scene, (TRUTH,))
+    run_single(scene, lockstep_services(scene), messages, None, lambda *_: False)
+    poses = [m.pose for m in messages.of[TRUTH]]
+    position, attitude = np.array([p.position for p in poses]), np.array([p.orientation for p in poses])
     return Track(scene[Exchange].interval, position, attitude)
 
 
