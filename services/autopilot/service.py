@@ -1,7 +1,7 @@
 """The autopilot as a service: sensors (or the truth) and setpoints in, motor voltages out."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from dynamics.cell import Cell, read
 from dynamics.effects.rotor_thrust import RotorThrust
@@ -38,6 +38,14 @@ def steer(p, s, dt, believed, position_world, velocity_world, acceleration_world
     setpoint = interface.Setpoint(position_world, velocity_world, acceleration_world, yaw, yaw_rate)
     s.value, command = control.step(p.value, s.value, dt, estimate, setpoint)
     return command, s.value.stage.name
+
+
+class Core(NamedTuple):
+    """What a compiled closed loop flies with; there is no pilot in it."""
+
+    navigation: navigation.Core
+    parameters: Cell  # of the controller
+    state: Cell  # of the controller
 
 
 class Autopilot:
@@ -77,6 +85,11 @@ class Autopilot:
             config.operator,
         )
         self._thrust = 0.0  # [N] asked for at the last tick
+
+    @property
+    def core(self) -> Core:
+        """What a compiled closed loop takes instead of `step`."""
+        return Core(self._navigation.core, self._parameters, self._state)
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
