@@ -1,6 +1,6 @@
 """One flight of a campaign: in the compiled closed loop where that can fly it, else by the services."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -8,23 +8,16 @@ from dynamics.cell import Cell
 from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from messages import VehicleState
 from messages.topics import STATUS
+from services.autopilot.commander.failsafes import POSITION_LOST
 from services.autopilot.config import Autopilot
 from services.scene import Scene
 from services.sections import Exchange, Run, follows_trajectory, gravity, period
 from services.sensors.service import TEMPERATURE
 from services.table import lockstep_services
-from studies.campaign import loop
+from studies.campaign import by_services, loop
+from studies.campaign.record import FlightRecord, Flown, blank
 
-SHAPES = {"attitude": 4, "setpoint_world": 4, "tilt_reference": 2, "motor_voltage": 4, "estimated_attitude": 4}
-FLAT = {"power": float, "in_contact": bool, "armed": bool, "health": int}
-
-
-class Flown(NamedTuple):
-    """A flight: its record, and how it ended."""
-
-    record: loop.FlightRecord
-    finite: bool  # all numbers to the end
-    finished: bool  # the mission ended before the run
+DOUBT = 0.5  # [s] without a sure position after which a pilot may take over
 
 
 def seeded(scene: Scene, seed: int) -> Scene:
@@ -32,30 +25,29 @@ def seeded(scene: Scene, seed: int) -> Scene:
     return scene.replaced(scene[Run].model_copy(update={"seed": seed}))
 
 
-def refusal(scene: Scene) -> str:
-    """Why the compiled loop cannot fly this scene; "" where it can."""
-    if not scene.has(Autopilot) or not follows_trajectory(scene) or scene[Autopilot].operator:
-        return "expected a scene whose autopilot follows a [trajectory], without an operator"
-    return ""
-
-
-def blank(ticks: int) -> loop.FlightRecord:
-    """A record of so many rows, all zero."""
-    columns = {}
-    for name in loop.FlightRecord._fields:
-        kind = FLAT.get(name)
-        columns[name] = np.zeros(ticks, kind) if kind else np.zeros((ticks, SHAPES.get(name, 3)))
-    return loop.FlightRecord(**columns)
-
-
 def fly(scene: Scene) -> Flown:
-    """Fly the scene to its end in the compiled loop.
+    """Fly the scene to its end: compiled, unless the pilot may act, who is in the services only.
 
     Raises:
-        ValueError: the loop cannot fly it.
+        ValueError: nobody flies along a trajectory in this scene.
     """
-    if why := refusal(scene):
-        raise ValueError(f"{scene.path}: {why}")
+    if not scene.has(Autopilot) or not follows_trajectory(scene):
+        raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
+    if scene[Autopilot].operator or scene.tables("effects").get("battery") is not None:
+        return by_services.fly(scene)
+    flown = fly_compiled(scene)
+    return by_services.fly(scene) if _doubtful(flown.record, scene[Exchange].rate) else flown
+
+
+def _doubtful(record: FlightRecord, rate: int) -> bool:
+    """Whether the position was lost for so long that the pilot may have acted."""
+    lost = record.armed & (record.health & POSITION_LOST != 0)
+    sure = np.flatnonzero(~np.concatenate([[False], lost, [False]]))
+    return bool(np.diff(sure).max() - 1 > DOUBT * rate)
+
+
+def fly_compiled(scene: Scene) -> Flown:
+    """Fly the scene to its end in the compiled loop, without a pilot."""
     services: dict[str, Any] = lockstep_services(scene)
     core = services["autopilot"].core
     path, final = services["trajectory"].core
@@ -73,7 +65,7 @@ def fly(scene: Scene) -> Flown:
     ticks, finite, finished = loop.fly(
         services["plant"].core, carried, core.navigation, core.parameters, core.state, path, around, timing, record
     )
-    return Flown(loop.FlightRecord(*(column[:ticks] for column in record)), finite, finished)
+    return Flown(FlightRecord(*(column[:ticks] for column in record)), finite, finished)
 
 
 def _carried(sensors: Any, interval_ns: int) -> loop.Carried:

@@ -63,25 +63,6 @@ class Timing(NamedTuple):
     settle: int  # after the mission has ended
 
 
-class FlightRecord(NamedTuple):
-    """What is kept of a flight, a row a tick: arrays of shape (n, ...)."""
-
-    position_world: np.ndarray  # (n, 3) [m]
-    attitude: np.ndarray  # (n, 4) wxyz
-    velocity_world: np.ndarray  # (n, 3) [m/s]
-    omega_body: np.ndarray  # (n, 3) [rad/s]
-    power: np.ndarray  # (n,) [W] electrical
-    in_contact: np.ndarray  # (n,) bool: any foot touches the ground
-    setpoint_world: np.ndarray  # (n, 4) position [m] and yaw [rad]
-    tilt_reference: np.ndarray  # (n, 2) roll and pitch that the inner loops follow [rad]
-    motor_voltage: np.ndarray  # (n, 4) [V] asked for
-    armed: np.ndarray  # (n,) bool
-    estimated_world: np.ndarray  # (n, 3) [m]
-    estimated_attitude: np.ndarray  # (n, 4) wxyz
-    position_std: np.ndarray  # (n, 3) [m] world
-    health: np.ndarray  # (n,)
-
-
 def _sample(p, s, key, tick, truth):
     """`sample` of the sensor whose parameters `p` are."""
     raise NotImplementedError("compiled code only")

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land"}
 _RANK = ("hold", "return", "land")  # a failsafe never undoes a stronger one
-_POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
+POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
 
 
 class Failsafe(NamedTuple):
@@ -26,7 +26,7 @@ class Failsafe(NamedTuple):
 FAILSAFES = (
     Failsafe(
         "the position is lost",
-        lambda p: bool(p.health & _POSITION_LOST),
+        lambda p: bool(p.health & POSITION_LOST),
         lambda p: p.parameters["COM_POS_FS_DELAY"],
         "FS_ESTIMATE_ACT",
     ),
