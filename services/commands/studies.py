@@ -1,4 +1,4 @@
-"""The studies: performance, effects, accuracy, tune."""
+"""The studies: performance, effects, accuracy, campaign, tune."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -80,6 +80,39 @@ def accuracy(
         check_writable(json)
         check_plot(plot)
         command.run(target, set_ or [], goal, json, plot)
+
+
+@app.command()
+def campaign(
+    scene: SceneFile,
+    set_: Overrides = None,
+    seeds: Annotated[int, typer.Option(metavar="N", help="fly seeds 1 to N")] = 100,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write every flight's figures as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the distribution (PNG, SVG or PDF)")] = None,
+) -> None:
+    """Fly a scene with many seeds, in one compiled closed loop: errors as a distribution, and crashes."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from services.scene import load
+    from studies.campaign import show, study
+
+    with user_errors():
+        if seeds < 1:
+            raise ValueError(f"--seeds {seeds}: expected at least 1")
+        check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+        check_writable(json)
+        check_plot(plot)
+        console = Console()
+        loaded = load(scene, set_ or [])
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
+            found = study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
+        show.show(console, found)
+        if json:
+            show.write_json(json, found)
+        if plot:
+            show.plot(plot, found)
 
 
 @app.command()

@@ -80,9 +80,7 @@ class Reduced:
     @property
     def core(self) -> Core:
         """What a compiled closed loop flies with instead of `step`."""
-        return Core(
-            self._method, self._parameters, self._state, self._key, self._step, self._steps, self._interval
-        )
+        return Core(self._method, self._parameters, self._state, self._key, self._step, self._steps, self._interval)
 
     def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
         """(parameters, state at the start)."""
