@@ -47,7 +47,7 @@ def heartbeat(v: Vehicle) -> Any:
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if s.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if s.mode == "position_control":
+    if s.mode in ("position_control", "altitude_control"):
         base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     else:
         base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
@@ -86,6 +86,7 @@ def extended_state(v: Vehicle) -> Any:
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
     else:
         between = {"takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF, "land": mavlink.MAV_LANDED_STATE_LANDING}
+        between["descend"] = mavlink.MAV_LANDED_STATE_LANDING
         state = between.get(s.mode, mavlink.MAV_LANDED_STATE_IN_AIR)
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
 

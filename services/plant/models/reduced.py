@@ -62,8 +62,7 @@ class Reduced:
         parameters, start = self._vehicle(scene)
         self._parameters, self._state = Cell(parameters), Cell(start)
         self._off = (0.0,) * len(frame.rotors.position)
-        self._cells = frame.battery.cells if frame.battery else 0
-        self._voltage = frame.motor.max_voltage
+        self._pack = frame.battery
 
     def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
         """(parameters, state at the start)."""
@@ -92,4 +91,4 @@ class Reduced:
             yield from outputs.whereabouts(time_ns, self._name, motion)
             yield ODOM, outputs.odometry(time_ns, self._name, motion)
         if tick % self._battery_every == 0:
-            yield BATTERY, outputs.battery(time_ns, self._name, self._voltage, sum(seen.motor_current), self._cells)
+            yield BATTERY, outputs.battery(time_ns, self._name, seen.battery, self._pack)
