@@ -11,6 +11,7 @@ from services.mavlink.telemetry.stream import stream
 from services.mavlink.vehicle import Vehicle
 
 NONE = 0xFFFF  # no item of a mission
+CRITICAL = 2  # Status.battery_warning
 
 _CONTROL = (
     mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
@@ -70,7 +71,9 @@ def sys_status(v: Vehicle) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
-    sound = _CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_GEOFENCE
+    sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
+    sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
+    sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
     for bits, good in _SENSORS.items():
         sound |= bits if (healthy(v) if v.on_truth else good(v)) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
