@@ -62,6 +62,7 @@ GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate=
 BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
 SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
+TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # what of it is flown is in SETPOINT
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
 LIFT = Topic("{vehicle}/lift", LiftCommand)

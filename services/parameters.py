@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from services.scene import Scene, sections
 
-NOTHING, HOLD, RETURN, LAND = 0, 1, 2, 3  # what a failsafe does
-_ACTION = "0 nothing, 1 hold, 2 return, 3 land"
+NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # what a failsafe does
+_ACTION = "0 a warning, 1 hold, 2 return, 3 land, 4 descend, which needs no position"
 
 
 class Parameter(NamedTuple):
@@ -48,14 +48,19 @@ _FLIGHT = (
 )
 _FAILSAFES = (
     Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "offboard setpoints older than this are lost"),
-    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 3, f"when they are: {_ACTION}", True),
+    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"when they are: {_ACTION}", True),
     Parameter("COM_DL_LOSS_T", "s", 10.0, 1.0, 300.0, "a ground station that is silent for so long is lost"),
-    Parameter("NAV_DLL_ACT", "", RETURN, 0, 3, f"when it is: {_ACTION}", True),
-    Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which the battery is low, fraction"),
-    Parameter("FS_BATTERY_ACT", "", LAND, 0, 3, f"when it is: {_ACTION}", True),
+    Parameter("NAV_DLL_ACT", "", RETURN, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
+    Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which it is critical, and the motors are not armed"),
+    Parameter("FS_BAT_CRIT_ACT", "", RETURN, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("BAT_EMERGEN_THR", "", 0.05, 0.0, 0.5, "charge below which it is nearly empty"),
+    Parameter("FS_BAT_EMER_ACT", "", LAND, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"when a motor gives less than it is asked for: {_ACTION}", True),
     Parameter("COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position for so long it is lost"),
-    Parameter("FS_ESTIMATE_ACT", "", LAND, 0, 3, f"when it is: {_ACTION}", True),
-    Parameter("FS_FENCE_ACT", "", RETURN, 0, 3, f"outside of the fence: {_ACTION}", True),
+    Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"outside of the fence: {_ACTION}", True),
 )
 _LOOPS = {
     "lift": "MPC_Z",

@@ -62,16 +62,17 @@ def read(path: Path) -> list[OperatorCommand]:
     if not items:
         raise ValueError(f"{path}: holds no mission item")
 
-    def command(kind: str, values: tuple[float, ...] = (), items: Sequence[Any] = ()) -> OperatorCommand:
-        return OperatorCommand(kind, SOURCE, 0, values, "", tuple(items))
-
+    steps: list[tuple[str, tuple[float, ...], Sequence[Any]]] = [
+        ("mission_upload", (), items),
+        ("fence_upload", (), fence),
+        ("rally_upload", (), rally),
+        ("mission", (), ()),
+        ("arm", (0.0, PATIENCE), ()),
+        ("finish", (), ()),
+    ]
     return [
-        command("mission_upload", items=items),
-        command("fence_upload", items=fence),
-        command("rally_upload", items=rally),
-        command("mission"),
-        command("arm", (0.0, PATIENCE)),
-        command("finish"),
+        OperatorCommand(kind, SOURCE, number, values, "", tuple(given))
+        for number, (kind, values, given) in enumerate(steps, start=1)
     ]
 
 

@@ -11,6 +11,7 @@ The stages of one evaluation, in order, each a hook:
     factors   (e, memory, s, factors) -> Factors             on each rotor's thrust and torque
     loads     (e, memory, s, factors, loads) -> Loads        thrust and torque of each rotor, added to those before
     supply    (e, memory, voltage) -> voltage                what the battery lets the motors have
+    gauge     (e, memory) -> (charge, voltage [V], current [A]) of the battery, charge a fraction
     motor     (e, memory, s, loads, voltage) -> (acceleration, current) of each rotor; one effect only
     wrench    (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
     wrench_body  the same with the force in body coordinates
@@ -61,6 +62,7 @@ air = _hook("air")
 factors = _hook("factors")
 loads = _hook("loads")
 supply = _hook("supply")
+gauge = _hook("gauge")
 motor = _hook("motor")
 wrench = _hook("wrench")
 wrench_body = _hook("wrench_body")
@@ -161,6 +163,14 @@ all_motors = _written_out(
     "motor",
     "s, loads, voltage, default",
     "value = f{i}(effects[{i}], memory[{i}], s, loads, voltage)",
+    "value",
+    default="default",
+)
+all_gauges = _written_out(
+    "all_gauges",
+    "gauge",
+    "default",
+    "value = f{i}(effects[{i}], memory[{i}])",
     "value",
     default="default",
 )

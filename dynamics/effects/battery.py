@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from dynamics.effects._hooks import sample, supply
+from dynamics.effects._hooks import gauge, sample, supply
 from dynamics.effects._rotors import each, total
 from dynamics.effects._scene import cannot, checked
 from dynamics.kernel import leaf
@@ -78,3 +78,9 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 def battery(e, memory, voltage):
     """Voltage [V] that each motor gets."""
     return each(_at_most, memory[1], voltage, voltage)
+
+
+@gauge(Battery)
+def read(e, memory):
+    """What a battery monitor shows: charge, voltage [V] under load, current [A]."""
+    return memory

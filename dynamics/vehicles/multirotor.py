@@ -5,6 +5,7 @@ every force is an effect (dynamics/effects). All functions are pure. What stands
 (`FORMS`): here one rigid body; `multirotor_multibody` adds five, under the same effects, `advance` and `observe`.
 """
 
+import math
 import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -89,6 +90,7 @@ class MultirotorObservation(NamedTuple):
     wind_world: Vec3  # [m/s]
     mass: float  # [kg]
     in_contact: bool
+    battery: tuple[float, float, float]  # charge (fraction, NaN where no effect counts it), voltage [V], current [A]
 
 
 @leaf
@@ -291,6 +293,7 @@ def observe(p, tick, interval, state, command):
         s.air.wind_world,
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
+        hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current))),
     )
 
 

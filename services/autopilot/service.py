@@ -9,9 +9,9 @@ from dynamics.kernel import kernel
 from dynamics.vector import ZERO
 from dynamics.vehicles.multirotor import STANDARD_DENSITY
 from messages import Actuators, Answers, Estimate, Point, Pose, Quaternion, Setpoint, Status, Vector3, header
-from messages.topics import ACTUATORS, ANSWERS, ESTIMATE, OPERATOR, SETPOINT, STATUS, Topic
+from messages.topics import ACTUATORS, ANSWERS, BATTERY, ESTIMATE, OPERATOR, SETPOINT, STATUS, TRAJECTORY, Topic
 from services import parameters
-from services.autopilot import control, estimator, gains, interface, navigation
+from services.autopilot import control, estimator, gains, interface, motor_watch, navigation
 from services.autopilot.commander.checks import reasons
 from services.autopilot.commander.orders import obey
 from services.autopilot.commander.pilot import Pilot
@@ -31,13 +31,18 @@ def create(scene: Scene) -> "Autopilot | None":
 
 
 @kernel
-def steer(p, s, dt, believed, position_world, velocity_world, acceleration_world, yaw, yaw_rate):
-    """One step of the controller in the cell `s` on the estimate in the cell `believed`; the command and the stage."""
+def steer(p, s, watch, watched, dt, believed, position_world, velocity_world, acceleration_world, yaw, yaw_rate):
+    """One step of the controller in the cell `s` on the estimate in the cell `believed`.
+
+    Returns the command, the stage, and the number of a motor that has failed (watched in `watched`; 0: none).
+    """
     e = believed.value
     estimate = interface.Estimate(e.position_world, e.attitude, e.velocity_world, e.omega_body)
     setpoint = interface.Setpoint(position_world, velocity_world, acceleration_world, yaw, yaw_rate)
     s.value, command = control.step(p.value, s.value, dt, estimate, setpoint)
-    return command, s.value.stage.name
+    height = e.position_world[2] - p.value.resting_height
+    watched.value = motor_watch.step(watch.value, watched.value, dt, e.omega_body, height, command.thrust)
+    return command, s.value.stage.name, watched.value.failed
 
 
 class Core(NamedTuple):
@@ -46,6 +51,8 @@ class Core(NamedTuple):
     navigation: navigation.Core
     parameters: Cell  # of the controller
     state: Cell  # of the controller
+    watch: Cell  # parameters of the watch for failing motors
+    watched: Cell  # its state
 
 
 class Autopilot:
@@ -55,12 +62,11 @@ class Autopilot:
         config, exchange = scene[Config], scene[Exchange]
         self._navigation = navigation.Truth(scene) if config.estimator == "truth" else navigation.Filter(scene)
         follows = follows_trajectory(scene)
-        self._given = Input(SETPOINT) if follows else None
+        self._given = Input(TRAJECTORY) if follows else None
         self._operator = Input(OPERATOR, external=True) if config.operator else None
         optional = [needed for needed in (self._given, self._operator) if needed]
-        self.inputs = (*optional, *self._navigation.inputs)
-        self.outputs: tuple[Topic, ...] = (ACTUATORS, ESTIMATE, STATUS)
-        self.outputs += () if follows else (SETPOINT,)
+        self.inputs = (*optional, Input(BATTERY), *self._navigation.inputs)
+        self.outputs: tuple[Topic, ...] = (ACTUATORS, ESTIMATE, STATUS, SETPOINT)
         self.outputs += (ANSWERS,) if config.operator else ()
         self._interval, self._interval_ns = exchange.interval, exchange.interval_ns
         self._estimate_every = ticks(scene, scene[Rates].estimate, "estimate")
@@ -71,13 +77,15 @@ class Autopilot:
             config.attitude == "so3",
             known_airframe(scene),
         )
-        built = gains.build(self._gains, self._airframe, self._geometric)
+        table = parameters.table(scene)
+        built = self._build({p.name: p.default for p in table.values()})
         self._parameters = Cell(built)
-        self._state, self._stage = Cell(control.START), STANDING
+        self._watch = Cell(motor_watch.build(self._airframe))
+        self._stand()
         self._weight = self._airframe.mass * self._airframe.gravity
         share = self._weight / (4.0 * built.thrust_max)
         self._pilot = Pilot(
-            parameters.table(scene),
+            table,
             self._airframe.resting_height,
             self._airframe.gravity,
             share,
@@ -89,18 +97,28 @@ class Autopilot:
     @property
     def core(self) -> Core:
         """What a compiled closed loop takes instead of `step`."""
-        return Core(self._navigation.core, self._parameters, self._state)
+        return Core(self._navigation.core, self._parameters, self._state, self._watch, self._watched)
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
         self._navigation.prepare()
-        self._steer(Cell(control.START), interface.Setpoint(ZERO, ZERO, ZERO, 0.0, 0.0))
+        self._steer(Cell(control.START), Cell(motor_watch.START), interface.Setpoint(ZERO, ZERO, ZERO, 0.0, 0.0))
         read(self._navigation.believed)
 
-    def _steer(self, state: Cell, wanted: Any) -> Any:
+    def _stand(self) -> None:
+        """The controller before a flight."""
+        self._state, self._watched, self._stage = Cell(control.START), Cell(motor_watch.START), STANDING
+
+    def _build(self, values: dict[str, float]) -> control.Parameters:
+        """The controller's parameters of the pilot's `values`."""
+        return gains.build(parameters.with_gains(self._gains, values), self._airframe, self._geometric)
+
+    def _steer(self, state: Cell, watched: Cell, wanted: Any) -> Any:
         return steer(
             self._parameters,
             state,
+            self._watch,
+            watched,
             self._interval,
             self._navigation.believed,
             *wanted,
@@ -111,9 +129,12 @@ class Autopilot:
         arrived = iter(messages)
         setpoint = next(arrived) if self._given else None
         commands = next(arrived) if self._operator else None
+        battery = next(arrived)
+        if battery is not None:
+            self._pilot.charge = battery.percentage
         self._navigation.update(tick, self._stage == STANDING, *arrived)
         wanted = self._ask(tick, setpoint, commands)
-        command, self._stage = self._steer(self._state, wanted)
+        command, self._stage, self._pilot.failed_motor = self._steer(self._state, self._watched, wanted)
         self._thrust = sum(command.thrust)
         yield from self._tell(tick, setpoint, wanted, command)
 
@@ -127,12 +148,11 @@ class Autopilot:
             obey(pilot, given)
         if pilot.parameters_changed:
             pilot.parameters_changed = False
-            changed = parameters.with_gains(self._gains, pilot.parameters)
-            self._parameters = Cell(gains.build(changed, self._airframe, self._geometric))
+            self._parameters = Cell(self._build(pilot.parameters))
         carried = self._thrust / self._weight if self._weight > 0.0 else 1.0  # without gravity nothing falls
         wanted = pilot.step(self._interval, setpoint, carried, self._stage == LANDED)
         if not pilot.on_trajectory and not pilot.flying and self._stage != STANDING:
-            self._state, self._stage = Cell(control.START), STANDING
+            self._stand()
         return wanted
 
     def _tell(self, tick: int, setpoint: Any, wanted: Any, command: Any) -> Iterator[tuple[Topic, Any]]:
@@ -151,7 +171,9 @@ class Autopilot:
         )
         if tick % self._estimate_every == 0:
             yield ESTIMATE, estimate_message(time_ns, read(self._navigation.believed))
-        if self._given is None:
+        if pilot.on_trajectory:
+            yield SETPOINT, setpoint
+        else:
             yield SETPOINT, Setpoint(header(time_ns, "world"), *wanted_vectors(wanted), pilot.phase, False)
         if tick % self._status_every == 0:
             over = command.finished and setpoint.final if pilot.on_trajectory else pilot.finished
@@ -188,6 +210,9 @@ def status_message(time_ns: int, pilot: Pilot, phase: str, flying: bool, finishe
         pilot.offboard_fresh,
         tuple(reasons(pilot)) if pilot.operated and not armed else (),
         bool(pilot.failsafe),
+        Vector3(*pilot.home, 0.0),
+        pilot.battery_warning,
+        pilot.failed_motor,
     )
 
 

@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from messages.topics import ANSWERS, ESTIMATE, STATUS, Topic
+from messages import OperatorInput, header
+from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS, Topic
 from services.mavlink.channel import Channel, Signature
 from services.mavlink.client import Client
 from services.mavlink.clock import Clock, Instant
@@ -22,6 +23,7 @@ FRESH = 3.5  # [s] after its last heartbeat a ground station counts as gone
 ALL = 0  # target system or component of a message for everybody
 TEXT = 50  # bytes of a STATUSTEXT
 NONE = 0xFFFF
+_NOTHING = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
 
 
 class Adapter:
@@ -54,6 +56,7 @@ class Adapter:
         self._signature = Signature(key) if key else None
         self._insecure = insecure
         self._shown: tuple = ()
+        self._home = vehicle.status.home
         self._reached, self._item = NONE, (0, 0)
         self._texts = 0
         self._next_link = 0
@@ -107,6 +110,12 @@ class Adapter:
             payload: the message, encoded.
             wall: monotonic wall time [s].
         """
+        if topic is OPERATOR:
+            if len(payload) > _NOTHING:
+                ours = {client.name for client in self.clients} if self.requests.taken else ()
+                given = topic.message.decode(payload).commands
+                self.missions.overhear([command for command in given if command.source not in ours], ())
+            return
         self.vehicle.view.put(topic, payload)
         if topic is ESTIMATE:
             self.vehicle.time_ns = time_ns
@@ -115,6 +124,7 @@ class Adapter:
         elif topic is ANSWERS:
             said = self.vehicle.view.get(ANSWERS)
             self.requests.take(said.answers)
+            self.missions.overhear((), said.answers)
             for text in said.text:
                 self.say(text)
         elif topic is STATUS:
@@ -178,6 +188,9 @@ class Adapter:
             self._shown = shown
             self.send_all("HEARTBEAT")
             self.send_all("EXTENDED_SYS_STATE")
+        if s.home != self._home:
+            self._home = s.home
+            self.send_all("HOME_POSITION")
         if (s.mission_current, s.mission_state) != self._item:
             self._item = s.mission_current, s.mission_state
             self.send_all("MISSION_CURRENT")

@@ -1,11 +1,13 @@
 """The missions, fences and rally points that the vehicle holds, and uploads on their way."""
 
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Iterable
 from typing import Any
 
 from services.mavlink.client import Client
 from services.mavlink.clock import Clock
 from services.mavlink.dialect import mavlink
+from services.mavlink.express import express
 from services.mavlink.mission_items import MOST_ITEMS, Refused, convert
 from services.mavlink.requests import Requests
 
@@ -15,6 +17,8 @@ KINDS = {  # what the autopilot is asked to take
     mavlink.MAV_MISSION_TYPE_FENCE: "fence_upload",
     mavlink.MAV_MISSION_TYPE_RALLY: "rally_upload",
 }
+_KIND_OF = {command: kind for kind, command in KINDS.items()} | {"mission_clear": mavlink.MAV_MISSION_TYPE_MISSION}
+_RECENT = 64  # uploads and acceptances that wait for one another
 _RESULTS = {
     mavlink.MAV_RESULT_ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: mavlink.MAV_MISSION_DENIED,
@@ -42,6 +46,8 @@ class Missions:
         self.held: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as they came
         self._uploads: dict[int, _Upload] = {}
         self._finished: dict[int, tuple[Client, int]] = {}  # whose the last upload was, and how it ended
+        self._overheard: deque[Any] = deque(maxlen=_RECENT)  # uploads that did not come through us
+        self._accepted: deque[tuple[str, int]] = deque(maxlen=_RECENT)  # source and number of commands
 
     def begin(self, client: Client, kind: int, count: int) -> None:
         """A client has that many items to hand over."""
@@ -92,6 +98,15 @@ class Missions:
                     self._hand_over(_Upload(client, other, 0, self._clock), told=kind)
         else:
             self.begin(client, kind, 0)
+
+    def overhear(self, commands: Iterable[Any], answers: Iterable[Any]) -> None:
+        """The autopilot has got commands that are none of ours, or answered some: uploads among them are held too."""
+        self._overheard += (c for c in commands if c.kind in _KIND_OF)
+        self._accepted += ((a.source, a.id) for a in answers if a.result == mavlink.MAV_RESULT_ACCEPTED)
+        for command in [c for c in self._overheard if (c.source, c.id) in self._accepted]:
+            self._overheard.remove(command)
+            kind = _KIND_OF[command.kind]
+            self.held[kind] = express(command.items, kind)
 
     def step(self) -> None:
         """Ask again for what does not come; give up at last."""

@@ -22,6 +22,11 @@ class Requests:
         self._last = 0
         self._waiting: dict[int, tuple[Answered, Instant]] = {}
 
+    @property
+    def taken(self) -> bool:
+        """Whether there is an autopilot that takes commands."""
+        return self._put is not None
+
     def ask(
         self,
         kind: str,

@@ -6,7 +6,7 @@ subscribes to; all else it reads from the services' journals, which wakes nobody
 
 from typing import TYPE_CHECKING
 
-from messages.topics import ANSWERS, ESTIMATE, STATUS
+from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS
 from services.journal import JOURNAL_KEY, entries
 from services.outside import OPERATOR_KEY
 from services.parameters import table
@@ -46,7 +46,12 @@ def run(process: Process, options: "Options") -> None:
                     if flying:
                         hub.take(topic, time_ns, payload)
                 else:
-                    newest = {t: (tick, words) for t, tick, words in entries(payload) if t not in AT_ONCE}
+                    newest = {}
+                    for other, tick, words in entries(payload):
+                        if other is OPERATOR:  # of commands every one counts
+                            hub.take(other, tick * interval, words)
+                        elif other not in AT_ONCE:
+                            newest[other] = tick, words
                     for other, (tick, words) in newest.items():
                         hub.take(other, tick * interval, words)
         for line in hub.report():

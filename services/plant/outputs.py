@@ -7,6 +7,7 @@ from typing import Any
 from dynamics.effects._types import Motion
 from dynamics.lie.quaternion import rotate_back
 from dynamics.vector import Vec3
+from dynamics.vehicles.airframe import Battery
 from dynamics.vehicles.multirotor import MultirotorObservation
 from messages import (
     BatteryState,
@@ -31,6 +32,7 @@ from messages import (
 from messages.topics import CLOCK, POSE, TF, Topic
 
 WORLD = "world"
+AMPERE_HOUR = 3600.0  # [A s]
 
 
 def pose_of(motion: Motion) -> Any:
@@ -116,17 +118,23 @@ def whereabouts(time_ns: int, vehicle: str, motion: Motion) -> Iterator[tuple[To
     yield CLOCK, clock(time_ns)
 
 
-def battery(time_ns: int, vehicle: str, voltage: float, current: float, cells: int) -> Any:
-    """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it."""
+def battery(time_ns: int, vehicle: str, gauge: tuple[float, float, float], pack: Battery | None) -> Any:
+    """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it.
+
+    `gauge`: charge (fraction), voltage [V], current [A]; `pack`: the airframe's battery.
+    """
+    charge, voltage, current = gauge
+    cells = pack.cells if pack else 0
+    capacity = pack.capacity / AMPERE_HOUR if pack else math.nan
     return BatteryState(
         header(time_ns, vehicle),
         voltage=voltage,
         temperature=math.nan,
         current=-current,
-        charge=math.nan,
+        charge=charge * capacity,
         capacity=math.nan,
-        design_capacity=math.nan,
-        percentage=math.nan,
+        design_capacity=capacity,
+        percentage=charge,
         power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
         present=True,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from messages import Clock, Setpoint, Vector3, header
-from messages.topics import CLOCK, SETPOINT, Topic
+from messages.topics import CLOCK, TRAJECTORY, Topic
 from services.lockstep import Input
 from services.scene import Scene
 from services.sections import Exchange, follows_trajectory, start_height
@@ -23,7 +23,7 @@ def create(scene: Scene) -> "Trajectory | None":
 class Trajectory:
     """Evaluates the compiled trajectory tick by tick."""
 
-    outputs = (SETPOINT,)
+    outputs = (TRAJECTORY,)
 
     def __init__(self, scene: Scene):
         exchange = scene[Exchange]
@@ -45,7 +45,7 @@ class Trajectory:
         """The setpoint at `tick`."""
         r = evaluate(self._parameters, tick * self._interval)
         yield (
-            SETPOINT,
+            TRAJECTORY,
             Setpoint(
                 header(tick * self._interval_ns, "world"),
                 Vector3(*r.position_world),

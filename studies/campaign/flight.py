@@ -8,7 +8,7 @@ from dynamics.cell import Cell
 from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from messages import VehicleState
 from messages.topics import STATUS
-from services.autopilot.commander.failsafes import POSITION_LOST
+from services.autopilot.commander.pilot import POSITION_LOST
 from services.autopilot.config import Autopilot
 from services.scene import Scene
 from services.sections import Exchange, Run, follows_trajectory, gravity, period
@@ -35,8 +35,9 @@ def fly(scene: Scene) -> Flown:
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
     if scene[Autopilot].operator or scene.tables("effects").get("battery") is not None:
         return by_services.fly(scene)
-    flown = fly_compiled(scene)
-    return by_services.fly(scene) if _doubtful(flown.record, scene[Exchange].rate) else flown
+    flown, failed_motor = fly_compiled(scene)
+    acts = failed_motor > 0 or _doubtful(flown.record, scene[Exchange].rate)
+    return by_services.fly(scene) if acts else flown
 
 
 def _doubtful(record: FlightRecord, rate: int) -> bool:
@@ -46,8 +47,8 @@ def _doubtful(record: FlightRecord, rate: int) -> bool:
     return bool(np.diff(sure).max() - 1 > DOUBT * rate)
 
 
-def fly_compiled(scene: Scene) -> Flown:
-    """Fly the scene to its end in the compiled loop, without a pilot."""
+def fly_compiled(scene: Scene) -> tuple[Flown, int]:
+    """Fly the scene to its end in the compiled loop, without a pilot; and the number of a motor found to have failed."""
     services: dict[str, Any] = lockstep_services(scene)
     core = services["autopilot"].core
     path, final = services["trajectory"].core
@@ -62,10 +63,11 @@ def fly_compiled(scene: Scene) -> Flown:
     around = loop.Surroundings(gravity(scene), Home(), TEMPERATURE, MAGNETIC_FIELD_WORLD)
     carried = None if core.navigation.state is None else _carried(services["sensors"], exchange.interval_ns)
     record = blank(timing.last + 1)
-    ticks, finite, finished = loop.fly(
-        services["plant"].core, carried, core.navigation, core.parameters, core.state, path, around, timing, record
+    ticks, finite, finished, failed_motor = loop.fly(
+        services["plant"].core, carried, core, path, around, timing, record
     )
-    return Flown(FlightRecord(*(column[:ticks] for column in record)), finite, finished)
+    record = FlightRecord(*(column[:ticks] for column in record))
+    return Flown(record, finite, finished), failed_motor
 
 
 def _carried(sensors: Any, interval_ns: int) -> loop.Carried:

@@ -211,23 +211,23 @@ def keep(record, tick, motion, observed, believed, setpoint, command, flying):
 
 
 @kernel
-def fly(plant, carried, believing, controller, memory, trajectory, around, timing, record):
+def fly(plant, carried, autopilot, trajectory, around, timing, record):
     """Fly from tick 0 to the end of the run, writing the record.
 
     Args:
         plant: the plant's `Core`.
         carried: `Carried`, or None where the truth is believed.
-        believing: `services.autopilot.navigation.Core`.
-        controller: cell of the controller's parameters.
-        memory: cell of the controller's state, at its start.
+        autopilot: the autopilot's `Core`.
         trajectory: `services.trajectory.piece.Parameters`.
         around: `Surroundings`.
         timing: `Timing`.
         record: `FlightRecord` of timing.last + 1 rows.
 
     Returns:
-        Ticks flown, whether all numbers stayed finite, whether the mission ended before the run.
+        Ticks flown, whether all numbers stayed finite, whether the mission ended before the run, and the number of a
+        motor that the autopilot found to have failed (0: none).
     """
+    believing, failed = autopilot.navigation, 0
     off = (0.0, 0.0, 0.0, 0.0)
     before, newest = off, off  # commands of the tick before the last, of the last
     stage, begun, last, over = STANDING, False, timing.last, -1
@@ -244,7 +244,7 @@ def fly(plant, carried, believing, controller, memory, trajectory, around, timin
             plant.interval,
         )
         if not sound:
-            return tick, False, False
+            return tick, False, False, failed
         if over >= 0 and over + timing.loop_delay == tick:
             last = min(last, tick + timing.settle)
         truth = Truth(
@@ -261,9 +261,11 @@ def fly(plant, carried, believing, controller, memory, trajectory, around, timin
         )
         begun = estimated(carried, believing, tick, truth, stage == STANDING, begun)
         wanted = evaluate(trajectory, tick * plant.interval)
-        command, stage = steer(
-            controller,
-            memory,
+        command, stage, failed = steer(
+            autopilot.parameters,
+            autopilot.state,
+            autopilot.watch,
+            autopilot.watched,
             plant.interval,
             believing.believed,
             wanted.position_world,
@@ -277,5 +279,5 @@ def fly(plant, carried, believing, controller, memory, trajectory, around, timin
         before, newest = newest, command.motor_voltage
         keep(record, tick, motion, observed, believing.believed.value, wanted, command, stage == FLYING)
         if tick >= last:
-            return tick + 1, True, last < timing.last
-    return timing.last + 1, True, False
+            return tick + 1, True, last < timing.last, failed
+    return timing.last + 1, True, False, failed

@@ -1,17 +1,16 @@
-"""What the vehicle does by itself when something is lost: hold, return or land, as the parameters say."""
+"""What the vehicle does by itself when something is lost: hold, return, land or descend, as the parameters say."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-from services.autopilot.estimator.state import GPS
-from services.parameters import HOLD, LAND, RETURN
+from services.parameters import DESCEND, HOLD, LAND, RETURN
 
 if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
 
-_MODES = {HOLD: "hold", RETURN: "return", LAND: "land"}
-_RANK = ("hold", "return", "land")  # a failsafe never undoes a stronger one
-POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
+_MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
+_RANK = ("hold", "return", "land", "descend")  # a failsafe never undoes a stronger one
+_WARNING = 1.0  # [s] a condition lasts before the pilot is told what is to come
 
 
 class Failsafe(NamedTuple):
@@ -23,14 +22,21 @@ class Failsafe(NamedTuple):
     action: str  # parameter
 
 
+def _battery(reason: str, threshold: str, action: str) -> Failsafe:
+    return Failsafe(reason, lambda p: p.charge < p.parameters[threshold], lambda p: 0.5, action)
+
+
 FAILSAFES = (
     Failsafe(
         "the position is lost",
-        lambda p: bool(p.health & POSITION_LOST),
+        lambda p: p.position_lost,
         lambda p: p.parameters["COM_POS_FS_DELAY"],
         "FS_ESTIMATE_ACT",
     ),
-    Failsafe("the battery is low", lambda p: p.charge < p.parameters["BAT_CRIT_THR"], lambda p: 0.5, "FS_BATTERY_ACT"),
+    Failsafe("a motor has failed", lambda p: p.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
+    _battery("the battery is nearly empty", "BAT_EMERGEN_THR", "FS_BAT_EMER_ACT"),
+    _battery("the battery is critical", "BAT_CRIT_THR", "FS_BAT_CRIT_ACT"),
+    _battery("the battery is low", "BAT_LOW_THR", "FS_BAT_LOW_ACT"),
     Failsafe(
         "the ground station is lost",
         lambda p: p.linked and p.link_age > p.parameters["COM_DL_LOSS_T"],
@@ -65,18 +71,31 @@ class Failsafes:
             if not failsafe.lost(pilot):
                 self._lasted[i], self._acted[i] = 0.0, False
                 continue
+            before = self._lasted[i]
             self._lasted[i] += dt
-            if self._acted[i] or self._lasted[i] <= failsafe.patience(pilot):
+            if self._acted[i]:
                 continue
-            self._acted[i] = True
-            name = _MODES.get(round(pilot.parameters[failsafe.action]))
-            if name is None:
-                pilot.say(f"{failsafe.reason}; nothing is to be done")
-            elif _rank(pilot) < _RANK.index(name):
-                pilot.failsafe = failsafe.reason
-                pilot.enter(name)
-                pilot.say(f"{failsafe.reason}: {name}")
+            patience, name = failsafe.patience(pilot), _MODES.get(round(pilot.parameters[failsafe.action]))
+            if self._lasted[i] > patience:
+                self._acted[i] = _act(pilot, failsafe.reason, name)
+            elif before <= _WARNING < self._lasted[i] and name:
+                pilot.say(f"{failsafe.reason}: {name} in {patience - _WARNING:.0f} s")
+
+
+def _act(pilot: "Pilot", reason: str, name: str | None) -> bool:
+    """Do what is to be done; whether that was possible in the present mode."""
+    if name is None:
+        pilot.say(reason)
+        return True
+    if name == "descend" and pilot.sticks_fresh:
+        name = "altitude_control"  # there is a pilot who sees it: he has it
+    elif _rank(pilot) >= _RANK.index(name):
+        return False
+    pilot.failsafe = reason
+    pilot.enter(name)
+    pilot.say(f"{reason}: {name}")
+    return True
 
 
 def _rank(pilot: "Pilot") -> int:
-    return _RANK.index(pilot.mode_name) if pilot.mode_name in ("return", "land") else -1
+    return _RANK.index(pilot.mode_name) if pilot.mode_name in _RANK[1:] else -1

@@ -60,6 +60,6 @@ class Fence:
 def rally_points(items: Sequence[Any]) -> tuple[tuple[float, float, float], ...]:
     """Places [m] to return to, from uploaded items; ValueError if one is none."""
     points = tuple((i.position.x, i.position.y, i.position.z) for i in items)
-    if not all(math.isfinite(v) for point in points for v in point):
-        raise ValueError("rally: a place is not finite")
+    if not all(math.isfinite(v) for point in points for v in point) or any(i.action != "rally" for i in items):
+        raise ValueError("rally: expected points of the action rally at finite places")
     return points

@@ -16,7 +16,6 @@ Order = Callable[[Pilot, Any], None]
 ORDERS: dict[str, Order] = {}
 """What is done for each kind of command; flight modes besides these are entered by their names."""
 SILENT = ("manual", "link", "offboard_position", "offboard_attitude")  # streams: not answered
-MODES = ("takeoff", "land", "return", "hold", "mission", "goto", "offboard", "position_control")
 
 
 class Denied(ValueError):
@@ -84,20 +83,21 @@ def disarm(pilot: Pilot, command: Any) -> None:
     pilot.disarm("as commanded")
 
 
-@order(*MODES)
+@order(*modes())
 def change_mode(pilot: Pilot, command: Any) -> None:
     """Enter the flight mode of this name."""
-    if command.kind in ("land", "return") and not pilot.flying and pilot.armed:
-        raise ValueError(f"{command.kind}: the vehicle stands on the ground")
+    kind = modes()[command.kind].Mode
+    if pilot.position_lost and pilot.flying and kind.needs_position:
+        raise ValueError(f"{command.kind}: the position is lost")
     pilot.enter(command.kind, *command.values)
     pilot.failsafe = ""
 
 
 @order("manual")
 def manual(pilot: Pilot, command: Any) -> None:
-    """Sticks, which only the mode position_control listens to."""
-    if isinstance(pilot.mode, modes()["position_control"].Mode):
-        pilot.mode.take(command.values)
+    """Sticks, which the modes position_control and altitude_control listen to."""
+    sticks = [max(-1.0, min(1.0, value(command.values, k))) for k in range(4)]
+    pilot.sticks, pilot.sticks_age = tuple(0.0 if math.isnan(v) else v for v in sticks), 0.0
 
 
 @order("offboard_position", "offboard_attitude")

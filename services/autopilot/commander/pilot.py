@@ -16,6 +16,7 @@ from services.autopilot.commander.guide import Guide, Limits
 from services.autopilot.commander.modes import modes
 from services.autopilot.commander.modes.base import FlightMode
 from services.autopilot.commander.route import ACTIVE, COMPLETE, MISSING, PAUSED, WAITING, Route
+from services.autopilot.estimator.state import GPS
 from services.autopilot.interface import Setpoint
 from services.parameters import Parameter
 
@@ -23,6 +24,8 @@ PHASES = "mission"  # how the flight along the scene's own trajectory is called
 FELT = 1.0  # [s] of sinking in vain after which the vehicle stands on the ground
 LIGHT = 0.5  # share of the hovering thrust below which it does not carry itself
 STILL = 0.15  # [m/s]
+STICK_TIMEOUT = 1.0  # [s] older sticks are in the middle
+POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
 
 
 def followed(message: Any) -> Setpoint:
@@ -61,6 +64,7 @@ class Pilot:
         self.estimate: Any = None
         self.health: int = 0
         self.charge: float = math.nan  # of the battery, fraction; NaN: nobody knows
+        self.failed_motor: int = 0  # its number, from 1; 0: none
         self.mode_name: str = PHASES if trajectory else "hold"
         self.mode: FlightMode | None = None if trajectory else modes()["hold"].Mode(self)
         self.guide = Guide((0.0, 0.0, ground), 0.0)
@@ -71,6 +75,8 @@ class Pilot:
         self.rally: tuple[Vec3, ...] = ()
         self.offboard: tuple[str, tuple[float, ...]] = ("", ())
         self.offboard_age: float = math.inf  # [s]
+        self.sticks: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # forward, left, up, yaw rate, each from -1 to 1
+        self.sticks_age: float = math.inf  # [s]
         self.link_age: float = math.inf  # [s]
         self.linked: bool = False  # a ground station has been heard
         self.failsafe = ""  # the reason of the failsafe in force
@@ -103,6 +109,21 @@ class Pilot:
     def offboard_fresh(self) -> bool:
         """Whether setpoints from outside are coming."""
         return self.offboard_age < self.parameters["COM_OF_LOSS_T"]
+
+    @property
+    def sticks_fresh(self) -> bool:
+        """Whether somebody holds a joystick."""
+        return self.sticks_age < STICK_TIMEOUT
+
+    @property
+    def position_lost(self) -> bool:
+        """Whether the estimate is not to be trusted as to where the vehicle is."""
+        return bool(self.health & POSITION_LOST)
+
+    @property
+    def battery_warning(self) -> int:
+        """0: none, 1: low, 2: critical, 3: nearly empty."""
+        return sum(self.charge < self.parameters[name] for name in ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"))
 
     @property
     def on_trajectory(self) -> bool:
@@ -161,6 +182,7 @@ class Pilot:
         """
         self.offboard_age += dt
         self.link_age += dt
+        self.sticks_age += dt
         if self.waiting_arm is not None:
             self._try_again(dt)
         if self.on_trajectory:

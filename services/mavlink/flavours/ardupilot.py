@@ -7,7 +7,7 @@ HOME_FIRST = True
 TAKEOFF_ABOVE_SEA = False
 RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 
-_AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 3, 4, 5, 6, 9, 16, 17
+_ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
 _SHOWN = {  # what a mode looks like
     "takeoff": _GUIDED,
     "hold": _GUIDED,
@@ -16,12 +16,15 @@ _SHOWN = {  # what a mode looks like
     "mission": _AUTO,
     "return": _RTL,
     "land": _LAND,
+    "descend": _LAND,
     "position_control": _LOITER,
+    "altitude_control": _ALT_HOLD,
 }
 _ENTERED = {
     _AUTO: "mission",
     _GUIDED: "hold",
     _LOITER: "position_control",
+    _ALT_HOLD: "altitude_control",
     _POSHOLD: "position_control",
     _BRAKE: "hold",
     _RTL: "return",

@@ -9,7 +9,7 @@ HOME_FIRST = False
 TAKEOFF_ABOVE_SEA = True
 RATES: dict[str, float] = {}
 
-_POSITION, _AUTO, _OFFBOARD = 3, 4, 6
+_ALTITUDE, _POSITION, _AUTO, _OFFBOARD = 2, 3, 4, 6
 _SHOWN = {  # what a mode looks like
     "takeoff": (_AUTO, 2),
     "hold": (_AUTO, 3),
@@ -17,10 +17,12 @@ _SHOWN = {  # what a mode looks like
     "mission": (_AUTO, 4),
     "return": (_AUTO, 5),
     "land": (_AUTO, 6),
+    "descend": (_AUTO, 6),
     "offboard": (_OFFBOARD, 0),
     "position_control": (_POSITION, 0),
+    "altitude_control": (_ALTITUDE, 0),
 }
-_ENTERED = {shown: mode for mode, shown in _SHOWN.items() if mode != "goto"}
+_ENTERED = {shown: mode for mode, shown in _SHOWN.items() if mode not in ("goto", "descend")}
 
 
 def custom_mode(main: float, sub: float) -> int:

@@ -3,9 +3,10 @@
 import math
 from typing import Any
 
+from dynamics.geodesy import enu_to_geodetic
 from messages.topics import ESTIMATE
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import whole
+from services.mavlink.frames import swap_world, whole
 from services.mavlink.telemetry.stream import stream
 from services.mavlink.vehicle import Vehicle
 from services.mavlink.view import HOME
@@ -25,12 +26,14 @@ _GIVEN = (
 
 @stream("HOME_POSITION", 0.5)
 def home_position(v: Vehicle) -> Any:
-    """Where it started, and where it returns to."""
+    """Where it was armed, and returns to; before it is armed, where it stood at the start."""
+    home = tuple(v.status.home)
+    latitude, longitude, height = enu_to_geodetic(HOME, home)
     return mavlink.MAVLink_home_position_message(
-        whole(HOME.latitude_deg * 1e7, 32),
-        whole(HOME.longitude_deg * 1e7, 32),
-        whole(HOME.height * 1e3, 32),
-        *(0.0, 0.0, 0.0),
+        whole(latitude * 1e7, 32),
+        whole(longitude * 1e7, 32),
+        whole(height * 1e3, 32),
+        *swap_world(home),
         [1.0, 0.0, 0.0, 0.0],
         *(0.0, 0.0, 0.0),
         time_usec=v.boot_us,

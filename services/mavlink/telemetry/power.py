@@ -11,8 +11,14 @@ from services.mavlink.vehicle import Vehicle
 
 PULSE_LEAST, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
 OUTPUTS = 8
-CELLS = 10  # that BATTERY_STATUS has room for
-EMPTY = 0xFFFF  # a cell that is not there
+CELLS, MORE_CELLS = 10, 4  # that BATTERY_STATUS has room for in its two lists
+EMPTY = 0xFFFF  # a cell that is not there, in the first list; in the second it is 0
+_STATES = (
+    mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW,
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL,
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY,
+)
 
 
 def motor_shares(v: Vehicle) -> list[float]:
@@ -43,19 +49,22 @@ def battery_status(v: Vehicle) -> Any:
     b = v.view.get(BATTERY)
     if b is None:
         return None
-    cells = [whole(1e3 * u, 16, unsigned=True) for u in b.cell_voltage[:CELLS]] or [whole(1e3 * b.voltage, 16, True)]
+    cells = [whole(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [whole(1e3 * b.voltage, 16, True)]
+    first, more = cells[:CELLS], cells[CELLS:][:MORE_CELLS]
+    known = math.isfinite(b.percentage)
     used = 1e3 * (b.design_capacity - b.charge)  # [mA h]
     return mavlink.MAVLink_battery_status_message(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
         mavlink.MAV_BATTERY_TYPE_LIPO,
         whole(1e2 * b.temperature, 16),
-        cells + [EMPTY] * (CELLS - len(cells)),
+        first + [EMPTY] * (CELLS - len(first)),
         whole(-1e2 * b.current, 16, unknown=-1),
         whole(used, 32, unknown=-1),
         -1,
         remaining(b),
-        charge_state=mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+        charge_state=_STATES[v.status.battery_warning] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
+        voltages_ext=more + [0] * (MORE_CELLS - len(more)),
     )
 
 

@@ -11,6 +11,7 @@ from services.mavlink.telemetry.stream import stream
 from services.mavlink.vehicle import Vehicle
 
 NONE = 0xFFFF  # no item of a mission
+CRITICAL = 2  # Status.battery_warning
 
 _CONTROL = (
     mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
@@ -47,7 +48,7 @@ def heartbeat(v: Vehicle) -> Any:
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if s.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if s.mode == "position_control":
+    if s.mode in ("position_control", "altitude_control"):
         base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     else:
         base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
@@ -70,7 +71,9 @@ def sys_status(v: Vehicle) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
-    sound = _CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_GEOFENCE
+    sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
+    sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
+    sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
     for bits, good in _SENSORS.items():
         sound |= bits if (healthy(v) if v.on_truth else good(v)) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
@@ -86,6 +89,7 @@ def extended_state(v: Vehicle) -> Any:
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
     else:
         between = {"takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF, "land": mavlink.MAV_LANDED_STATE_LANDING}
+        between["descend"] = mavlink.MAV_LANDED_STATE_LANDING
         state = between.get(s.mode, mavlink.MAV_LANDED_STATE_IN_AIR)
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
 

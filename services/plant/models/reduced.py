@@ -74,8 +74,7 @@ class Reduced:
         parameters, start = self._vehicle(scene)
         self._parameters, self._state = Cell(parameters), Cell(start)
         self._off = (0.0,) * len(frame.rotors.position)
-        self._cells = frame.battery.cells if frame.battery else 0
-        self._voltage = frame.motor.max_voltage
+        self._pack = frame.battery
 
     @property
     def core(self) -> Core:
@@ -109,4 +108,4 @@ class Reduced:
             yield from outputs.whereabouts(time_ns, self._name, motion)
             yield ODOM, outputs.odometry(time_ns, self._name, motion)
         if tick % self._battery_every == 0:
-            yield BATTERY, outputs.battery(time_ns, self._name, self._voltage, sum(seen.motor_current), self._cells)
+            yield BATTERY, outputs.battery(time_ns, self._name, seen.battery, self._pack)

@@ -46,6 +46,7 @@ class StandIn:
         self.setpoint_at = -1e9
         self.commands, self.answers, self.text, self.prearm = [], [], [], ()
         self.deaf = set()  # kinds that are not answered
+        self.status, self.more = {}, []  # other fields of the status, and other messages
         self.kinds = {}
 
     @property
@@ -71,7 +72,8 @@ class StandIn:
             head, self.mode, self.mode, self.armed, self.landed, False, "", self.current, len(self.items), self.reached,
             self.state, self.fresh, self.prearm, False,
         )  # fmt: skip
-        yield STATUS, status
+        yield STATUS, status._replace(**self.status)
+        yield from self.more
         yield ANSWERS, Answers(head, tuple(self.answers), tuple(self.text))
         yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity))
         self.answers, self.text = [], []

@@ -5,8 +5,8 @@ import math
 import pytest
 from bench import Bench
 
-from messages import Vector3, VehicleState
-from messages.topics import TRUTH
+from messages import BatteryState, Vector3, VehicleState
+from messages.topics import BATTERY, TRUTH
 from services.mavlink.dialect import mavlink
 
 
@@ -118,3 +118,38 @@ def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
     assert partner.last("FILE_TRANSFER_PROTOCOL").payload[:6] == [6, 0, 2, 129, 1, 3]
     partner.send("log_request_list", 1, 1, 0, 0xFFFF)
     assert partner.last("LOG_ENTRY").num_logs == 0
+
+
+def test_the_battery_cell_by_cell_and_how_low_it_is():
+    bench = Bench()
+    battery = BatteryState(
+        voltage=42.0, current=-20.0, charge=1.2, design_capacity=10.0, percentage=0.12, cell_voltage=(3.5,) * 12
+    )
+    bench.vehicle.more = [(BATTERY, battery)]
+    bench.vehicle.status = {"battery_warning": 1}
+    partner = bench.partner()
+    bench.step(120)
+    m = partner.last("BATTERY_STATUS")
+    assert sum([*m.voltages, *m.voltages_ext]) == 42_000  # as ground stations add them
+    assert (m.current_battery, m.current_consumed, m.battery_remaining) == (2000, 8800, 12)
+    assert m.charge_state == mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    s = partner.last("SYS_STATUS")
+    assert (s.voltage_battery, s.current_battery, s.battery_remaining) == (42_000, 2000, 12)
+    assert s.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    bench.vehicle.status = {"battery_warning": 3, "failed_motor": 2}
+    bench.step(60)
+    health = partner.last("SYS_STATUS").onboard_control_sensors_health
+    assert not health & (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS)
+
+
+def test_home_is_where_it_was_armed_and_told_at_once():
+    bench = Bench()
+    partner = bench.partner()
+    bench.step(5)
+    partner.got.clear()
+    bench.vehicle.status = {"home": Vector3(30.0, 40.0, 0.0)}
+    bench.step(1)
+    m = partner.last("HOME_POSITION")
+    assert (m.x, m.y, m.z) == (40.0, 30.0, 0.0)
+    assert (m.latitude - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)
+    assert m.altitude == 280_000

@@ -23,7 +23,8 @@ SCENES = Path(__file__).parents[3] / "scenes"
 )
 def test_same_bits_and_the_same_end(scene, overrides):
     scene = load(SCENES / f"{scene}.toml", overrides)
-    compiled, by_messages = fly_compiled(scene), by_services.fly(scene)
+    (compiled, failed), by_messages = fly_compiled(scene), by_services.fly(scene)
+    assert failed == 0
     assert (compiled.finite, compiled.finished) == (by_messages.finite, by_messages.finished) == (True, True)
     for name, column in compiled.record._asdict().items():
         assert np.array_equal(column, getattr(by_messages.record, name)), name

@@ -9,11 +9,14 @@ if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
 
 
+DEAD = 0.05  # sticks nearer to the middle ask for nothing
+
+
 class FlightMode:
     """One way to lead the guide."""
 
     needs_flight = False  # whether it can only be entered in the air
-    fresh = False  # whether setpoints from outside have come lately
+    needs_position = True  # whether it can only be entered while the vehicle knows where it is
     next: str | None = None  # the mode to go on with, once this one has done its work
 
     @property
@@ -29,6 +32,12 @@ def tuple_of(here: Vec3, asked: Vec3) -> Vec3:
     """The place asked for; a coordinate that was not given (NaN) is that of `here`."""
     x, y, z = (h if math.isnan(a) else a for h, a in zip(here, asked, strict=True))
     return x, y, z
+
+
+def stick(pilot: "Pilot", index: int) -> float:
+    """Where a stick is, -1 to 1; in the middle where it is nearly there, or nobody holds it."""
+    given = value(pilot.sticks, index)
+    return given if pilot.sticks_fresh and abs(given) >= DEAD else 0.0
 
 
 def value(values: tuple[float, ...], index: int) -> float:

@@ -13,8 +13,17 @@ NAME = "land"
 SLOW_HEIGHT = 3.0  # [m] above the ground, as estimated; below it the last metres begin
 
 
+def sinking(pilot: "Pilot", height: float) -> float:
+    """Speed [m/s] of going down at a height [m] of the world."""
+    limits, slow = pilot.limits, pilot.parameters["MPC_LAND_SPEED"]
+    above = max(0.0, height - pilot.ground - SLOW_HEIGHT)
+    return max(slow, min(limits.down, slow + approach(above, limits.acceleration)))
+
+
 class Mode(FlightMode):
     """Sink until the ground is felt: how high the vehicle is may be wrong."""
+
+    needs_flight = True
 
     def __init__(self, pilot: "Pilot", *values: float):
         self._place: tuple[float, float] | None = None
@@ -23,10 +32,9 @@ class Mode(FlightMode):
         """Stop where it is, and sink."""
         if not pilot.flying:
             return
-        guide, limits, slow = pilot.guide, pilot.limits, pilot.parameters["MPC_LAND_SPEED"]
+        guide, limits = pilot.guide, pilot.limits
         x, y, z = guide.position
-        above = max(0.0, z - pilot.ground - SLOW_HEIGHT)
-        speed = max(slow, min(limits.down, slow + approach(above, limits.acceleration)))
+        speed = sinking(pilot, z)
         across = limits._replace(down=speed)
         if self._place is None:
             vx, vy, _ = ZERO

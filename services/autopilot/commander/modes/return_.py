@@ -17,6 +17,8 @@ _PARTS = ("climb", "home")
 class Mode(FlightMode):
     """Climb to the height of return (or stay where it is higher), cross, land."""
 
+    needs_flight = True
+
     def __init__(self, pilot: "Pilot", *values: float):
         x, y, z = pilot.guide.position
         places = pilot.rally or ((*pilot.home, 0.0),)

@@ -1,0 +1,123 @@
+"""Notices a rotor that gives less thrust than it is asked for, by what the gyroscopes say of the torques.
+
+An observer of the angular acceleration about the two horizontal body axes: what the commands explain is predicted, the
+rest is a disturbance. A rotor that lacks a share of its thrust makes one along its own arm. Without telemetry of the
+motor controllers this is what an autopilot has; ArduPilot's thrust-loss check looks for the same by way of saturation.
+Theory.md, eqs. (4.25)-(4.26).
+"""
+
+import math
+from typing import NamedTuple
+
+from dynamics.kernel import leaf
+from dynamics.vector import Vec3
+from services.autopilot.gains import Airframe
+from services.autopilot.interface import Four
+
+BANDWIDTH = 40.0  # [rad/s] of the observer
+LOST = 0.3  # share of its thrust that a rotor must lack
+ALIGNED = 0.25  # share of the disturbance, squared, that may point elsewhere than along the rotor's arm
+PATIENCE = 0.1  # [s] for so long
+CLEAR = 0.3  # [m] over the ground, below which the feet may push too
+LEAST = 0.3  # of the hovering thrust: rotors that are asked for less are judged by this
+
+
+class Parameters(NamedTuple):
+    """The vehicle as the autopilot knows it."""
+
+    rotor_x: Four  # [m]
+    rotor_y: Four  # [m]
+    inertia_body: Vec3  # [kg m^2]
+    time_constant: float  # of the rotor speeds [s]
+    hovering: float  # thrust of each rotor [N]
+
+
+class State(NamedTuple):
+    """Memory of the watch."""
+
+    asked: Four  # thrusts of the last tick [N]
+    root: Four  # square root of the thrusts that the rotors should give by now [N^(1/2)]
+    rate: tuple[float, float]  # omega x, y as predicted [rad/s]
+    disturbance: tuple[float, float]  # angular acceleration that the commands do not explain [rad/s^2]
+    suspect: int  # number of the rotor, from 1
+    lasting: float  # [s]
+    failed: int  # number of the rotor, from 1; 0: none
+
+
+_NONE = (0.0, 0.0, 0.0, 0.0)
+START = State(_NONE, _NONE, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
+
+
+def build(airframe: Airframe) -> Parameters:
+    """The watch of an airframe."""
+    a = airframe
+    return Parameters(a.rotor_x, a.rotor_y, a.inertia_body, a.motor.time_constant, 0.25 * a.mass * a.gravity)
+
+
+@leaf
+def _follow(share, root, asked):
+    return root + share * (math.sqrt(asked) - root)
+
+
+@leaf
+def _arm(p, k, root):
+    """Angular acceleration [rad/s^2] about x and y that rotor k should give."""
+    thrust = max(root[k] * root[k], LEAST * p.hovering)
+    return p.rotor_y[k] * thrust / p.inertia_body[0], -p.rotor_x[k] * thrust / p.inertia_body[1]
+
+
+@leaf
+def suspect(p, root, disturbance):
+    """Number of the rotor, from 1, whose lack of thrust explains the disturbance; 0 if none does."""
+    x, y = disturbance
+    found, most = 0, LOST
+    for k in range(4):
+        ax, ay = _arm(p, k, root)
+        lack = -(x * ax + y * ay) / (ax * ax + ay * ay)
+        left = (x + lack * ax) * (x + lack * ax) + (y + lack * ay) * (y + lack * ay)
+        if lack > most and left < ALIGNED * (x * x + y * y):
+            found, most = k + 1, lack
+    return found
+
+
+@leaf
+def step(p, s, dt, omega_body, height, asked):
+    """The watch after a tick of dt [s].
+
+    Args:
+        p: Parameters.
+        s: State; `START` before a flight.
+        dt: [s].
+        omega_body: body rates now [rad/s].
+        height: over the standing height [m].
+        asked: thrusts of the rotors that are asked for from now on [N].
+    """
+    share = 1.0 - math.exp(-dt / p.time_constant)
+    a, r = s.asked, s.root
+    root = (
+        _follow(share, r[0], a[0]),
+        _follow(share, r[1], a[1]),
+        _follow(share, r[2], a[2]),
+        _follow(share, r[3], a[3]),
+    )
+    ix, iy, iz = p.inertia_body
+    wx, wy, wz = omega_body
+    ax, ay = (iy - iz) * wy * wz / ix, (iz - ix) * wz * wx / iy
+    for k in range(4):
+        thrust = root[k] * root[k]
+        ax += p.rotor_y[k] * thrust / ix
+        ay -= p.rotor_x[k] * thrust / iy
+    if height < CLEAR:
+        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, s.failed)
+    ex, ey = wx - s.rate[0], wy - s.rate[1]
+    gain = 2.0 * BANDWIDTH
+    rate = (
+        s.rate[0] + dt * (ax + s.disturbance[0] + gain * ex),
+        s.rate[1] + dt * (ay + s.disturbance[1] + gain * ey),
+    )
+    square = BANDWIDTH * BANDWIDTH * dt
+    disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
+    found = suspect(p, root, disturbance)
+    lasting = s.lasting + dt if found > 0 and found == s.suspect else 0.0
+    failed = found if lasting > PATIENCE and s.failed == 0 else s.failed
+    return State(asked, root, rate, disturbance, found, lasting, failed)
