@@ -48,7 +48,7 @@ def _doubtful(record: FlightRecord, rate: int) -> bool:
 
 
 def fly_compiled(scene: Scene) -> tuple[Flown, int]:
-    """Fly the scene to its end in the compiled loop, without a pilot; and the number of a motor found to have failed."""
+    """Fly the scene to its end in the compiled loop, without a pilot; and the number of a failed motor."""
     services: dict[str, Any] = lockstep_services(scene)
     core = services["autopilot"].core
     path, final = services["trajectory"].core
