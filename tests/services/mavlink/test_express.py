@@ -7,7 +7,6 @@ from bench import Bench
 
 from messages import Answer, Answers, MissionItem, OperatorCommand, OperatorInput, Vector3, header
 from messages.topics import ANSWERS, OPERATOR
-from services.mavlink.dialect import mavlink
 from services.mavlink.express import express
 from services.mavlink.mission_items import convert
 
