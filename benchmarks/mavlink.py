@@ -2,9 +2,10 @@
 
     python -m benchmarks.mavlink [--soak]
 
-Processor time: an adapter with one client at PX4's rates in real time, fed by a process of its own kind of messages.
-Jitter: of ATTITUDE at 50 Hz as a client on UDP sees it, in a run at real time. Lock step: the same scene at top speed
-without an operator, with one who says nothing, and with a link; the best of repeats in turn. The soak: a client flies 30 simulated minutes at ten times real time, and counts heartbeats.
+Processor time: an adapter with one client at PX4's rates in real time, fed by a run. Jitter: of ATTITUDE at 50 Hz as a
+client on UDP sees it, in a run at real time. Lock step: the same scene at top speed without an operator, with one who
+says nothing, and with a link; the best of repeats in turn. The soak: a client flies 30 simulated minutes at ten times
+real time, and counts heartbeats.
 """
 
 import json
@@ -136,7 +137,8 @@ def main():
                 factors[name].append(top_speed(folder, *more))
         best = max(factors["nobody listens"])
         for name, found in factors.items():
-            print(f"lock step at top speed, {name}: {max(found):.2f} x real time, {100.0 * (max(found) / best - 1):+.1f} %")
+            change = 100.0 * (max(found) / best - 1.0)
+            print(f"lock step at top speed, {name}: {max(found):.2f} x real time, {change:+.1f} %")
 
 
 if __name__ == "__main__":
