@@ -152,7 +152,7 @@ class Autopilot:
     def _ask(self, tick: int, setpoint: Any, commands: Any) -> Any:
         """What the pilot wants, having heard the operator."""
         pilot = self._pilot
-        if tick % LOOK == 0:
+        if tick % LOOK == 0 or pilot.looks_closely:
             pilot.estimate = read(self._navigation.believed)
             pilot.health = pilot.estimate.health
         for given in commands.commands if commands else ():

@@ -30,7 +30,9 @@ def run(process: Process, options: "Options") -> None:
     from services.mavlink.vehicle import Vehicle
 
     interval = process.scene[Exchange].interval_ns
-    topics = {process.key(topic): topic for topic in AT_ONCE}
+    # A run as fast as it goes is slowed by every message that wakes somebody; the journals come often enough for it.
+    at_once = AT_ONCE if process.speed else ()
+    topics = {process.key(topic): topic for topic in at_once}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
     with Hub(Vehicle.of(process.scene), options, table(process.scene).values(), lambda payload: put(payload, 0)) as hub:
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
@@ -40,19 +42,18 @@ def run(process: Process, options: "Options") -> None:
             hub.wait()
             while flying and (news := arrived.get_with_key(timeout=0.0)) is not None:
                 key, time_ns, payload = news
-                topic = topics.get(key)
-                if topic:
-                    flying = bool(payload)
+                flying = bool(payload)
+                if topic := topics.get(key):
                     if flying:
                         hub.take(topic, time_ns, payload)
-                else:
-                    newest = {}
-                    for other, tick, words in entries(payload):
-                        if other is OPERATOR:  # of commands every one counts
-                            hub.take(other, tick * interval, words)
-                        elif other not in AT_ONCE:
-                            newest[other] = tick, words
-                    for other, (tick, words) in newest.items():
+                    continue
+                newest = {}
+                for other, tick, words in entries(payload):
+                    if other is OPERATOR or (other in AT_ONCE and not at_once):  # of these every one counts
                         hub.take(other, tick * interval, words)
+                    elif other not in AT_ONCE:
+                        newest[other] = tick, words
+                for other, (tick, words) in newest.items():
+                    hub.take(other, tick * interval, words)
         for line in hub.report():
             print(line, flush=True)

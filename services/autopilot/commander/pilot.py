@@ -130,6 +130,11 @@ class Pilot:
         """Whether the vehicle follows the scene's own trajectory."""
         return self.mode is None
 
+    @property
+    def looks_closely(self) -> bool:
+        """Whether the setpoint was made from the estimate, which must then be that of the same tick."""
+        return self._direct is not None
+
     def lift_off(self) -> None:
         """Let the guide leave the ground, from where the vehicle is believed to stand."""
         if not self.flying and self.armed:
