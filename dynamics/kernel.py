@@ -26,13 +26,15 @@ def cache_folder(package: str) -> str:
     """Where the machine code of a package is kept: a folder for each state of the sources that can be in it.
 
     Numba stamps a cached function with its own file only; an edited import would keep the old machine code. The
-    sources of `dynamics` can be in any kernel, those of a service or a study only in its own.
+    sources of `dynamics` can be in any kernel, those of a service in its own and in a study's, those of a study only
+    in its own.
 
     Args:
         package: "dynamics", a service's "services.NAME", or a study's "studies.NAME".
     """
     digest = hashlib.blake2b(digest_size=8)
-    for folder in sorted({"dynamics", package.replace(".", "/")}):
+    services = {"services"} if package.startswith("studies.") else set()
+    for folder in sorted({"dynamics", package.replace(".", "/")} | services):
         for path in sorted((ROOT / folder).rglob("*.py")):
             digest.update(str(path.relative_to(ROOT)).encode())
             digest.update(path.read_bytes())

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from messages import message_class, stamp_ns
 from services.log import LogReader
 from services.scene import recorded_data
+from studies import tracking
 
-AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+AXES = tuple(tracking.AXES)
 
 
 class Flown:
@@ -71,10 +71,7 @@ class Flown:
     @cached_property
     def attitude(self) -> np.ndarray:
         """True roll, pitch, yaw [rad] at the times of "truth", shape (n, 3); yaw without jumps."""
-        xyzw = self.column("truth", lambda m: m.pose.orientation)
-        yaw_pitch_roll = Rotation.from_quat(xyzw).as_euler("ZYX")
-        yaw_pitch_roll[:, 0] = np.unwrap(yaw_pitch_roll[:, 0])
-        return yaw_pitch_roll[:, ::-1]
+        return tracking.roll_pitch_yaw(self.column("truth", lambda m: m.pose.orientation))
 
     @cached_property
     def reference(self) -> np.ndarray:
@@ -102,13 +99,12 @@ class Flown:
         n = len(self.reference)
         if n == 0:
             return {}
-        position = self.reference[:, :3] - self.column("truth", lambda m: m.pose.position)[:n]
-        turn = np.angle(np.exp(1j * (self.reference[:, 3:] - self.attitude[:n])))
-        return dict(zip(AXES, np.column_stack([position, turn])[self.armed].T, strict=True))
+        position = self.column("truth", lambda m: m.pose.position)[:n]
+        return dict(zip(AXES, tracking.errors(self.reference, position, self.attitude[:n], self.armed).T, strict=True))
 
     def rmse(self) -> dict[str, float]:
         """Root-mean-square error of each axis [m], [rad]."""
-        return {axis: float(np.sqrt(np.mean(e**2))) if e.size else float("nan") for axis, e in self.errors.items()}
+        return tracking.rmse(np.column_stack(list(self.errors.values()))) if self.errors else {}
 
     @property
     def landed(self) -> bool:

@@ -1,7 +1,7 @@
 """The two sources of what the controller believes: the estimator on the sensors, or the truth (the paper's case)."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from dynamics.cell import Cell
 from dynamics.kernel import kernel
@@ -21,6 +21,17 @@ STILL = 0.02  # ratio by which the specific force of a vehicle at rest may diffe
 STANDSTILL_EVERY = 10  # ticks between two reminders that the vehicle stands
 
 
+class Core(NamedTuple):
+    """What a compiled closed loop believes with; without parameters and state it is the truth."""
+
+    parameters: Any  # cell of the estimator's, or None
+    state: Any  # cell that the estimator's first state goes into, or None
+    believed: Cell  # of an `estimator.Estimate`
+    gravity: float  # [m/s^2] that the estimator counts on
+    start_world: Vec3  # [m] where it begins
+    remind_every: int  # ticks between two reminders that the vehicle stands
+
+
 class Truth:
     """Believes what the plant says."""
 
@@ -28,6 +39,11 @@ class Truth:
 
     def __init__(self, scene: Scene):
         self.believed = Cell(NOTHING)
+
+    @property
+    def core(self) -> Core:
+        """What a compiled closed loop takes instead of `update`."""
+        return Core(None, None, self.believed, 0.0, ZERO, 1)
 
     def prepare(self) -> None:
         """Compile or load the kernel."""
@@ -73,10 +89,21 @@ class Filter:
         self._state: Cell | None = None
         self.believed = Cell(NOTHING._replace(position_world=self._position, health=NOT_STARTED))
 
+    @property
+    def core(self) -> Core:
+        """What a compiled closed loop takes instead of `update`."""
+        every = STANDSTILL_EVERY * self._imu_every
+        return Core(self._parameters, self._any_state(), self.believed, self._p.gravity, self._position, every)
+
+    def _any_state(self) -> Cell:
+        """A sound state to be overwritten."""
+        up, north = (0.0, 0.0, self._p.gravity), (0.0, 2e-5, -4e-5)
+        return Cell(estimator.initial(self._p, self._position, up, north))
+
     def prepare(self) -> None:
         """Compile or load the kernels, on a state that is thrown away."""
         up, north = (0.0, 0.0, self._p.gravity), (0.0, 2e-5, -4e-5)
-        p, s = self._parameters, Cell(estimator.initial(self._p, self._position, up, north))
+        p, s = self._parameters, self._any_state()
         predict(p, s, up, up, 1e-6, 1e-4, True, True)
         update_gps(p, s, 0.0, 0.0, 0.0, (1.0, 1.0, 1.0), 0, False)
         update_gps_velocity(p, s, ZERO, 1.0, 0, False)

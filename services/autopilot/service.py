@@ -1,7 +1,8 @@
 """The autopilot as a service: sensors (or the truth) and setpoints in, motor voltages out."""
 
+import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from dynamics.cell import Cell, read
 from dynamics.effects.rotor_thrust import RotorThrust
@@ -20,7 +21,17 @@ from services.autopilot.motor import Motor
 from services.autopilot.stage import FLYING, LANDED, STANDING
 from services.lockstep import Input
 from services.scene import Scene
-from services.sections import Exchange, Rates, airframe, follows_trajectory, gravity, period, start_height, ticks
+from services.sections import (
+    Effects,
+    Exchange,
+    Rates,
+    airframe,
+    follows_trajectory,
+    gravity,
+    period,
+    start_height,
+    ticks,
+)
 
 LOOK = 5  # ticks between two looks of the pilot at the estimate
 
@@ -43,6 +54,16 @@ def steer(p, s, watch, watched, dt, believed, position_world, velocity_world, ac
     height = e.position_world[2] - p.value.resting_height
     watched.value = motor_watch.step(watch.value, watched.value, dt, e.omega_body, height, command.thrust)
     return command, s.value.stage.name, watched.value.failed
+
+
+class Core(NamedTuple):
+    """What a compiled closed loop flies with; there is no pilot in it."""
+
+    navigation: navigation.Core
+    parameters: Cell  # of the controller
+    state: Cell  # of the controller
+    watch: Cell  # parameters of the watch for failing motors
+    watched: Cell  # its state
 
 
 class Autopilot:
@@ -83,6 +104,11 @@ class Autopilot:
             config.operator,
         )
         self._thrust = 0.0  # [N] asked for at the last tick
+
+    @property
+    def core(self) -> Core:
+        """What a compiled closed loop takes instead of `step`."""
+        return Core(self._navigation.core, self._parameters, self._state, self._watch, self._watched)
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
@@ -205,6 +231,11 @@ def known_airframe(scene: Scene) -> gains.Airframe:
     """What the autopilot is told of the vehicle: nominal numbers, at standard density."""
     frame = airframe(scene)
     propeller = RotorThrust.from_scene({}, frame)
+    torque_per_thrust = propeller.torque_constant / propeller.thrust_constant
+    thrust_coefficient = STANDARD_DENSITY * propeller.thrust_constant
+    weight = 0.25 * frame.mass.total * gravity(scene)
+    slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
+    spins_up = "rotor_gyro" in scene[Effects].tables and slope > 0.0
     x, y, _ = zip(*frame.rotors.position, strict=True)
     a, b, c, d = frame.rotors.yaw_sign
     engine = frame.motor
@@ -214,13 +245,12 @@ def known_airframe(scene: Scene) -> gains.Airframe:
         x,
         y,
         (a, b, c, d),
-        propeller.torque_constant / propeller.thrust_constant,
-        Motor(
-            STANDARD_DENSITY * propeller.thrust_constant, engine.belt_ratio, engine.speed_constant, engine.time_constant
-        ),
+        torque_per_thrust,
+        Motor(thrust_coefficient, engine.belt_ratio, engine.speed_constant, engine.time_constant),
         engine.max_voltage,
         start_height(scene),
         gravity(scene),
+        frame.rotors.inertia / (slope * torque_per_thrust) if spins_up else 0.0,
     )
 
 

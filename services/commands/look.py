@@ -1,20 +1,17 @@
 """What there is to fly, whether it is valid, what it is tuned to, what a log shows; and kernels compiled ahead."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from services.commands.app import app
-from services.commands.choice import decided
+from services.commands.choice import decided, warn_of_gains
 from services.commands.errors import user_errors
 from services.commands.options import (
     Overrides,
     SceneFile,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @app.command()
@@ -46,6 +43,7 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
         loaded, _ = decided(scene, set_ or [])
         vehicle, exchange = loaded[Vehicle], loaded[Exchange]
         typer.echo(f"{scene}: ok")
+        warn_of_gains(loaded)
         for label, line in {
             "title": loaded[Run].title or loaded.name,
             "vehicle": f"{vehicle.name}, {vehicle.airframe}",

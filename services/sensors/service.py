@@ -1,7 +1,8 @@
 """The sensors as a service: the true state in, what each instrument reads out."""
 
 from collections.abc import Iterator
-from typing import Any
+from types import ModuleType
+from typing import Any, NamedTuple
 
 from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from dynamics.lie.quaternion import Quaternion
@@ -19,6 +20,16 @@ from services.sensors.truth import Truth
 TEMPERATURE = 15.0  # [deg C] of the air at the ground
 
 
+class Instrument(NamedTuple):
+    """A sensor that the vehicle carries."""
+
+    name: str
+    module: ModuleType  # of this folder
+    parameters: Any
+    key: tuple[int, int]  # of its random stream
+    every: int  # ticks between two samples
+
+
 def create(scene: Scene) -> "Sensors | None":
     """The sensors that the scene names; None where it names none."""
     return Sensors(scene) if scene[Config].tables else None
@@ -34,21 +45,22 @@ class Sensors:
         self._interval_ns = exchange.interval_ns
         self._frame = vehicle
         self._gravity = gravity(scene)
-        self._instruments = []
+        self.instruments: list[Instrument] = []
         for name, table in sorted(scene[Config].tables.items()):
             p = parameters(name, table, exchange.interval)
             key = stream_key(scene[Run].seed, vehicle, name)
-            self._instruments.append((name, sensors()[name], p, key, ticks(scene, p.rate, name)))
+            self.instruments.append(Instrument(name, sensors()[name], p, key, ticks(scene, p.rate, name)))
         self._states: dict[str, Any] = {}
-        self.outputs = tuple(topic for name, *_ in self._instruments for topic, _ in CONVERSIONS[name])
+        self.outputs = tuple(topic for name, *_ in self.instruments for topic, _ in CONVERSIONS[name])
 
     def prepare(self) -> None:
         """Compile or load the kernels."""
-        for _, module, p, key, _ in self._instruments:
-            truth = self._truth(VehicleState())
+        for _, module, p, key, _ in self.instruments:
+            truth = self.truth(VehicleState())
             module.sample(p, module.initial(p, key, truth), key, 0, truth)
 
-    def _truth(self, state: VehicleState) -> Truth:
+    def truth(self, state: VehicleState) -> Truth:
+        """What the sensors measure in this state."""
         p, q = state.pose.position, state.pose.orientation
         return Truth(
             (p.x, p.y, p.z),
@@ -65,9 +77,9 @@ class Sensors:
 
     def step(self, tick: int, state: VehicleState) -> Iterator[tuple[Topic, Any]]:
         """The readings that are due at `tick`."""
-        truth = self._truth(state)
+        truth = self.truth(state)
         time_ns = tick * self._interval_ns
-        for name, module, p, key, every in self._instruments:
+        for name, module, p, key, every in self.instruments:
             if tick % every:
                 continue
             before = self._states.get(name)

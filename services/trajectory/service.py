@@ -10,7 +10,7 @@ from services.scene import Scene
 from services.sections import Exchange, follows_trajectory, start_height
 from services.trajectory.config import Trajectory as Spec
 from services.trajectory.mission import compile
-from services.trajectory.piece import evaluate
+from services.trajectory.piece import Parameters, evaluate
 
 LEAD = 0.1  # [s] the setpoints are ahead of the clock at the most
 
@@ -31,6 +31,11 @@ class Trajectory:
         self._interval, self._interval_ns = exchange.interval, exchange.interval_ns
         compiled = compile(scene[Spec], (0.0, 0.0, start_height(scene)), folder=scene.path.parent)
         self._parameters, self._phases, self._final = compiled.parameters, compiled.phases, compiled.final
+
+    @property
+    def core(self) -> tuple[Parameters, int]:
+        """What a compiled closed loop evaluates instead of `step`, and the phase that is final."""
+        return self._parameters, self._final
 
     def prepare(self) -> None:
         """Compile or load the kernel."""

@@ -18,7 +18,8 @@ class Estimator(NamedTuple):
     magnetic_field_world: Vec3 = MAGNETIC_FIELD_WORLD  # [T]
     ground_height: float = 0.0  # [m] of the level ground under the home point, world z
 
-    position_std: Annotated[float, Gt(0)] = 10.0  # [m] one standard deviation of the start, in each axis
+    start_std: Annotated[float, Gt(0)] = 0.1  # [m] in each axis: the world's origin is where the vehicle is put down
+    position_std: Annotated[float, Gt(0)] = 10.0  # [m] above it the position is not known
     attitude_std: Annotated[float, Gt(0)] = 0.1  # [rad] of the first, levelled attitude
     gyro_bias_std: Annotated[float, Gt(0)] = 2e-3  # [rad/s] at the start
     gyro_bias_walk: Annotated[float, Ge(0)] = 1e-5  # [rad/s/sqrt(s)], instability and warming up

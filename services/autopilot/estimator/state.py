@@ -111,7 +111,7 @@ def initial(p, position_world, specific_force_body, field_body):
 
     Args:
         p: `Estimator`.
-        position_world: [m] where it is thought to stand, good to `p.position_std`.
+        position_world: [m] where it is thought to stand, good to `p.start_std`.
         specific_force_body: [m/s^2] a reading of the accelerometers, or a mean of several.
         field_body: [T] the same of the magnetometer.
     """
@@ -119,7 +119,7 @@ def initial(p, position_world, specific_force_body, field_body):
     for i in range(3):
         covariance[THETA + i, THETA + i] = p.attitude_std**2
         covariance[VELOCITY + i, VELOCITY + i] = 0.1**2
-        covariance[POSITION + i, POSITION + i] = p.position_std**2
+        covariance[POSITION + i, POSITION + i] = p.start_std**2
         covariance[GYRO + i, GYRO + i] = p.gyro_bias_std**2
         covariance[ACCELEROMETER + i, ACCELEROMETER + i] = p.accelerometer_bias_std**2
         covariance[WANDER + i, WANDER + i] = p.gps_wander_horizontal**2

@@ -1,7 +1,7 @@
 """A multirotor as one rigid body with rotors: motor voltages in, the vehicle's true state out."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from dynamics.cell import Cell
 from dynamics.kernel import kernel
@@ -44,6 +44,18 @@ def fly(method, p, s, key, tick, command, h, n, interval):
     return motion, observe(p.value, tick, interval, s.value, command), finite(s.value.motion)
 
 
+class Core(NamedTuple):
+    """What `fly` is given at every tick of a flight."""
+
+    method: tuple
+    parameters: Cell
+    state: Cell
+    key: tuple[int, int]
+    step: float  # [s]
+    steps: int  # of a tick
+    interval: float  # [s] a tick
+
+
 class Reduced:
     """Integrates the vehicle from tick to tick under the newest command."""
 
@@ -63,6 +75,11 @@ class Reduced:
         self._parameters, self._state = Cell(parameters), Cell(start)
         self._off = (0.0,) * len(frame.rotors.position)
         self._pack = frame.battery
+
+    @property
+    def core(self) -> Core:
+        """What a compiled closed loop flies with instead of `step`."""
+        return Core(self._method, self._parameters, self._state, self._key, self._step, self._steps, self._interval)
 
     def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
         """(parameters, state at the start)."""

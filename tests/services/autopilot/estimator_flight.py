@@ -177,7 +177,7 @@ def flight(seed=1, instruments=DEFAULT, p=estimator.PRESETS["rtk"], duration=40.
     out = np.zeros((ticks // 25, COLUMNS))
     keys = tuple(stream_key(seed, "drone1", name) for name in NAMES)
     draw = normal3(keys[0], TURN_ON, 999)  # the first guess is as wrong as the filter is told
-    guess = (p.position_std * draw[0], p.position_std * draw[1], REST + p.position_std * draw[2])
+    guess = (p.start_std * draw[0], p.start_std * draw[1], REST + p.start_std * draw[2])
     fly(p, instruments, keys, ticks, agility, guess, velocity, out)
     covariance = out[:, COVARIANCE:].reshape(-1, 9, 9)
     return Flight(out[:, :9], covariance, out[:, NIS:HEALTH], out[:, HEALTH].astype(int), out[:, REJECTED].astype(int))

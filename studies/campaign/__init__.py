@@ -1,0 +1,1 @@
+"""Campaign: one scene with many seeds, and how its figures are distributed."""

@@ -1,0 +1,131 @@
+"""Figures of flights made up, whose answers are known."""
+
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from services.cli import app
+from services.scene import load
+from studies.campaign import show
+from studies.campaign.figures import figures
+from studies.campaign.flight import seeded
+from studies.campaign.record import Flown, blank
+from studies.campaign.study import campaign, spread, summary
+from studies.tracking import AXES
+
+HOVER = "scenes/hover.toml"
+N = 400
+
+
+def flown(finite=True, finished=True, **columns):
+    record = blank(N)
+    record.attitude[:, 0] = record.estimated_attitude[:, 0] = 1.0
+    record.armed[:] = True
+    record.position_std[:] = 0.1
+    record.power[:] = 100.0
+    for name, value in columns.items():
+        getattr(record, name)[:] = value
+    return Flown(record, finite, finished)
+
+
+def test_errors_of_known_offsets():
+    half = np.sin(0.05), np.cos(0.05)
+    f = figures(
+        3,
+        flown(
+            setpoint_world=(1.0, 2.0, 3.0, 0.2),
+            position_world=(0.9, 2.0, 3.2),
+            estimated_world=(1.0, 1.7, 3.2),
+            attitude=(half[1], 0.0, 0.0, half[0]),  # a yaw of 0.1
+        ),
+        0.01,
+    )
+    assert f.seed == 3
+    assert f.rmse == pytest.approx(dict(zip(AXES, (0.1, 0.0, 0.2, 0.0, 0.0, 0.1), strict=True)))
+    assert f.rmse_estimate == pytest.approx(dict(zip(AXES, (0.0, 0.3, 0.2, 0.0, 0.0, 0.2), strict=True)))
+    assert f.worst == pytest.approx(np.hypot(0.1, 0.2))
+    assert f.inside == (1.0, 1.0, 1.0)
+    assert f.energy == pytest.approx(400.0)
+    assert f.crash == ""
+
+
+def test_share_of_the_time_within_three_sigma():
+    ramp = np.zeros((N, 3))
+    ramp[:, 1] = np.linspace(0.0, 0.6, N)  # three sigma are reached half-way
+    assert figures(1, flown(estimated_world=ramp), 0.01).inside == pytest.approx((1.0, 0.5, 1.0))
+
+
+def test_only_the_armed_part_counts():
+    armed = np.arange(N) < 10
+    off = np.where(armed, 0.0, 5.0)[:, None] * np.ones(3)
+    assert figures(1, flown(position_world=off, armed=armed), 0.01).worst == 0.0
+
+
+def test_crashes_are_named():
+    touch = np.arange(N) > 300
+    falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    assert figures(1, flown(in_contact=touch, velocity_world=falling), 0.01).crash == "hit the ground at 3.0 m/s"
+    assert figures(1, flown(in_contact=touch, velocity_world=falling / 3), 0.01).touchdown == pytest.approx(1.0)
+    assert figures(1, flown(attitude=(0.0, 1.0, 0.0, 0.0)), 0.01).crash == "turned over"
+    assert figures(1, flown(finite=False), 0.01).crash == "numbers are not finite"
+    assert figures(1, flown(finished=False), 0.01).crash == "the mission did not end"
+
+
+def test_spread_names_the_worst():
+    values = [(float(v), 100 + v) for v in range(101)]
+    assert spread(values) == (50.0, 5.0, 95.0, 100.0, 200)
+    assert spread(values, least=True).seed == 100
+
+
+def test_on_the_truth_every_seed_flies_the_same_windless_path():
+    found = campaign(load(HOVER), [3, 4, 5], lambda: None)
+    assert [f.seed for f in found.flights] == [3, 4, 5]
+    assert not found.crashes
+    assert len({f.worst for f in found.flights}) == 1
+    assert found.rmse == found.rmse_estimate
+
+
+def test_order_of_the_flights_does_not_matter():
+    scene, one = load(HOVER), lambda k: figures(k, flown(position_world=(0.01 * k, 0.0, 0.0)), 0.01)
+    assert summary(scene, [one(1), one(2)]).rmse == summary(scene, [one(2), one(1)]).rmse
+
+
+def test_a_seeded_scene_differs_in_its_seed_only():
+    scene = load(HOVER)
+    assert seeded(scene, 9).lookup("run.seed") == 9
+    assert seeded(scene, 9).lookup("run.duration") == scene.lookup("run.duration")
+
+
+def test_table_json_and_plot(tmp_path):
+    scene = load("scenes/delivery_mission.toml")
+    crashed = figures(2, flown(finished=False, estimated_world=(0.2, 0.0, 0.0)), 0.01)
+    found = summary(scene, [figures(1, flown(position_world=(0.1, 0.1, 0.1)), 0.01), crashed])
+    console = Console(record=True, width=120)
+    show.show(console, found)
+    said = console.export_text()
+    assert "2 flights, seeds 1 to 2" in said
+    assert "paper, Table 7" in said
+    assert "Crashes: 1 of 2" in said
+    assert "seed 2: the mission did not end" in said
+    show.write_json(tmp_path / "c.json", found)
+    assert json.loads((tmp_path / "c.json").read_text())["crashes"] == [2]
+    show.plot(tmp_path / "c.png", found)
+    assert (tmp_path / "c.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([HOVER, "--seeds", "0"], "--seeds 0: expected at least 1"),
+        (["scenes/gyrostat_blocked.toml"], "expected a scene whose autopilot follows a [trajectory]"),
+        ([HOVER, "--plot", "c.gif"], "--plot c.gif: expected a name that ends in .png, .svg or .pdf"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message):
+    result = CliRunner().invoke(app, ["campaign", *arguments])
+    assert result.exit_code == 2
+    assert message in result.output.replace("\n", " ")
+    assert "Traceback" not in result.output
