@@ -76,7 +76,8 @@ def service(
                     flying[name].prepare()
                     run_lockstep(process, flying[name], operator(plan))
                 elif name == MAVLINK:
-                    modules()[name].run(process, mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed)))
+                    options = mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed))
+                    modules()[name].run(process, options, operator(plan)(0))
                 else:
                     modules()[name].run(process, log)
             except Stopped:

@@ -4,7 +4,8 @@ It takes no part in the lock step: nobody waits for it, and when it dies the fli
 subscribes to; all else it reads from the services' journals, which wakes nobody up for a message.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS
 from services.journal import JOURNAL_KEY, entries
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 AT_ONCE = (ESTIMATE, STATUS, ANSWERS)
 
 
-def run(process: Process, options: "Options") -> None:
+def run(process: Process, options: "Options", given: Iterable[Any] = ()) -> None:
     """Serve the links until the flight has ended, or until asked to stop; then say how it went.
+
+    `given` are the commands that the autopilot begins with: it may have taken them before this process is there.
 
     Raises:
         ValueError: a link cannot be opened.
@@ -35,6 +38,8 @@ def run(process: Process, options: "Options") -> None:
     topics = {process.key(topic): topic for topic in at_once}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
     with Hub(Vehicle.of(process.scene), options, table(process.scene).values(), lambda payload: put(payload, 0)) as hub:
+        for command in given:
+            hub.adapter.missions.hold(command)
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
         process.join()
         flying = True

@@ -166,3 +166,22 @@ def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
         fly_single(load(HOVER, ["autopilot.operator=true"]), quiet, None, display)
     with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:
         assert flooded.digest() == read.digest()
+
+
+def test_the_mission_of_a_plan_can_be_downloaded(tmp_path):
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "scenes/plans/delivery.plan", "--speed", "2"]
+    with run(tmp_path, "test-mavlink-plan", *more) as process:
+        heard(station, "HEARTBEAT")
+        station.mav.mission_request_list_send(1, 1, 0)
+        found = []
+        for number in range(heard(station, "MISSION_COUNT").count):
+            station.mav.mission_request_int_send(1, 1, number, 0)
+            found.append(heard(station, "MISSION_ITEM_INT"))
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    station.close()
+    assert [m.command for m in found] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
+    assert found[5].param1 == 5.0
+    assert found[4].z == pytest.approx(10.35, abs=0.02)
