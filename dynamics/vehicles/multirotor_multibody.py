@@ -99,7 +99,7 @@ def _rotor(k, layout, R, motion, part):
     drive = sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
     wrench = Wrench(scale(thrust, (R[2], R[5], R[8])), (0.0, 0.0, -sign * torque))
     speed = sign * motion.rotor_speed[k]
-    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench)
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench, d.held[k])
 
 
 @leaf
@@ -121,7 +121,7 @@ def machine(drive, t, motion):
 @leaf
 def _still(k, d, motion, sign):
     speed = -sign[k] * motion.rotor_speed[k]
-    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH)
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH, d.held[k])
 
 
 @leaf
@@ -166,31 +166,37 @@ FORMS[FiveBodies] = Form(seen, rate, held, accelerations)
 
 @leaf
 def _on_propeller(x, reaction):
-    return reaction.reaction_force, rotate_back(x.attitude, reaction.reaction_torque)
+    force, torque = reaction
+    return force, rotate_back(x.attitude, torque)
 
 
 @leaf
 def _on_chassis(chassis, x, reaction):
+    force, torque = reaction
     arm = subtract(x.position_world, chassis.position_world)
-    torque = add(reaction.reaction_torque, cross(arm, reaction.reaction_force))
-    return scale(-1.0, reaction.reaction_force), scale(-1.0, rotate_back(chassis.attitude, torque))
+    return scale(-1.0, force), scale(-1.0, rotate_back(chassis.attitude, add(torque, cross(arm, force))))
 
 
 @kernel
 def joints(drive, t, x):
     """(force [N] in the world, torque about the centre of mass [N m] in the body) of the hinges on each body, chassis
     first; z of a propeller's torque is what its drive gives."""
-    l = five_bodies.solve(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x).leaves  # noqa: E741
+    on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(
-        (_on_chassis(c, b[0], l[0]), _on_chassis(c, b[1], l[1]), _on_chassis(c, b[2], l[2]), _on_chassis(c, b[3], l[3]))
+        (
+            _on_chassis(c, b[0], on[0]),
+            _on_chassis(c, b[1], on[1]),
+            _on_chassis(c, b[2], on[2]),
+            _on_chassis(c, b[3], on[3]),
+        )
     )
     return (
         chassis,
-        _on_propeller(b[0], l[0]),
-        _on_propeller(b[1], l[1]),
-        _on_propeller(b[2], l[2]),
-        _on_propeller(b[3], l[3]),
+        _on_propeller(b[0], on[0]),
+        _on_propeller(b[1], on[1]),
+        _on_propeller(b[2], on[2]),
+        _on_propeller(b[3], on[3]),
     )
 
 
