@@ -93,6 +93,12 @@ def lanes(context, a, b, c, d):
 
 
 @intrinsic
+def spread(context, x):
+    """One float in every lane."""
+    return signature(LANES, types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
+
+
+@intrinsic
 def apart(context, x):
     """The four floats of x as a tuple."""
 
@@ -123,6 +129,32 @@ def where(context, flag, a, b):
         return builder.select(builder.fcmp_ordered(">", args[0], zero), *(_spread(builder, a) for a in args[1:]))
 
     return signature(LANES, LANES, a, b), chosen
+
+
+def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> Any:
+    data = context.make_array(array)(context, builder, value).data
+    return builder.bitcast(builder.gep(data, [start]), VECTOR.as_pointer())
+
+
+@intrinsic
+def load(context, array, start):
+    """The four numbers of a contiguous array of floats from the `start`-th on, in memory order; not checked."""
+
+    def taken(context, builder, sig, args):
+        return builder.load(_place(context, builder, sig.args[0], *args), align=8)
+
+    return signature(LANES, array, types.intp), taken
+
+
+@intrinsic
+def store(context, array, start, x):
+    """Put x where `load` would take it from."""
+
+    def put(context, builder, sig, args):
+        builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)
+        return context.get_dummy_value()
+
+    return signature(types.none, array, types.intp, LANES), put
 
 
 @leaf

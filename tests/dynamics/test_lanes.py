@@ -6,7 +6,7 @@ import numpy as np
 
 from dynamics import vector
 from dynamics.kernel import kernel
-from dynamics.lanes import apart, beside, lanes, root, separate, total, where
+from dynamics.lanes import apart, beside, lanes, load, root, separate, spread, store, total, where
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
 
@@ -55,3 +55,14 @@ def test_choice_root_and_sum():
     picked, whole = chosen((1.0, 0.0, 0.5, -1.0), x)
     assert picked == (2.0, -1.0, math.sqrt(2.0), -1.0)
     assert whole == 14.0
+
+
+@kernel
+def moved(a):
+    store(a, 5, load(a, 1) + spread(10.0))
+    return a
+
+
+def test_in_and_out_of_memory():
+    a = np.arange(12.0).reshape(3, 4)
+    np.testing.assert_array_equal(moved(a).ravel(), [0, 1, 2, 3, 4, 11, 12, 13, 14, 9, 10, 11])
