@@ -35,6 +35,8 @@ class Manifold(NamedTuple):
 
 
 MANIFOLDS: dict[type, Manifold] = {}
+NUMBERS: list[type] = [types.Float]
+"""The numba types that are numbers in a tree."""
 
 
 def _leaf_class(tree: types.Type) -> type | None:
@@ -42,12 +44,12 @@ def _leaf_class(tree: types.Type) -> type | None:
     return found if found in MANIFOLDS else None
 
 
-def _unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict[str, Any]) -> str:
+def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict[str, Any]) -> str:
     """Source of the tree whose leaves are `rule(leaf class or None for a float, paths, names)`.
 
     A rule that gives None for a manifold class is asked for each of the numbers stored in it instead.
     """
-    if isinstance(tree, types.Float):
+    if isinstance(tree, tuple(NUMBERS)):
         return rule(None, paths, names)
     leaf = _leaf_class(tree)
     if leaf and (expression := rule(leaf, paths, names)):
@@ -56,7 +58,7 @@ def _unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dic
         return "None"
     if not isinstance(tree, types.BaseTuple):
         raise TypingError(f"a state holds floats, tuples and manifold leaves only, not {tree}")
-    parts = [_unroll(part, tuple(f"{a}[{i}]" for a in paths), rule, names) for i, part in enumerate(tree.types)]
+    parts = [unroll(part, tuple(f"{a}[{i}]" for a in paths), rule, names) for i, part in enumerate(tree.types)]
     if isinstance(tree, types.BaseNamedTuple):
         name = f"Node{len(names)}"
         names[name] = tree.instance_class
@@ -95,12 +97,12 @@ def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float:
         names[function] = getattr(MANIFOLDS[leaf], operation)
         return f"{function}({', '.join(paths[takes])})"
 
-    return lambda tree, names: _unroll(tree, paths, rule, names)
+    return lambda tree, names: unroll(tree, paths, rule, names)
 
 
 def _of_numbers(paths: tuple[str, ...], template: str) -> Callable:
     """Body that maps a template over every stored number."""
-    return lambda tree, names: _unroll(tree, paths, lambda leaf, p, _: None if leaf else template.format(*p), names)
+    return lambda tree, names: unroll(tree, paths, lambda leaf, p, _: None if leaf else template.format(*p), names)
 
 
 def _number_paths(tree: types.Type, path: str) -> list[str]:
@@ -112,7 +114,7 @@ def _number_paths(tree: types.Type, path: str) -> list[str]:
             found.append(paths[0])
         return None if leaf else paths[0]
 
-    _unroll(tree, (path,), rule, {})
+    unroll(tree, (path,), rule, {})
     return found
 
 
@@ -136,14 +138,14 @@ def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
         return x
 
     found: list[str] = []
-    _unroll(tree, ("x", "e"), rule, names)
+    unroll(tree, ("x", "e"), rule, names)
     names["largest"] = largest
     return f"max(0.0, {', '.join(found)})"
 
 
 def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:
     index = itertools.count()
-    return _unroll(tree, (), lambda leaf, _, __: None if leaf else f"numbers[{next(index)}]", names)
+    return unroll(tree, (), lambda leaf, _, __: None if leaf else f"numbers[{next(index)}]", names)
 
 
 retract = _operation(

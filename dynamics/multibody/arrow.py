@@ -1,12 +1,14 @@
 """The fast path: one core body and four leaves hinged to it at their centres of mass, nothing assembled.
 
-Every leaf is eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)); what remains is one symmetric 3x3
-system. All vectors are in the same axes, whichever they are. A symmetric matrix is six floats (xx, yy, zz, xy, xz, yz).
+The leaves are eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)), all four at once: every number of a
+`Leaf` is `lanes`, a lane a leaf. What remains is one symmetric 3x3 system. All vectors are in the same axes, whichever
+they are. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
 """
 
 from typing import NamedTuple
 
 from dynamics.kernel import leaf
+from dynamics.lanes import total
 from dynamics.vector import Vec3, add, cross, dot, scale, subtract
 
 Sym3 = tuple[float, float, float, float, float, float]
@@ -22,38 +24,32 @@ class Core(NamedTuple):
 
 
 class Leaf(NamedTuple):
-    """A leaf, the motion its hinge leaves it, a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn + s axis,
-    and what acts on it. A leaf that is gone has no mass and no inertia."""
+    """The leaves, the motion their hinges leave them, a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn +
+    s axis, and what acts on them. One that is gone has no mass, no inertia, and nothing acts on it."""
 
     mass: float  # [kg]
     inertia: Sym3  # about its centre of mass [kg m^2]; without the axial moment if it spins freely, eq. (8.42)
     offset: Vec3  # hinge point from the core's centre of mass [m]
     axis: Vec3  # unit vector, a principal axis of the inertia
-    axial: float  # moment of inertia about the axis [kg m^2]
+    axial: float  # moment of inertia about the axis [kg m^2], never zero
     spins: float  # 1: s follows from `drive_torque`; 0: s = 0, the whole turn is imposed
-    drive_torque: float  # about the axis, from the core on the leaf [N m]
+    drive_torque: float  # about the axis, from the core on the leaf [N m]; not read if s = 0
     drift: Vec3  # [m/s^2]
     turn: Vec3  # [rad/s^2]
     force: Vec3  # [N]
     torque: Vec3  # [N m], gyroscopic part included
 
 
-class LeafResult(NamedTuple):
-    """What a leaf does."""
+class Result(NamedTuple):
+    """Accelerations of the core (linear of its centre of mass, angular), and what the leaves do."""
 
     acceleration: Vec3  # [m/s^2]
     angular_acceleration: Vec3  # [rad/s^2]
+    relative: Vec3  # acceleration of the leaves less that of the core [m/s^2]
+    turned: Vec3  # angular acceleration of the leaves [rad/s^2]
     spin: float  # s [rad/s^2]
-    reaction_force: Vec3  # from the core on the leaf [N]
+    reaction_force: Vec3  # from the core on the leaves [N]
     reaction_torque: Vec3  # the same about the hinge point [N m]; along the axis: the drive torque
-
-
-class Result(NamedTuple):
-    """Accelerations of the core (linear of its centre of mass, angular) and its four leaves."""
-
-    acceleration: Vec3
-    angular_acceleration: Vec3
-    leaves: tuple[LeafResult, LeafResult, LeafResult, LeafResult]
 
 
 @leaf
@@ -87,23 +83,14 @@ def point_inertia(mass, a):
 
 
 @leaf
-def rotated(R, moments):
-    """R diag(moments) R^T."""
-    x, y, z = moments
-    return (
-        x * R[0] * R[0] + y * R[1] * R[1] + z * R[2] * R[2],
-        x * R[3] * R[3] + y * R[4] * R[4] + z * R[5] * R[5],
-        x * R[6] * R[6] + y * R[7] * R[7] + z * R[8] * R[8],
-        x * R[0] * R[3] + y * R[1] * R[4] + z * R[2] * R[5],
-        x * R[0] * R[6] + y * R[1] * R[7] + z * R[2] * R[8],
-        x * R[3] * R[6] + y * R[4] * R[7] + z * R[5] * R[8],
-    )
-
-
-@leaf
-def felt(R, moments, spins):
-    """The inertia of a leaf as its core feels it: without the moment about its z axis if it spins freely."""
-    return rotated(R, (moments[0], moments[1], (1.0 - spins) * moments[2]))
+def felt(C, moments, spins):
+    """The inertia of a leaf as its core feels it: C diag(moments) C^T for a rotation matrix C, without the moment about
+    the leaf's z axis if it spins freely."""
+    # C diag(1, 1, 1) C^T = 1 saves a column
+    along = outer(moments[0] - moments[1], (C[0], C[3], C[6]))
+    about = outer((1.0 - spins) * moments[2] - moments[1], (C[2], C[5], C[8]))
+    x, y, z, xy, xz, yz = plus(along, about)
+    return (x + moments[1], y + moments[1], z + moments[1], xy, xz, yz)
 
 
 @leaf
@@ -120,49 +107,43 @@ def solve_symmetric(m, b):
 
 
 @leaf
-def _seen(l):  # noqa: E741
-    """What the core sees of a leaf: (inertia, force, torque), eqs. (8.42), (8.43)."""
-    inertia = plus(l.inertia, point_inertia(l.mass, l.offset))
-    force = subtract(l.force, scale(l.mass, l.drift))
-    torque = subtract(l.torque, times(l.inertia, l.turn))
-    torque = subtract(torque, scale(l.spins * (l.drive_torque + dot(l.axis, l.torque)), l.axis))
-    return inertia, force, add(torque, cross(l.offset, force))
+def _all(a):
+    """The sum over the leaves."""
+    return (total(a[0]), total(a[1]), total(a[2]))
 
 
 @leaf
-def _moved(l, a, alpha):  # noqa: E741
-    """What the leaf does under the core's accelerations, eqs. (8.40), (8.41)."""
-    turned = add(alpha, l.turn)
-    acceleration = add(add(a, cross(alpha, l.offset)), l.drift)
-    given = l.spins * (l.drive_torque + dot(l.axis, l.torque))
-    # a leaf that is gone has nothing to divide by
-    spin = given / l.axial - l.spins * dot(l.axis, turned) if l.axial > 0.0 else 0.0
-    return LeafResult(
-        acceleration,
-        add(turned, scale(spin, l.axis)),
-        spin,
-        subtract(scale(l.mass, acceleration), l.force),
-        subtract(add(times(l.inertia, turned), scale(given, l.axis)), l.torque),
-    )
+def _sum(m):
+    """The same for a symmetric matrix."""
+    return (total(m[0]), total(m[1]), total(m[2]), total(m[3]), total(m[4]), total(m[5]))
 
 
 @leaf
-def eliminate(core, leaves):
+def eliminate(core, leaf):
     """Accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
-    l1, l2, l3, l4 = leaves
-    i1, f1, t1 = _seen(l1)
-    i2, f2, t2 = _seen(l2)
-    i3, f3, t3 = _seen(l3)
-    i4, f4, t4 = _seen(l4)
-    mass = core.mass + l1.mass + l2.mass + l3.mass + l4.mass
-    moment = add(
-        add(scale(l1.mass, l1.offset), scale(l2.mass, l2.offset)),
-        add(scale(l3.mass, l3.offset), scale(l4.mass, l4.offset)),
+    given = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
+    force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
+    torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(given, leaf.axis)))
+    mass, moment = core.mass + total(leaf.mass), _all(scale(leaf.mass, leaf.offset))
+    inverse = 1.0 / mass
+    points = point_inertia(leaf.mass, leaf.offset)
+    fixed = plus(core.inertia, plus(point_inertia(-inverse, moment), _sum(points)))
+    whole_force = add(core.force, _all(force))
+    whole_torque = add(core.torque, _all(add(torque, cross(leaf.offset, force))))
+    alpha = solve_symmetric(
+        plus(fixed, _sum(leaf.inertia)), subtract(whole_torque, scale(inverse, cross(moment, whole_force)))
     )
-    force = add(core.force, add(add(f1, f2), add(f3, f4)))
-    torque = add(core.torque, add(add(t1, t2), add(t3, t4)))
-    inertia = plus(plus(core.inertia, point_inertia(-1.0 / mass, moment)), plus(plus(i1, i2), plus(i3, i4)))
-    alpha = solve_symmetric(inertia, subtract(torque, scale(1.0 / mass, cross(moment, force))))
-    a = scale(1.0 / mass, add(force, cross(moment, alpha)))
-    moved = (_moved(l1, a, alpha), _moved(l2, a, alpha), _moved(l3, a, alpha), _moved(l4, a, alpha))
-    return Result(a, alpha, moved)
+    a = scale(inverse, add(whole_force, cross(moment, alpha)))
+    # back to the leaves, eqs. (8.40), (8.41)
+    turned = add(alpha, leaf.turn)
+    relative = add(cross(alpha, leaf.offset), leaf.drift)
+    spin = given * (1.0 / leaf.axial) - leaf.spins * dot(leaf.axis, turned)
+    return Result(
+        a,
+        alpha,
+        relative,
+        add(turned, scale(spin, leaf.axis)),
+        spin,
+        subtract(scale(leaf.mass, add(a, relative)), leaf.force),
+        subtract(add(times(leaf.inertia, turned), scale(given, leaf.axis)), leaf.torque),
+    )

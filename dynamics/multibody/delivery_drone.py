@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from dynamics.integrators import RATES
 from dynamics.kernel import kernel, leaf
+from dynamics.lanes import apart, beside, separate
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody.arrow import Core, Leaf, eliminate
-from dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
+from dynamics.vector import Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
 
 Four = tuple[float, ...]
 
@@ -22,9 +23,10 @@ class Drone(NamedTuple):
     mass: float  # chassis [kg]
     inertia: Vec3  # chassis about its centre of mass, principal moments along the body axes [kg m^2]
     hubs: tuple[Vec3, ...]  # [m], chassis axes
-    propeller_mass: Four  # [kg]; 0 for one that was torn off
+    propeller_mass: Four  # [kg]
     propeller_inertia: tuple[Vec3, ...]  # principal moments, x along the blade, z the spin axis [kg m^2]
     spins: Four  # 1: torque-driven, 0: imposed speed
+    held: Four = (1.0, 1.0, 1.0, 1.0)  # 0: torn off
 
 
 class DroneState(NamedTuple):
@@ -120,36 +122,44 @@ def delivery_drone(
 
 def without_propeller(drone: Drone, k: int) -> Drone:
     """The drone after propeller k (0 to 3) was torn off; its angle and speed in the state mean nothing any more."""
-    masses, inertias = list(drone.propeller_mass), list(drone.propeller_inertia)
-    masses[k], inertias[k] = 0.0, ZERO
-    return drone._replace(propeller_mass=tuple(masses), propeller_inertia=tuple(inertias))
+    return drone._replace(held=tuple(0.0 if i == k else held for i, held in enumerate(drone.held)))
 
 
 @leaf
-def _propeller(d, x, loads, g, k):
-    """Propeller k as a leaf in chassis axes; its inertia turns with it at twice the speed (theory.md, eq. (8.50))."""
-    moments, offset, speed, w = d.propeller_inertia[k], d.hubs[k], x.speeds[k], x.omega_body
-    spins, gone = d.spins[k], d.propeller_mass[k] == 0.0
+def _double(angles):
+    """Cosines and sines of twice the angles."""
+    c, s = math.cos, math.sin
+    a, b, d, e = 2.0 * angles[0], 2.0 * angles[1], 2.0 * angles[2], 2.0 * angles[3]
+    return beside((c(a), c(b), c(d), c(e))), beside((s(a), s(b), s(d), s(e)))
+
+
+@leaf
+def _propellers(d, x, loads, g):
+    """The propellers as leaves in chassis axes; their inertia turns with them at twice the speed (theory.md, eq.
+    (8.50))."""
+    w, speed, spins, held = x.omega_body, beside(x.speeds), beside(d.spins), beside(d.held)
+    offset, drive = beside(d.hubs), beside(loads.drive)
+    mass, inertia = held * beside(d.propeller_mass), beside(d.propeller_inertia)
+    moments = scale(held, inertia)
+    cosine, sine = _double(x.angles)
     mean, half = 0.5 * (moments[0] + moments[1]), 0.5 * (moments[0] - moments[1])
-    c, s = half * math.cos(2.0 * x.angles[k]), half * math.sin(2.0 * x.angles[k])
+    c, s = half * cosine, half * sine
     own = (w[0], w[1], w[2] + speed)
-    momentum = ((mean + c) * own[0] + s * own[1], s * own[0] + (mean - c) * own[1], moments[2] * own[2])
-    turn = (w[1] * speed, -w[0] * speed, loads.drive[k] * (1.0 - spins))
-    drag, thrust = (0.0, 0.0) if gone else (loads.aerodynamic_torque[k], loads.thrust[k])
-    weight = scale(d.propeller_mass[k], g)
+    momentum = ((mean + c) * w[0] + s * w[1], s * w[0] + (mean - c) * w[1], moments[2] * own[2])
     gyroscopic = cross(own, momentum)
+    weight, zero = scale(mass, g), 0.0 * mass
     return Leaf(
-        d.propeller_mass[k],
-        (mean + c, mean - c, (1.0 - spins) * moments[2], s, 0.0, 0.0),
+        mass,
+        (mean + c, mean - c, (1.0 - spins) * moments[2], s, zero, zero),
         offset,
-        (0.0, 0.0, 1.0),
-        moments[2],
+        (zero, zero, 1.0 + zero),
+        inertia[2],
         spins,
-        0.0 if gone else loads.drive[k] * spins,
+        held * drive,
         cross(w, cross(w, offset)),
-        turn,
-        (weight[0], weight[1], weight[2] + thrust),
-        (-gyroscopic[0], -gyroscopic[1], drag - gyroscopic[2]),
+        (w[1] * speed, -w[0] * speed, drive * (1.0 - spins)),
+        (weight[0], weight[1], weight[2] + held * beside(loads.thrust)),
+        (-gyroscopic[0], -gyroscopic[1], held * beside(loads.aerodynamic_torque) - gyroscopic[2]),
     )
 
 
@@ -165,28 +175,16 @@ def motion(d, loads, x):
         add(scale(d.mass, g), apply_transposed(R, loads.force_world)),
         subtract(loads.torque_body, cross(w, multiply(d.inertia, w))),
     )
-    leaves = (
-        _propeller(d, x, loads, g, 0),
-        _propeller(d, x, loads, g, 1),
-        _propeller(d, x, loads, g, 2),
-        _propeller(d, x, loads, g, 3),
-    )
-    s = eliminate(core, leaves)
-    l1, l2, l3, l4 = s.leaves
-    t1, t2, t3, t4 = l1.reaction_torque, l2.reaction_torque, l3.reaction_torque, l4.reaction_torque
-    imposed, k = loads.drive, d.spins
+    s = eliminate(core, _propellers(d, x, loads, g))
+    held, spins = beside(d.held), beside(d.spins)
+    spin = held * (s.spin + (1.0 - spins) * beside(loads.drive))
     return Motion(
         apply(R, s.acceleration),
         s.angular_acceleration,
-        (
-            l1.spin + (1.0 - k[0]) * imposed[0],
-            l2.spin + (1.0 - k[1]) * imposed[1],
-            l3.spin + (1.0 - k[2]) * imposed[2],
-            l4.spin + (1.0 - k[3]) * imposed[3],
-        ),
-        (t1[2], t2[2], t3[2], t4[2]),
-        (l1.reaction_force, l2.reaction_force, l3.reaction_force, l4.reaction_force),
-        (t1, t2, t3, t4),
+        apart(spin),
+        apart(s.reaction_torque[2]),
+        separate(s.reaction_force),
+        separate(s.reaction_torque),
     )
 
 

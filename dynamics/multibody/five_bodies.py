@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dynamics.integrators import RATES
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import leaf
+from dynamics.lanes import beside, separate, where
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
-from dynamics.multibody.arrow import Core, Leaf, eliminate, felt, rotated
-from dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, multiply, scale, subtract
+from dynamics.multibody.arrow import Core, Leaf, eliminate, felt
+from dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, divide, dot, multiply, scale, subtract
 
 UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -55,6 +56,7 @@ class Rotor(NamedTuple):
     drive: float  # torque from the chassis [N m] if it spins, else imposed acceleration [rad/s^2]
     speed: float  # imposed speed relative to the chassis at t = 0 [rad/s]; not read if it spins
     wrench: Wrench
+    held: float  # 1; 0: torn off, a body by itself
 
 
 class Machine(NamedTuple):
@@ -75,114 +77,111 @@ def column(R, k):
 
 
 @leaf
-def free_turn(R0, axis, gamma_1, gamma_2):
-    """The relative angular acceleration that the rows v1 . v3 and v2 . v3 ask for, up to the hinge axis itself, in the
-    world (theory.md, eq. (8.46)); v1 and v2 are the chassis' x and y axes, `axis` is v3 in chassis axes."""
+def from_chassis(chassis, leaf):
+    """Rotation matrices from the leaves' axes to the chassis' axes, orthogonal even where the stages of a step have
+    attitudes that are not quite of unit length."""
+    q = quaternion.multiply(quaternion.conjugate(chassis.attitude), leaf.attitude)
+    k = 2.0 / ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
+    x2, y2, z2 = k * q[1], k * q[2], k * q[3]
+    xx, yy, zz = q[1] * x2, q[2] * y2, q[3] * z2
+    xy, xz, yz = q[1] * y2, q[1] * z2, q[2] * z2
+    wx, wy, wz = q[0] * x2, q[0] * y2, q[0] * z2
+    return (1.0 - (yy + zz), xy - wz, xz + wy, xy + wz, 1.0 - (xx + zz), yz - wx, xz - wy, yz + wx, 1.0 - (xx + yy))
+
+
+@leaf
+def free_turn(axis, gamma_1, gamma_2):
+    """The relative angular acceleration that the rows v1 . v3 and v2 . v3 ask for, up to the hinge axis itself
+    (theory.md, eq. (8.46)); v1 and v2 are the chassis' x and y axes, `axis` is v3."""
     k = 1.0 / axis[2]
-    return apply(R0, (-k * gamma_2, k * gamma_1, 0.0))
+    return (-k * gamma_2, k * gamma_1, 0.0 * k)
 
 
 @leaf
-def _fed_back(rate, r, x, chassis, R0, offset, own, speed):
+def choose(flag, a, b):
+    """The vector a where flag is above zero, else b."""
+    return (where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]))
+
+
+@leaf
+def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
     """(drift, turn) of Baumgarte's feedback at `rate` [1/s] of what is missing at a hinge (theory.md, eq. (8.30))."""
-    axis, w_world = column(quaternion.rotation_matrix(x.attitude), 2), apply(R0, chassis.omega_body)
-    gap = subtract(subtract(x.position_world, chassis.position_world), offset)
-    slip = subtract(subtract(x.velocity_world, chassis.velocity_world), cross(w_world, offset))
-    drift = add(scale(-2.0 * rate, slip), scale(-rate * rate, gap))
-    a = apply_transposed(R0, axis)
-    relative = subtract(own, w_world)
-    swing = apply_transposed(R0, cross(relative, axis))
-    back = rate * rate
-    if r.spins > 0.0:
-        both = (-2.0 * rate * swing[0] - back * a[0], -2.0 * rate * swing[1] - back * a[1])
-        return drift, free_turn(R0, a, both[0], both[1])
-    late = subtract(relative, scale(speed, column(R0, 2)))
-    return drift, add(scale(-2.0 * rate, late), free_turn(R0, a, -back * a[0], -back * a[1]))
+    w, back = chassis.omega_body, rate * rate
+    gap = subtract(apply_transposed(R0, subtract(x.position_world, chassis.position_world)), r.offset)
+    opening = subtract(apply_transposed(R0, subtract(x.velocity_world, chassis.velocity_world)), cross(w, r.offset))
+    drift = add(scale(-2.0 * rate, opening), scale(-back, gap))
+    relative = subtract(own, w)
+    swing = cross(relative, axis)
+    tilt = free_turn(axis, -back * axis[0], -back * axis[1])
+    swings = free_turn(axis, -2.0 * rate * swing[0], -2.0 * rate * swing[1])
+    slip = subtract(relative, (0.0, 0.0, speed))
+    return drift, add(tilt, choose(r.spins, swings, scale(-2.0 * rate, slip)))
 
 
 @leaf
-def _leaf(r, x, t, chassis, R0, w_world, gravity, feedback):
-    """What `arrow` must know of rotor r in state x, in world axes; w_world: angular velocity of the chassis."""
-    w = chassis.omega_body
-    R = quaternion.rotation_matrix(x.attitude)
-    own = apply(R, x.omega_body)
-    axis = column(R, 2)
-    offset = apply(R0, r.offset)
-    if r.spins > 0.0:
-        a, o = apply_transposed(R0, axis), apply_transposed(R0, own)
-        slip = subtract(w, o)
-        square, wa = dot(slip, slip), dot(w, a)
-        twice = 2.0 * wa - x.omega_body[2]
-        gamma_1 = a[0] * square - w[0] * wa + o[0] * twice
-        gamma_2 = a[1] * square - w[1] * wa + o[1] * twice
-        speed, turn, torque = 0.0, free_turn(R0, a, gamma_1, gamma_2), r.drive
-    else:
-        speed = r.speed + r.drive * t
-        turn, torque = apply(R0, (w[1] * speed, -w[0] * speed, r.drive)), 0.0
-    drift = cross(w_world, cross(w_world, offset))
+def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
+    """What `arrow` must know of the rotors r in states x, in chassis axes; C: `from_chassis`."""
+    w, own, axis = chassis.omega_body, apply(C, x.omega_body), column(C, 2)
+    slip = subtract(w, own)
+    square, wa = dot(slip, slip), dot(w, axis)
+    twice = 2.0 * wa - x.omega_body[2]
+    gamma_1 = axis[0] * square - w[0] * wa + own[0] * twice
+    gamma_2 = axis[1] * square - w[1] * wa + own[1] * twice
+    speed = r.speed + r.drive * t
+    turn = choose(r.spins, free_turn(axis, gamma_1, gamma_2), (w[1] * speed, -w[0] * speed, r.drive))
+    mass, moments = r.held * r.mass, scale(r.held, r.inertia)
+    force = add(scale(mass, gravity_body), scale(r.held, apply_transposed(R0, r.wrench.force_world)))
+    gyroscopic = cross(x.omega_body, multiply(moments, x.omega_body))
+    torque = apply(C, subtract(scale(r.held, r.wrench.torque_body), gyroscopic))
+    drift = subtract(scale(dot(w, r.offset), w), scale(dot(w, w), r.offset))
     if feedback > 0.0:
-        more, swing = _fed_back(feedback, r, x, chassis, R0, offset, own, speed)
+        more, swing = _fed_back(feedback, r, speed, x, chassis, R0, axis, own)
         drift, turn = add(drift, more), add(turn, swing)
-    return Leaf(
-        r.mass,
-        felt(R, r.inertia, r.spins),
-        offset,
-        axis,
-        r.inertia[2],
-        r.spins,
-        torque,
-        drift,
-        turn,
-        add(scale(r.mass, gravity), r.wrench.force_world),
-        apply(R, subtract(r.wrench.torque_body, cross(x.omega_body, multiply(r.inertia, x.omega_body)))),
-    )
+    inertia = felt(C, moments, r.spins)
+    drive = r.held * r.drive
+    return Leaf(mass, inertia, r.offset, axis, r.inertia[2], r.spins, drive, drift, turn, force, torque)
 
 
 @leaf
 def solve(p, t, x):
-    """Everything the fast path knows at a state: `arrow.Result`, in world axes."""
-    R0 = quaternion.rotation_matrix(x.chassis.attitude)
-    w = x.chassis.omega_body
-    w_world = apply(R0, w)
+    """(`arrow.Result` at a state in chassis axes, chassis to world, leaves to chassis)."""
+    c, r, b = x.chassis, beside(p.rotors), beside(x.propellers)
+    R0, C, w = quaternion.rotation_matrix(c.attitude), from_chassis(c, b), c.omega_body
+    g = apply_transposed(R0, p.gravity)
     core = Core(
         p.mass,
-        rotated(R0, p.inertia),
-        add(scale(p.mass, p.gravity), p.wrench.force_world),
-        apply(R0, subtract(p.wrench.torque_body, cross(w, multiply(p.inertia, w)))),
+        (p.inertia[0], p.inertia[1], p.inertia[2], 0.0, 0.0, 0.0),
+        add(scale(p.mass, g), apply_transposed(R0, p.wrench.force_world)),
+        subtract(p.wrench.torque_body, cross(w, multiply(p.inertia, w))),
     )
-    r, b = p.rotors, x.propellers
-    leaves = (
-        _leaf(r[0], b[0], t, x.chassis, R0, w_world, p.gravity, p.feedback),
-        _leaf(r[1], b[1], t, x.chassis, R0, w_world, p.gravity, p.feedback),
-        _leaf(r[2], b[2], t, x.chassis, R0, w_world, p.gravity, p.feedback),
-        _leaf(r[3], b[3], t, x.chassis, R0, w_world, p.gravity, p.feedback),
-    )
-    return eliminate(core, leaves)
+    return eliminate(core, _leaf(r, b, t, c, R0, C, g, p.feedback)), R0, C
 
 
 @leaf
-def _rate(x, acceleration, angular_acceleration):
-    own = quaternion.rotation_matrix(x.attitude)
-    return BodyState(x.velocity_world, x.omega_body, acceleration, apply_transposed(own, angular_acceleration))
-
-
-@kernel
 def rate(p, t, x):
     """Tangent of the state: index-1 equations of motion by elimination (theory.md, eqs. (8.40)-(8.46))."""
-    s = solve(p, t, x)
-    b, l1, l2, l3, l4 = x.propellers, s.leaves[0], s.leaves[1], s.leaves[2], s.leaves[3]
+    s, R0, C = solve(p, t, x)
+    r, b = beside(p.rotors), beside(x.propellers)
+    acceleration = apply(R0, s.acceleration)
+    # one that was torn off flies by itself
+    free = add(p.gravity, scale(1.0 / r.mass, r.wrench.force_world))
+    spun = subtract(r.wrench.torque_body, cross(b.omega_body, multiply(r.inertia, b.omega_body)))
+    turned = choose(r.held, apply_transposed(C, s.turned), divide(spun, r.inertia))
+    moved = choose(r.held, add(acceleration, apply(R0, s.relative)), free)
     return FiveBodies(
-        _rate(x.chassis, s.acceleration, s.angular_acceleration),
-        (
-            _rate(b[0], l1.acceleration, l1.angular_acceleration),
-            _rate(b[1], l2.acceleration, l2.angular_acceleration),
-            _rate(b[2], l3.acceleration, l3.angular_acceleration),
-            _rate(b[3], l4.acceleration, l4.angular_acceleration),
-        ),
+        BodyState(x.chassis.velocity_world, x.chassis.omega_body, acceleration, s.angular_acceleration),
+        separate(BodyState(b.velocity_world, b.omega_body, moved, turned)),
     )
 
 
 RATES[Machine] = rate
+
+
+@leaf
+def reactions(p, t, x):
+    """(force [N], torque about its hinge [N m]) from the chassis on each propeller, in the world."""
+    s, R0, _ = solve(p, t, x)
+    return separate((apply(R0, s.reaction_force), apply(R0, s.reaction_torque)))
 
 
 def machine(
@@ -197,7 +196,7 @@ def machine(
     rotors = tuple(
         Rotor(
             drone.propeller_mass[k], drone.propeller_inertia[k], drone.hubs[k], drone.spins[k],
-            float(drive[k]), float(speeds[k]), wrenches[k + 1],
+            float(drive[k]), float(speeds[k]), wrenches[k + 1], drone.held[k],
         )
         for k in range(4)
     )  # fmt: skip

@@ -4,22 +4,11 @@ import math
 
 from dynamics.integrators import step
 from dynamics.kernel import kernel, leaf
+from dynamics.lanes import beside, root, separate, where
 from dynamics.lie import quaternion
-from dynamics.multibody.arrow import Core, Leaf, eliminate, felt, rotated
-from dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, column, free_turn
-from dynamics.vector import (
-    ZERO,
-    add,
-    apply,
-    apply_transposed,
-    cross,
-    matmul,
-    multiply,
-    norm,
-    scale,
-    subtract,
-    transpose,
-)
+from dynamics.multibody.arrow import Core, Leaf, eliminate, felt
+from dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, choose, column, free_turn, from_chassis
+from dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 
 NONE, PARTITION, PROJECTION = 0, 1, 2
 
@@ -33,117 +22,131 @@ def _gap(chassis, R0, offset, x):
 
 
 @leaf
-def _position_leaf(r, chassis, R0, x):
-    R = quaternion.rotation_matrix(x.attitude)
-    offset = apply(R0, r.offset)
-    gap = subtract(subtract(x.position_world, chassis.position_world), offset)
-    axis = column(R, 2)
-    a = apply_transposed(R0, axis)
-    # rows v1 . v3 and v2 . v3 are a[0], a[1]; their increments must be the opposite
-    turn = free_turn(R0, a, -a[0], -a[1])
-    inertia = felt(R, r.inertia, 1.0)
-    return Leaf(r.mass, inertia, offset, axis, r.inertia[2], 1.0, 0.0, scale(-1.0, gap), turn, ZERO, ZERO)
+def _resting(r, spins, C, drift, turn, force, torque):
+    """Leaves whose drives rest; what acts on them are momenta, or nothing."""
+    mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
+    return Leaf(
+        mass, felt(C, moments, spins), r.offset, column(C, 2), r.inertia[2], spins, rest, drift, turn, force, torque
+    )
 
 
 @leaf
-def _velocity_leaf(r, t, R0, x):
-    R = quaternion.rotation_matrix(x.attitude)
-    axis = column(R, 2)
-    turn = ZERO if r.spins > 0.0 else scale(r.speed + r.drive * t, column(R0, 2))
-    momentum = scale(r.mass, x.velocity_world)
-    angular = apply(R, multiply(r.inertia, x.omega_body))
-    inertia, offset = felt(R, r.inertia, r.spins), apply(R0, r.offset)
-    return Leaf(r.mass, inertia, offset, axis, r.inertia[2], r.spins, 0.0, ZERO, turn, momentum, angular)
+def _turned(q, turn):
+    """The attitude after a turn in the body [rad], right to its third power; of unit length, without a root."""
+    s = scale(0.25, turn)
+    square = dot(s, s)
+    k = 1.0 / (1.0 + square)
+    x, y, z = scale(2.0 * k, s)
+    t = quaternion.multiply(q, quaternion.Quaternion(k - k * square, x, y, z))
+    k = 1.5 - 0.5 * ((t[0] * t[0] + t[1] * t[1]) + (t[2] * t[2] + t[3] * t[3]))
+    return quaternion.Quaternion(k * t[0], k * t[1], k * t[2], k * t[3])
 
 
 @leaf
-def _displaced(x, displacement, turn):
-    own = apply_transposed(quaternion.rotation_matrix(x.attitude), turn)
-    attitude = quaternion.normalise(quaternion.retract(x.attitude, own))
-    return BodyState(add(x.position_world, displacement), attitude, x.velocity_world, x.omega_body)
+def _attitude(flag, a, b):
+    """The attitude a where flag is above zero, else b."""
+    return quaternion.Quaternion(
+        where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]), where(flag, a[3], b[3])
+    )
 
 
 @leaf
-def _redirected(x, velocity, omega):
-    own = apply_transposed(quaternion.rotation_matrix(x.attitude), omega)
-    return BodyState(x.position_world, x.attitude, velocity, own)
-
-
-@leaf
-def _applied(change, x, s):
-    """`change` of all five bodies by an `arrow.Result` that holds displacements or velocities, not accelerations."""
-    b, l1, l2, l3, l4 = x.propellers, s.leaves[0], s.leaves[1], s.leaves[2], s.leaves[3]
-    return FiveBodies(
-        change(x.chassis, s.acceleration, s.angular_acceleration),
-        (
-            change(b[0], l1.acceleration, l1.angular_acceleration),
-            change(b[1], l2.acceleration, l2.angular_acceleration),
-            change(b[2], l3.acceleration, l3.angular_acceleration),
-            change(b[3], l4.acceleration, l4.angular_acceleration),
+def _gathered(p, c, r, b):
+    """(chassis, propellers) as lanes with their hinges closed."""
+    R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
+    axis = column(C, 2)
+    gap = subtract(apply_transposed(R0, subtract(b.position_world, c.position_world)), r.offset)
+    # rows v1 . v3 and v2 . v3 are axis[0], axis[1]; their increments must be the opposite
+    turn = free_turn(axis, -axis[0], -axis[1])
+    none, all_spin = scale(0.0, gap), 1.0 + 0.0 * r.mass
+    s = eliminate(_core(p, ZERO, ZERO), _resting(r, all_spin, C, scale(-1.0, gap), turn, none, none))
+    moved = apply(R0, s.acceleration)
+    position = add(b.position_world, add(moved, apply(R0, s.relative)))
+    attitude = _turned(b.attitude, apply_transposed(C, s.turned))
+    turned = _turned(c.attitude, s.angular_acceleration)
+    return (
+        BodyState(add(c.position_world, moved), turned, c.velocity_world, c.omega_body),
+        BodyState(
+            choose(r.held, position, b.position_world),
+            _attitude(r.held, attitude, b.attitude),
+            b.velocity_world,
+            b.omega_body,
         ),
     )
 
 
-@kernel
+@leaf
+def _core(p, force, torque):
+    return Core(p.mass, (p.inertia[0], p.inertia[1], p.inertia[2], 0.0, 0.0, 0.0), force, torque)
+
+
+@leaf
 def project(p, t, x):
     """The nearest state, in the metric of the masses, that meets all constraints (theory.md, eqs. (8.31), (8.32)).
 
     One Newton step on position level, then the velocities: a drift of e is left at e^2.
     """
-    r, b, c = p.rotors, x.propellers, x.chassis
-    R0 = quaternion.rotation_matrix(c.attitude)
-    leaves = (
-        _position_leaf(r[0], c, R0, b[0]),
-        _position_leaf(r[1], c, R0, b[1]),
-        _position_leaf(r[2], c, R0, b[2]),
-        _position_leaf(r[3], c, R0, b[3]),
+    r = beside(p.rotors)
+    c, b = _gathered(p, x.chassis, r, beside(x.propellers))
+    R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
+    speed = r.speed + r.drive * t
+    still = 0.0 * speed
+    momentum = apply_transposed(R0, scale(r.held * r.mass, b.velocity_world))
+    angular = apply(C, multiply(scale(r.held, r.inertia), b.omega_body))
+    imposed = choose(r.spins, (still, still, still), (still, still, speed))
+    core = _core(p, scale(p.mass, apply_transposed(R0, c.velocity_world)), multiply(p.inertia, c.omega_body))
+    s = eliminate(core, _resting(r, r.spins, C, (still, still, still), imposed, momentum, angular))
+    velocity = apply(R0, s.acceleration)
+    return FiveBodies(
+        BodyState(c.position_world, c.attitude, velocity, s.angular_acceleration),
+        separate(
+            BodyState(
+                b.position_world,
+                b.attitude,
+                choose(r.held, add(velocity, apply(R0, s.relative)), b.velocity_world),
+                choose(r.held, apply_transposed(C, s.turned), b.omega_body),
+            )
+        ),
     )
-    x = _applied(_displaced, x, eliminate(Core(p.mass, rotated(R0, p.inertia), ZERO, ZERO), leaves))
-    b, c = x.propellers, x.chassis
-    R0 = quaternion.rotation_matrix(c.attitude)
-    leaves = (
-        _velocity_leaf(r[0], t, R0, b[0]),
-        _velocity_leaf(r[1], t, R0, b[1]),
-        _velocity_leaf(r[2], t, R0, b[2]),
-        _velocity_leaf(r[3], t, R0, b[3]),
-    )
-    angular = apply(R0, multiply(p.inertia, c.omega_body))
-    core = Core(p.mass, rotated(R0, p.inertia), scale(p.mass, c.velocity_world), angular)
-    return _applied(_redirected, x, eliminate(core, leaves))
 
 
 @leaf
-def _follow(r, t, R0, chassis, x):
-    """The leaf put back on the chassis; its spin angle and spin speed are kept."""
-    C = matmul(transpose(R0), quaternion.rotation_matrix(x.attitude))
-    axis = column(C, 2)
-    # the shortest turn that takes the leaf's axis onto the chassis' z: about axis x z
-    swing = quaternion.normalise(quaternion.Quaternion(1.0 + axis[2], axis[1], -axis[0], 0.0))
-    relative = quaternion.multiply(swing, quaternion.from_matrix(C))
-    attitude = quaternion.normalise(quaternion.multiply(chassis.attitude, relative))
-    position = add(chassis.position_world, apply(R0, r.offset))
-    velocity = add(chassis.velocity_world, apply(R0, cross(chassis.omega_body, r.offset)))
-    core_rate = quaternion.rotate_back(relative, chassis.omega_body)
-    spin = x.omega_body[2] - core_rate[2] if r.spins > 0.0 else r.speed + r.drive * t
-    return BodyState(position, attitude, velocity, (core_rate[0], core_rate[1], core_rate[2] + spin))
-
-
-@kernel
 def partition(p, t, x):
     """Chassis pose, spin angles and their rates are independent; all else follows (theory.md, eq. (8.33))."""
-    q = quaternion.normalise(x.chassis.attitude)
-    chassis = BodyState(x.chassis.position_world, q, x.chassis.velocity_world, x.chassis.omega_body)
-    R0 = quaternion.rotation_matrix(q)
-    r, b = p.rotors, x.propellers
+    c = x.chassis
+    c = BodyState(c.position_world, quaternion.normalise(c.attitude), c.velocity_world, c.omega_body)
+    R0, r, b = quaternion.rotation_matrix(c.attitude), beside(p.rotors), beside(x.propellers)
+    relative = quaternion.multiply(quaternion.conjugate(c.attitude), b.attitude)
+    axis = column(quaternion.rotation_matrix(relative), 2)
+    # the shortest turn that takes a leaf's axis onto the chassis' z: about axis x z
+    swing = quaternion.Quaternion(1.0 + axis[2], axis[1], -axis[0], 0.0 * axis[0])
+    relative = _unit(quaternion.multiply(swing, relative))
+    core_rate = quaternion.rotate_back(relative, c.omega_body)
+    spin = where(r.spins, b.omega_body[2] - core_rate[2], r.speed + r.drive * t)
+    followed = BodyState(
+        add(c.position_world, apply(R0, r.offset)),
+        quaternion.multiply(c.attitude, relative),
+        add(c.velocity_world, apply(R0, cross(c.omega_body, r.offset))),
+        (core_rate[0], core_rate[1], core_rate[2] + spin),
+    )
     return FiveBodies(
-        chassis,
-        (
-            _follow(r[0], t, R0, chassis, b[0]),
-            _follow(r[1], t, R0, chassis, b[1]),
-            _follow(r[2], t, R0, chassis, b[2]),
-            _follow(r[3], t, R0, chassis, b[3]),
+        c,
+        separate(
+            BodyState(
+                choose(r.held, followed.position_world, b.position_world),
+                _attitude(r.held, followed.attitude, b.attitude),
+                choose(r.held, followed.velocity_world, b.velocity_world),
+                choose(r.held, followed.omega_body, b.omega_body),
+            )
         ),
     )
+
+
+@leaf
+def _unit(q):
+    """`quaternion.normalise` for lanes."""
+    k = 1.0 / root(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return quaternion.Quaternion(k * q[0], k * q[1], k * q[2], k * q[3])
 
 
 @leaf
@@ -160,7 +163,7 @@ def violation(p, x):
     position, velocity = 0.0, 0.0
     for k in range(4):
         r, b = p.rotors[k], x.propellers[k]
-        if r.mass > 0.0:
+        if r.held > 0.0:
             gap, axis = _gap(x.chassis, R0, r.offset, b)
             position = _worse(_worse(position, norm(gap)), math.hypot(axis[0], axis[1]))
             slip = subtract(

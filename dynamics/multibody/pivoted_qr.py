@@ -8,13 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel
+from dynamics.kernel import kernel, leaf
+from dynamics.lanes import load, spread, store
+
+BLOCK = 16  # numbers that a vectorised loop takes at once; rows are padded with empty columns to a multiple of it
 
 
 class Factor(NamedTuple):
-    """The factorisation: upper triangle of `b` is R, below it are the reflections."""
+    """The factorisation."""
 
-    b: np.ndarray  # (n, m)
+    upper: np.ndarray  # (n, at least m): R
+    reflection: np.ndarray  # (n, n): row k is the k-th vector of Householder, 1 at k, zero before it
     beta: np.ndarray  # (n,) factors of the reflections
     order: np.ndarray  # (m,) column of B at each place: the first `rank` are the independent rows of the problem
     scale: np.ndarray  # (m,) 1 / length of column order[i]; 0 for an empty column
@@ -24,20 +28,47 @@ class Factor(NamedTuple):
 @kernel
 def _lengths(b, k, out):
     """Squared length of every column from row k down."""
-    out[k:] = 0.0
+    out[:] = 0.0
     for i in range(k, b.shape[0]):
-        for j in range(k, b.shape[1]):
-            out[j] += b[i, j] * b[i, j]
+        row = b[i]
+        for j in range(len(out)):
+            out[j] += row[j] * row[j]
+
+
+@leaf
+def _reflect(b, v, beta, k):
+    """Reflect the columns of b from row k down; those before k are zero there and stay so."""
+    n, width = b.shape
+    # a row touches two bodies only: most of v is zero at first
+    for j in range(k // BLOCK * BLOCK, width, BLOCK):
+        w0 = w1 = w2 = w3 = spread(0.0)
+        for i in range(k, n):
+            f, at = v[i], i * width + j
+            if f != 0.0:
+                w0 = w0 + f * load(b, at)
+                w1 = w1 + f * load(b, at + 4)
+                w2 = w2 + f * load(b, at + 8)
+                w3 = w3 + f * load(b, at + 12)
+        w0, w1, w2, w3 = beta * w0, beta * w1, beta * w2, beta * w3
+        for i in range(k, n):
+            f, at = v[i], i * width + j
+            if f != 0.0:
+                store(b, at, load(b, at) - f * w0)
+                store(b, at + 4, load(b, at + 4) - f * w1)
+                store(b, at + 8, load(b, at + 8) - f * w2)
+                store(b, at + 12, load(b, at + 12) - f * w3)
 
 
 @kernel
-def factor(b, tolerance, most):
-    """Factor b in place; what is left of a dependent column after elimination is below `tolerance` of its length. At
-    most `most` columns are taken as independent."""
-    n, m = b.shape
+def factor(matrix, tolerance, most):
+    """Factor a matrix (n, m); what is left of a dependent column after elimination is below `tolerance` of its length.
+    At most `most` columns are taken as independent."""
+    n, m = matrix.shape
+    width = -(-m // BLOCK) * BLOCK
+    b, reflection = np.zeros((n, width)), np.zeros((n, n))
     beta, scale, order = np.zeros(n), np.zeros(m), np.arange(m)
-    left, w, v = np.zeros(m), np.zeros(m), np.zeros(n)
-    _lengths(b, 0, left)
+    left = np.zeros(width)
+    _lengths(matrix, 0, left[:m])
     longest = 0.0
     for j in range(m):
         longest = max(longest, left[j])
@@ -48,13 +79,13 @@ def factor(b, tolerance, most):
         left[j] = 0.0 if empty else 1.0
     for i in range(n):
         for j in range(m):
-            b[i, j] *= scale[j]
+            b[i, j] = matrix[i, j] * scale[j]
     rank = 0
     for k in range(min(min(n, m), most)):
-        pivot = k + np.argmax(left[k:])
+        pivot = k + np.argmax(left[k:m])
         if left[pivot] < 1e-8:  # the running lengths have lost their digits
             _lengths(b, k, left)
-            pivot = k + np.argmax(left[k:])
+            pivot = k + np.argmax(left[k:m])
             if left[pivot] <= tolerance * tolerance:
                 break
         if pivot != k:
@@ -64,35 +95,25 @@ def factor(b, tolerance, most):
             scale[k], scale[pivot] = scale[pivot], scale[k]
             left[pivot] = left[k]
         rank += 1
-        length = 0.0
+        v, length = reflection[k], 0.0
         for i in range(k, n):
             v[i] = b[i, k]
             length += v[i] * v[i]
         length = np.sqrt(length)
         head = -length if v[k] > 0.0 else length
-        # v scaled to v[k] = 1, so that only its tail needs a place in b
         beta[k] = (head - v[k]) / head
         divisor = 1.0 / (v[k] - head)
-        b[k, k] = head
         v[k] = 1.0
         for i in range(k + 1, n):
             v[i] *= divisor
-            b[i, k] = v[i]
-        w[k + 1 :] = 0.0
-        # a row touches two bodies only: most of v is zero at first
-        for i in range(k, n):
-            if v[i] != 0.0:
-                row = b[i]
-                for j in range(k + 1, m):
-                    w[j] += v[i] * row[j]
-        for i in range(k, n):
-            if v[i] != 0.0:
-                row, f = b[i], beta[k] * v[i]
-                for j in range(k + 1, m):
-                    row[j] -= f * w[j]
-        for j in range(k + 1, m):
-            left[j] -= b[k, j] * b[k, j]
-    return Factor(b, beta, order, scale, rank)
+        _reflect(b, v, beta[k], k)
+        b[k, k] = head
+        for i in range(k + 1, n):
+            b[i, k] = 0.0
+        row = b[k]
+        for j in range(width):
+            left[j] -= row[j] * row[j]
+    return Factor(b, reflection, beta, order, scale, rank)
 
 
 @kernel
@@ -101,27 +122,27 @@ def shortest(f, r):
 
     `conflict` is by how much the dependent equations, scaled to unit length, are not met: zero when they agree.
     """
-    n, m = f.b.shape
+    n, m = len(f.beta), len(f.order)
     z = np.zeros(n)
     partial = np.zeros(m)  # R^T z, gathered row by row
     conflict = 0.0
     for k in range(m):
         right = f.scale[k] * r[f.order[k]]
         if k < f.rank:
-            z[k] = (right - partial[k]) / f.b[k, k]
+            z[k] = (right - partial[k]) / f.upper[k, k]
             for j in range(k + 1, m):
-                partial[j] += f.b[k, j] * z[k]
+                partial[j] += f.upper[k, j] * z[k]
         else:
             conflict = max(conflict, abs(right - partial[k]))
     y = z.copy()
     for k in range(f.rank - 1, -1, -1):
         total = y[k]
         for i in range(k + 1, n):
-            total += f.b[i, k] * y[i]
+            total += f.reflection[k, i] * y[i]
         total *= f.beta[k]
         y[k] -= total
         for i in range(k + 1, n):
-            y[i] -= total * f.b[i, k]
+            y[i] -= total * f.reflection[k, i]
     return y, z, conflict
 
 
@@ -130,10 +151,10 @@ def _back_substitute(f, x):
     """Solve R11 x = x in place, for one column (rank, c) or several."""
     for k in range(f.rank - 1, -1, -1):
         for c in range(x.shape[1]):
-            x[k, c] /= f.b[k, k]
+            x[k, c] /= f.upper[k, k]
         for i in range(k):
             for c in range(x.shape[1]):
-                x[i, c] -= f.b[i, k] * x[k, c]
+                x[i, c] -= f.upper[i, k] * x[k, c]
 
 
 @kernel
@@ -158,14 +179,14 @@ def _solve_positive(m, x):
 @kernel
 def minimum_norm(f, z):
     """The shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
-    m = f.b.shape[1]
+    m = len(f.order)
     r, free = f.rank, m - f.rank
     # column 0: the basic solution; the others: minus the null space's upper part, R11^-1 R12
     work = np.empty((r, 1 + free))
     for k in range(r):
         work[k, 0] = z[k]
         for c in range(free):
-            work[k, 1 + c] = f.b[k, r + c]
+            work[k, 1 + c] = f.upper[k, r + c]
     _back_substitute(f, work)
     for k in range(r):
         for c in range(1 + free):
@@ -192,16 +213,16 @@ def minimum_norm(f, z):
 @kernel
 def basic(f, y):
     """The x of shape (m,) with B x = y in the least-squares sense that is zero on all dependent columns."""
-    n, m = f.b.shape
+    n, m = len(f.beta), len(f.order)
     c = y.copy()
     for k in range(f.rank):
         total = c[k]
         for i in range(k + 1, n):
-            total += f.b[i, k] * c[i]
+            total += f.reflection[k, i] * c[i]
         total *= f.beta[k]
         c[k] -= total
         for i in range(k + 1, n):
-            c[i] -= total * f.b[i, k]
+            c[i] -= total * f.reflection[k, i]
     x = np.zeros(m)
     upper = c[: f.rank].copy().reshape(-1, 1)
     _back_substitute(f, upper)

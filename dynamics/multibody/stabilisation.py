@@ -110,7 +110,7 @@ def partition(a, configuration, velocity, drive, ranks):
     _, e = rows(a, configuration, velocity, drive)
     if held > 0:
         jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
-        mask = _dependent(pivoted_qr.factor(jacobian.copy(), _tolerance(e), ranks[0]), width)
+        mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[0]), width)
         for _ in range(ITERATIONS):
             if largest(e.residual) < ENOUGH:
                 break
@@ -120,7 +120,7 @@ def partition(a, configuration, velocity, drive, ranks):
             jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
     if len(e.target) > 0:
         jacobian = np.ascontiguousarray(e.jacobian_t.T)
-        mask = _dependent(pivoted_qr.factor(jacobian.copy(), _tolerance(e), ranks[1]), width)
+        mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[1]), width)
         change = _correction(jacobian, mask, velocity_defect(e, velocity), _tolerance(e), ranks[1])
         velocity = velocity + change.reshape(-1, 6)
     return configuration, velocity

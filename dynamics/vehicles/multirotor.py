@@ -17,7 +17,7 @@ from dynamics.effects._rotors import each, total
 from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
-from dynamics.vector import Vec3, scale
+from dynamics.vector import ZERO, Vec3, scale
 from dynamics.vehicles.airframe import Airframe
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
@@ -314,8 +314,9 @@ def initial_state(
     position_world: Vec3 = (0.0, 0.0, 0.0),
     attitude: Quaternion = NO_ROTATION,
     rotor_speed: float = 0.0,
+    velocity_world: Vec3 = ZERO,
+    omega_body: Vec3 = ZERO,
 ) -> MultirotorState:
-    """At rest in the world, all rotors at the same speed [rad/s], the effects' memory fresh."""
-    still = (0.0, 0.0, 0.0)
-    motion = Motion(position_world, attitude, still, still, (rotor_speed,) * len(p.layout.x_body))
+    """All rotors at the same speed [rad/s], the effects' memory fresh; without more at rest in the world."""
+    motion = Motion(position_world, attitude, velocity_world, omega_body, (rotor_speed,) * len(p.layout.x_body))
     return MultirotorState(motion, tuple(hooks.initial_memory(e) for e in p.effects))

@@ -1,25 +1,26 @@
 """The multirotor's five bodies in XYZ Euler angles on the general engine, which factorises every constraint row.
 
-A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a chassis
-that pitches through 90 degrees: there its rates are NaN.
+A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a body that
+pitches through 90 degrees: there its pitch becomes infinite, which `singular` finds.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel
+from dynamics.kernel import kernel, leaf
 from dynamics.lie import quaternion
 from dynamics.multibody import euler, hold, stabilisation
 from dynamics.multibody.augmented import RANK_TOLERANCE, solve
 from dynamics.multibody.five_bodies import BodyState, FiveBodies
 from dynamics.multibody.mechanisms import drone_system
 from dynamics.multibody.system import Arrays
-from dynamics.vector import Vec3, apply
+from dynamics.vector import ZERO, Vec3, apply
 from dynamics.vehicles import multirotor_multibody as on_se3
 from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState
 
-HELD, DRIVEN = 20, 24  # ranks of the rows of four hinges, and of these and four drives
+NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
 
 
 class EulerBody(NamedTuple):
@@ -109,7 +110,8 @@ def _imposed(a, p):
     """Speed and acceleration of each drive, shape (4 or 0, 2)."""
     out = np.empty((len(a.drive_bodies), 2))
     for k in range(len(out)):
-        out[k, 0], out[k, 1] = p.rotors[k].speed, p.rotors[k].drive
+        r = p.rotors[max(a.drive_bodies[k, 0], a.drive_bodies[k, 1]) - 1]  # the chassis is body 0
+        out[k, 0], out[k, 1] = r.speed, r.drive
     return out
 
 
@@ -129,6 +131,29 @@ def _wrenches(p):
 
 
 @kernel
+def _ranks(a):
+    """Of the hinges' rows, and of all: of a drive's three rows two are its hinge's."""
+    held = 5 * len(a.joint_bodies)
+    return held, held + len(a.drive_bodies)
+
+
+@kernel
+def _upright(x):
+    """Whether all pitches are apart from 90 degrees; they pass it without a jump, so none is overlooked."""
+    for i in range(5):
+        if not math.cos(x.body[i].angles[1]) > NEAR:
+            return False
+    return True
+
+
+@leaf
+def _stopped(b):
+    """The tangent of one body where angles end: infinite for a pitch that is there, and nothing else."""
+    pitch = 0.0 if math.cos(b.angles[1]) > NEAR else math.inf
+    return EulerBody(ZERO, (0.0, pitch, 0.0), ZERO, ZERO)
+
+
+@kernel
 def seen(layout, x):
     """The Motion of the chassis with the speeds of the rotors."""
     return on_se3.seen(layout, five(x))
@@ -136,34 +161,41 @@ def seen(layout, x):
 
 @kernel
 def rate(drive, t, x):
-    """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)); NaN where the angles are singular."""
+    """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
+    if not _upright(x):
+        b = x.body
+        return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
     p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
     given = drive.parameters.layout.bodies
     a = _system(given.arrays, p)
     q, v = _arrays(x)
-    most = DRIVEN if len(a.drive_bodies) > 0 else HELD
     f = given.feedback
-    s, singular = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, most)
-    acceleration = s.acceleration
-    if singular >= 0:
-        acceleration = acceleration * np.nan
-    return _tree(v, acceleration)
+    s, _ = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, _ranks(a)[1])
+    return _tree(v, s.acceleration)
+
+
+@kernel
+def struck(drive, x):
+    """As `multirotor_multibody.struck`."""
+    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    a = _system(drive.parameters.layout.bodies.arrays, p)
+    q, v = _arrays(x)
+    q, v = stabilisation.project(a, q, v, _imposed(a, p), _ranks(a))
+    return _tree(q, v)
 
 
 @kernel
 def held(drive, x):
     """The bodies brought together again, as the assembly says."""
     given = drive.parameters.layout.bodies
-    if given.hold == hold.NONE:
+    if given.hold == hold.NONE or not _upright(x):
         return x
+    if given.hold == hold.PROJECTION:
+        return struck(drive, x)
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
     a = _system(given.arrays, p)
     q, v = _arrays(x)
-    ranks = (HELD, DRIVEN if len(a.drive_bodies) > 0 else HELD)
-    if given.hold == hold.PROJECTION:
-        q, v = stabilisation.project(a, q, v, _imposed(a, p), ranks)
-    else:
-        q, v = stabilisation.partition(a, q, v, _imposed(a, p), ranks)
+    q, v = stabilisation.partition(a, q, v, _imposed(a, p), _ranks(a))
     return _tree(q, v)
 
 
@@ -180,12 +212,28 @@ def accelerations(drive, t, x):
 FORMS[FiveEulerBodies] = Form(seen, rate, held, accelerations)
 
 
+def singular(x: FiveEulerBodies) -> int:
+    """The body whose pitch has reached 90 degrees in a state that is no longer finite; -1 if none has."""
+    return next((i for i, b in enumerate(x.body) if math.isinf(b.angles[1])), -1)
+
+
 def parameters(*given, **named) -> MultirotorParameters:
     """As `multirotor_multibody.parameters`."""
-    p = on_se3.parameters(*given, **named)
+    return _assembled(on_se3.parameters(*given, **named))
+
+
+def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """As `multirotor_multibody.after`."""
+    return _assembled(on_se3.after(p, k, becomes))
+
+
+def _assembled(p: MultirotorParameters) -> MultirotorParameters:
     bodies = p.layout.bodies
-    arrays = drone_system(bodies.drone, tuple(spins == 0.0 for spins in bodies.drone.spins)).arrays
-    return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=arrays)))
+    drone = bodies.drone
+    system = drone_system(drone, tuple(spins == 0.0 for spins in drone.spins))
+    for k, held in enumerate(drone.held):
+        system = system if held else system.without(f"hinge {k + 1}")
+    return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=system.arrays)))
 
 
 def initial_state(*given, **named) -> MultirotorState:

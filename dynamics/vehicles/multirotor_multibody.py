@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._rotors import each, total, total_wrench
-from dynamics.effects._types import Motion
+from dynamics.effects._types import Motion, PerRotor
 from dynamics.effects.rotor_gyro import RotorGyro
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate_back
@@ -22,6 +22,11 @@ from dynamics.vehicles.airframe import Airframe
 from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
 
 FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation
+BECOMES = {  # what may become of a propeller: (spins, powered, held)
+    "locked": (0.0, 0.0, 1.0),  # its speed relative to the chassis is zero from now on
+    "free": (1.0, 0.0, 1.0),  # its motor gives no torque any more, the air brakes it
+    "torn_off": (1.0, 0.0, 0.0),  # its hinge and its drive are gone: gravity alone acts on it, no ground stops it
+}
 STABILISATIONS = {
     "none": hold.NONE, "partitioning": hold.PARTITION, "projection": hold.PROJECTION, "baumgarte": hold.NONE,
 }  # fmt: skip
@@ -33,6 +38,7 @@ class Assembly(NamedTuple):
     drone: Drone
     hold: int  # of dynamics.multibody.hold, after every step
     feedback: float  # [1/s]
+    powered: PerRotor  # 0: the motor gives no torque; with an imposed speed, that speed is zero
     arrays: Any  # system.Arrays of the general engine; () on the fast path
 
 
@@ -52,16 +58,17 @@ def _rotor_speed(chassis_rate, sign, propeller):
 
 
 @leaf
-def seen(layout, x):
-    """The Motion of the chassis with the speeds of the rotors."""
-    c = x.chassis
-    speed = each(_rotor_speed, c.omega_body[2], layout.yaw_sign, x.propellers)
-    return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
+def _product(_, a, b):
+    return a * b
 
 
 @leaf
-def _product(_, a, b):
-    return a * b
+def seen(layout, x):
+    """The Motion of the chassis with the speeds of the rotors; of one that was torn off it is zero."""
+    c = x.chassis
+    speed = each(_rotor_speed, c.omega_body[2], layout.yaw_sign, x.propellers)
+    speed = each(_product, 0.0, layout.bodies.drone.held, speed)
+    return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
 
 
 @leaf
@@ -93,13 +100,13 @@ def acting(drive, t, motion):
 
 @leaf
 def _rotor(k, layout, R, motion, part):
-    d, sign = layout.bodies.drone, -layout.yaw_sign[k]
+    d, sign, powered = layout.bodies.drone, -layout.yaw_sign[k], layout.bodies.powered[k]
     thrust, torque, acceleration = part
     spins, axial = d.spins[k], d.propeller_inertia[k][2]
-    drive = sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
+    drive = powered * sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
     wrench = Wrench(scale(thrust, (R[2], R[5], R[8])), (0.0, 0.0, -sign * torque))
-    speed = sign * motion.rotor_speed[k]
-    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench)
+    speed = powered * sign * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench, d.held[k])
 
 
 @leaf
@@ -119,22 +126,23 @@ def machine(drive, t, motion):
 
 
 @leaf
-def _still(k, d, motion, sign):
-    speed = -sign[k] * motion.rotor_speed[k]
-    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH)
+def _still(k, layout, motion):
+    d = layout.bodies.drone
+    speed = -layout.bodies.powered[k] * layout.yaw_sign[k] * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH, d.held[k])
 
 
 @leaf
 def unloaded(drive, motion):
     """The machine without loads: all that projection looks at."""
-    d, sign = drive.parameters.layout.bodies.drone, drive.parameters.layout.yaw_sign
+    layout = drive.parameters.layout
     rotors = (
-        _still(0, d, motion, sign),
-        _still(1, d, motion, sign),
-        _still(2, d, motion, sign),
-        _still(3, d, motion, sign),
+        _still(0, layout, motion),
+        _still(1, layout, motion),
+        _still(2, layout, motion),
+        _still(3, layout, motion),
     )
-    mass = drive.body.mass - total(d.propeller_mass)
+    mass = drive.body.mass - total(layout.bodies.drone.propeller_mass)
     return Machine(mass, drive.body.inertia, ZERO, NO_WRENCH, rotors, 0.0)
 
 
@@ -155,6 +163,12 @@ def held(drive, x):
 
 
 @kernel
+def struck(drive, x):
+    """The bodies after impulses in the hinges that meet all constraints at once; they keep the momentum."""
+    return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
+
+
+@kernel
 def accelerations(drive, t, x):
     """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
     tangent = rate(drive, t, x)
@@ -166,31 +180,37 @@ FORMS[FiveBodies] = Form(seen, rate, held, accelerations)
 
 @leaf
 def _on_propeller(x, reaction):
-    return reaction.reaction_force, rotate_back(x.attitude, reaction.reaction_torque)
+    force, torque = reaction
+    return force, rotate_back(x.attitude, torque)
 
 
 @leaf
 def _on_chassis(chassis, x, reaction):
+    force, torque = reaction
     arm = subtract(x.position_world, chassis.position_world)
-    torque = add(reaction.reaction_torque, cross(arm, reaction.reaction_force))
-    return scale(-1.0, reaction.reaction_force), scale(-1.0, rotate_back(chassis.attitude, torque))
+    return scale(-1.0, force), scale(-1.0, rotate_back(chassis.attitude, add(torque, cross(arm, force))))
 
 
 @kernel
 def joints(drive, t, x):
     """(force [N] in the world, torque about the centre of mass [N m] in the body) of the hinges on each body, chassis
     first; z of a propeller's torque is what its drive gives."""
-    l = five_bodies.solve(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x).leaves  # noqa: E741
+    on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(
-        (_on_chassis(c, b[0], l[0]), _on_chassis(c, b[1], l[1]), _on_chassis(c, b[2], l[2]), _on_chassis(c, b[3], l[3]))
+        (
+            _on_chassis(c, b[0], on[0]),
+            _on_chassis(c, b[1], on[1]),
+            _on_chassis(c, b[2], on[2]),
+            _on_chassis(c, b[3], on[3]),
+        )
     )
     return (
         chassis,
-        _on_propeller(b[0], l[0]),
-        _on_propeller(b[1], l[1]),
-        _on_propeller(b[2], l[2]),
-        _on_propeller(b[3], l[3]),
+        _on_propeller(b[0], on[0]),
+        _on_propeller(b[1], on[1]),
+        _on_propeller(b[2], on[2]),
+        _on_propeller(b[3], on[3]),
     )
 
 
@@ -224,9 +244,21 @@ def parameters(
         ValueError: as `drone_of`.
     """
     feedback = FEEDBACK if stabilisation == "baumgarte" else 0.0
-    assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, ())
+    assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, (1.0,) * 4, ())
     p = multirotor.parameters(airframe, tuple(e for e in effects if not isinstance(e, RotorGyro)))
     return p._replace(layout=p.layout._replace(bodies=assembly))
+
+
+def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """The parameters once propeller k (0 to 3) has become what BECOMES names; see `struck` for the state then."""
+
+    def changed(values: PerRotor, value: float) -> PerRotor:
+        return (*values[:k], value, *values[k + 1 :])
+
+    bodies, (spins, powered, held) = p.layout.bodies, BECOMES[becomes]
+    drone = bodies.drone._replace(spins=changed(bodies.drone.spins, spins), held=changed(bodies.drone.held, held))
+    bodies = bodies._replace(drone=drone, powered=changed(bodies.powered, powered))
+    return p._replace(layout=p.layout._replace(bodies=bodies))
 
 
 def initial_state(
@@ -234,11 +266,13 @@ def initial_state(
     position_world: Vec3 = ZERO,
     attitude: Quaternion = NO_ROTATION,
     rotor_speed: float = 0.0,
+    velocity_world: Vec3 = ZERO,
+    omega_body: Vec3 = ZERO,
 ) -> MultirotorState:
-    """At rest in the world, all rotors at the same speed [rad/s], blades along x, the effects' memory fresh."""
+    """All rotors at the same speed [rad/s], blades along x, the effects' memory fresh; without more at rest."""
     plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
     d = p.layout.bodies.drone
-    chassis = BodyState(position_world, attitude, ZERO, ZERO)
+    chassis = BodyState(position_world, attitude, velocity_world, omega_body)
     speeds = tuple(-sign * rotor_speed for sign in p.layout.yaw_sign)
     x = hold.together(five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds)
     return plain._replace(motion=x)

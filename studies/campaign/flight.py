@@ -12,6 +12,7 @@ from services.autopilot import control
 from services.autopilot.commander.pilot import POSITION_LOST
 from services.autopilot.config import Autopilot
 from services.plant.models import reduced
+from services.plant.models.multibody import Multibody
 from services.scene import Scene
 from services.sections import Exchange, Run, follows_trajectory, gravity, period
 from services.sensors.service import TEMPERATURE
@@ -28,14 +29,15 @@ def seeded(scene: Scene, seed: int) -> Scene:
 
 
 def fly(scene: Scene) -> Flown:
-    """Fly the scene to its end: compiled, unless the pilot may act, who is in the services only.
+    """Fly the scene to its end: compiled, unless the pilot may act or propellers break, in the services only.
 
     Raises:
         ValueError: nobody flies along a trajectory in this scene.
     """
     if not scene.has(Autopilot) or not follows_trajectory(scene):
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
-    if scene[Autopilot].operator or scene.tables("effects").get("battery") is not None:
+    breaks = scene.has(Multibody) and scene[Multibody].event
+    if breaks or scene[Autopilot].operator or scene.tables("effects").get("battery") is not None:
         return by_services.fly(scene)
     flown, failed_motor = fly_compiled(scene)
     acts = failed_motor > 0 or _doubtful(flown.record, scene[Exchange].rate)

@@ -159,7 +159,7 @@ def test_a_column_of_round_off_is_not_scaled_up_to_look_independent():
 def test_pivoted_qr_solves_a_rank_deficient_problem():
     rng = np.random.default_rng(12)
     B = rng.normal(size=(6, 4)) @ rng.normal(size=(4, 9))
-    f = pivoted_qr.factor(B.copy(), 1e-9, augmented.ANY)
+    f = pivoted_qr.factor(B, 1e-9, augmented.ANY)
     assert f.rank == 4
     right = B.T @ rng.normal(size=6)
     y, z, conflict = pivoted_qr.shortest(f, right)

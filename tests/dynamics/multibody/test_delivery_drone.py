@@ -121,7 +121,7 @@ def test_a_torn_off_propeller_is_gone():
     for k in (0, 1, 3):
         relative = np.cross(alpha, hub[k]) + np.cross(w, np.cross(w, hub[k]))
         total += drone.propeller_mass[k] * (np.array(m.acceleration_world) + R @ relative)
-    mass = drone.mass + sum(drone.propeller_mass)
+    mass = drone.mass + sum(drone.propeller_mass[k] for k in (0, 1, 3))
     thrust = sum(given.thrust[k] for k in (0, 1, 3))
     np.testing.assert_allclose(
         total, np.array(given.force_world) + thrust * R[:, 2] + mass * np.array(GRAVITY), atol=1e-10

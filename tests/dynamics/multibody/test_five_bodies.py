@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from test_augmented import PAPER
 
-from dynamics.kernel import kernel
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody import augmented
 from dynamics.multibody.augmented import accelerations
-from dynamics.multibody.delivery_drone import delivery_drone
-from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate, solve
+from dynamics.multibody.delivery_drone import delivery_drone, without_propeller
+from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
+from dynamics.multibody.five_bodies import reactions as from_chassis
 from dynamics.multibody.hold import together
 from dynamics.multibody.mechanisms import drone_system
 from dynamics.multibody.placement import displaced
@@ -88,16 +88,35 @@ def test_identical_off_the_constraints_too(feedback):
         np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-11)
 
 
-@kernel
-def reacted(p, x):
-    leaves = solve(p, 0.0, x).leaves
-    return [(item.reaction_force, item.reaction_torque) for item in leaves]
-
-
 def test_reactions_are_the_multipliers():
     drone, p, x, wrench, speeds, drive = scene(np.random.default_rng(33), "speed")
     system, solution, imposed = general(drone, x, wrench, speeds, drive, "speed")
     expected = reactions(system, *arrays(x), solution, imposed)
-    for k, (force, torque) in enumerate(reacted(p, x)):
+    for k, (force, torque) in enumerate(from_chassis(p, 0.0, x)):
         np.testing.assert_allclose(force, expected[f"hinge {k + 1}"].force_world, atol=1e-10)
         np.testing.assert_allclose(torque, expected[f"hinge {k + 1}"].torque_world, atol=1e-10)
+
+
+@pytest.mark.parametrize("driven", ["speed", "torque"])
+def test_one_torn_off_is_the_general_engine_without_its_rows(driven):
+    """The other three go on as a mechanism, it as a free body; nothing acts between the two parts any more."""
+    rng = np.random.default_rng(34)
+    for _ in range(10):
+        drone, p, x, wrench, speeds, drive = scene(rng, driven)
+        drive[1] = 0.0
+        rotors = list(p.rotors)
+        rotors[1] = rotors[1]._replace(drive=0.0, held=without_propeller(drone, 1).held[1])
+        p = p._replace(rotors=tuple(rotors))
+        system, wrench = drone_system(drone, (driven == "speed",) * 4).without("hinge 2"), wrench.copy()
+        imposed = np.zeros((0, 2))
+        if driven == "speed":
+            system = system.without("drive 2")
+            imposed = np.delete(np.stack([speeds, drive], axis=1), 1, 0)
+        else:
+            wrench[1:, 5] += drive
+            wrench[0, 5] -= drive.sum()
+        expected = accelerations(system, *arrays(x), wrench, imposed).acceleration
+        _, ours = arrays(rate(p, 0.0, x))
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(ours / scale, expected / scale, atol=1e-12)
+        assert from_chassis(p, 0.0, x)[1] == ((0.0,) * 3, (0.0,) * 3)

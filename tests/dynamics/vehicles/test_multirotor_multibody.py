@@ -10,7 +10,7 @@ from dynamics import effects
 from dynamics.effects._types import body_of
 from dynamics.integrators import get
 from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION, exp, rotation_matrix
+from dynamics.lie.quaternion import NO_ROTATION, exp
 from dynamics.noise import stream_key
 from dynamics.vehicles import multirotor, multirotor_multibody
 from dynamics.vehicles.airframe import load_airframe
@@ -41,24 +41,6 @@ def reduced():
     return p._replace(body=body_of(DRONE.mass.total, tuple(inertia.tolist())))
 
 
-def thrown(state, omega):
-    """Turning at omega, each form in its own way."""
-    if hasattr(state.motion, "omega_body"):
-        return state._replace(motion=state.motion._replace(omega_body=omega))
-    chassis = state.motion.chassis
-    w = np.array(omega)
-    R = np.array(rotation_matrix(chassis.attitude)).reshape(3, 3)
-    propellers = []
-    for body in state.motion.propellers:
-        arm = R.T @ (np.array(body.position_world) - chassis.position_world)
-        velocity = R @ np.cross(w, arm)
-        spin = tuple((w + body.omega_body).tolist())  # blades along x: the frames agree
-        propellers.append(body._replace(velocity_world=tuple(velocity.tolist()), omega_body=spin))
-    return state._replace(
-        motion=state.motion._replace(chassis=chassis._replace(omega_body=omega), propellers=tuple(propellers))
-    )
-
-
 @kernel
 def looked(p, x):
     return multirotor.seen(p.layout, x)
@@ -75,13 +57,13 @@ ATTITUDE = exp((0.1, -0.2, 0.3))
 @pytest.fixture(scope="module")
 def reference():
     p = reduced()
-    return fly(p, thrown(multirotor.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED), OMEGA), 0.2, 2.5e-4).motion
+    return fly(p, multirotor.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA), 0.2, 2.5e-4).motion
 
 
 @pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
 def test_symmetric_propellers_at_imposed_speed_are_the_reduced_model(reference, stabilisation):
     p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)
-    start = thrown(multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED), OMEGA)
+    start = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA)
     # feedback turns the drift that the integration leaves into motion of the chassis: half the step for the same error
     ours = looked(p, fly(p, start, 0.2, 1.25e-4 if stabilisation == "baumgarte" else 2.5e-4).motion)
     for name in reference._fields:
@@ -91,7 +73,7 @@ def test_symmetric_propellers_at_imposed_speed_are_the_reduced_model(reference, 
 def hovering(blades, drive, omega=(0.0, 0.0, 0.0)):
     """(parameters, state turning at omega, voltages that keep the rotors at SPEED)."""
     p = multirotor_multibody.parameters(blades, ACTIVE, drive)
-    state = thrown(multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), NO_ROTATION, SPEED), omega)
+    state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), NO_ROTATION, SPEED, omega_body=omega)
     return p, state, (SPEED * DRONE.motor.rotor_constant,) * 4
 
 

@@ -1,31 +1,34 @@
 """`vehicle.model = "multibody"`: what a scene may say of it; and the mission begins as with the reduced model."""
 
+import math
+import re
 from pathlib import Path
 
 import pytest
 
 from messages import Actuators, header
 from messages.topics import BODIES, TRUTH
+from services.lockstep import LockStepError
 from services.scene import SceneError, load
 from services.table import lockstep_services
 
 MISSION = Path(__file__).parents[3] / "scenes/delivery_mission.toml"
 FLOWN = "vehicle.model=multibody"
+CALM = ["effects.wind_random.mean=[0.0, 0.0, 0.0]", "effects.wind_random.sigma=0.0"]
 
 
-def lifted(overrides):
-    """(truth, bodies) after 0.2 s at full voltage."""
+def lifted(overrides, volts=(44.4,) * 4, ticks=50):
+    """(truth, bodies) after ticks of 4 ms, 0.2 s, at these voltages, full ones unless given."""
     plant = lockstep_services(load(MISSION, overrides))["plant"]
-    full = Actuators(header(0, "drone1"), motor_voltage=(44.4,) * 4)
-    for tick in range(51):
-        said = dict(plant.step(tick, full, None))
+    command = Actuators(header(0, "drone1"), motor_voltage=volts)
+    for tick in range(ticks + 1):
+        said = dict(plant.step(tick, command, None))
     return said[TRUTH], said.get(BODIES)
 
 
 def test_it_rises_as_the_reduced_model_does():
-    calm = ["effects.wind_random.mean=[0.0, 0.0, 0.0]", "effects.wind_random.sigma=0.0"]
-    one, _ = lifted(calm)
-    several, bodies = lifted([FLOWN, *calm])
+    one, _ = lifted(CALM)
+    several, bodies = lifted([FLOWN, *CALM])
     assert several.pose.position.z == pytest.approx(one.pose.position.z, abs=1e-6)
     assert several.rotor_speed == pytest.approx(one.rotor_speed, rel=1e-3)
     assert list(bodies.name) == ["chassis", "propeller1", "propeller2", "propeller3", "propeller4"]
@@ -34,7 +37,84 @@ def test_it_rises_as_the_reduced_model_does():
     assert 0.99 * sum(several.rotor_thrust) < bodies.force[0].z < sum(several.rotor_thrust)
 
 
+def event(time, propeller, becomes):
+    return f'{{time={time}, propeller={propeller}, becomes="{becomes}"}}'
+
+
+BROKEN = f"multibody.event=[{event(0.1, 1, 'locked')}, {event(0.1, 2, 'free')}, {event(0.15, 3, 'torn_off')}]"
+
+
+@pytest.mark.parametrize("coordinates", ["se3", "euler"])
+def test_propellers_break_in_flight(coordinates):
+    """At 0.1 s the first locks and the second loses its motor, at 0.15 s the third goes; the fourth goes on."""
+    flown = [FLOWN, BROKEN, *CALM, f"multibody.coordinates={coordinates}"]
+    just_before, _ = lifted(flown, ticks=25)
+    at_once, _ = lifted(flown, ticks=26)
+    later, bodies = lifted(flown, ticks=45)
+    assert min(just_before.rotor_speed) > 100.0
+    assert at_once.rotor_speed[0] == pytest.approx(0.0, abs=1e-9)
+    assert at_once.rotor_speed[1] == pytest.approx(just_before.rotor_speed[1], rel=0.1)
+    assert later.rotor_speed[0] == pytest.approx(0.0, abs=1e-9)
+    assert 0.0 < later.rotor_speed[1] < just_before.rotor_speed[1]
+    assert later.rotor_speed[2] == later.rotor_thrust[2] == 0.0
+    assert later.rotor_speed[3] > just_before.rotor_speed[3]
+    assert bodies.force[3].z == bodies.torque[3].z == 0.0
+    assert bodies.torque[2].z == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_pitch_through_90_degrees_ends_euler_angles_and_nothing_else():
+    """Front rotors only; the angles' divisor is looked at before it is divided by, so no step may jump over it."""
+    thrown = ((0.0, 44.4, 44.4, 0.0), 150)
+    with pytest.raises(LockStepError) as error:
+        lifted([FLOWN, "multibody.coordinates=euler", *CALM], *thrown)
+    assert re.search(
+        r"the multirotor: \w+: pitch reached 90 degrees by t = 0\.\d+ s, where Euler angles end; "
+        'multibody.coordinates = "se3" has no such place',
+        str(error.value),
+    )
+    truth, _ = lifted([FLOWN, *CALM], *thrown)
+    q = truth.pose.orientation
+    assert 2.0 * (q.y * q.y + q.x * q.x) > 1.0  # past the vertical: the z axis points down
+
+
+def test_euler_angles_that_diverge_for_another_reason_say_so():
+    plant = lockstep_services(load(MISSION, [FLOWN, "multibody.coordinates=euler", *CALM]))["plant"]
+    with pytest.raises(LockStepError, match=r"not finite at t = 0.004 s: .*; take a smaller step than 0.001 s"):
+        for tick in range(2):
+            list(plant.step(tick, Actuators(header(0, "drone1"), motor_voltage=(math.nan,) * 4), None))
+
+
 WRONG = {
+    "no such propeller": (
+        [FLOWN],
+        f"multibody.event=[{event(1.0, 5, 'free')}]",
+        "multibody.event.0.propeller: expected a number not above 4, got 5",
+    ),
+    "an event after the end": (
+        [FLOWN, "run.duration=2"],
+        f"multibody.event=[{event(2.5, 1, 'free')}]",
+        "multibody.event.0.time: expected a time within run.duration = 2 s, got 2.5",
+    ),
+    "an event before the start": (
+        [FLOWN],
+        f"multibody.event=[{event(-1.0, 1, 'free')}]",
+        "multibody.event.0.time: expected a number not below 0, got -1",
+    ),
+    "an unknown fate": (
+        [FLOWN],
+        f"multibody.event=[{event(1.0, 1, 'bent')}]",
+        "multibody.event.0.becomes: expected 'locked', 'free' or 'torn_off', got 'bent'",
+    ),
+    "what is gone already": (
+        [FLOWN],
+        f"multibody.event=[{event(2.0, 1, 'free')}, {event(1.0, 1, 'torn_off')}]",
+        "multibody.event.0.propeller: propeller 1 is torn off at 1 s; nothing can become of it after that",
+    ),
+    "the reduced model": (
+        [],
+        f"multibody.event=[{event(1.0, 1, 'free')}]",
+        'multibody: the model reduced knows no such table; set vehicle.model = "multibody"',
+    ),
     "a table for nobody": (
         [],
         "multibody.drive=speed",

@@ -1,0 +1,177 @@
+"""A propeller that locks, turns free or is torn off in flight: nothing from outside acts, so momenta are kept."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics import effects
+from dynamics.integrators import get
+from dynamics.kernel import kernel
+from dynamics.lie.quaternion import exp, rotation_matrix
+from dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
+from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor import MultirotorDrive
+from dynamics.vehicles.multirotor_multibody import BECOMES
+
+DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+RK4 = get("rk4_renormalised").Method()
+VOLTS, SPEED = (25.0, 27.0, 24.0, 28.0), 200.0
+VELOCITY, OMEGA, ATTITUDE = (1.0, -2.0, 0.5), (0.6, -0.4, 0.3), exp((0.1, -0.2, 0.3))
+FORMS = {"se3": multirotor_multibody, "euler": multirotor_euler}
+H, N = 5e-4, 4
+IZ = DRONE.rotors.inertia
+
+
+@kernel
+def on_se3(x):
+    return multirotor_euler.five(x)
+
+
+@kernel
+def seen(p, x):
+    return multirotor.seen(p.layout, x)
+
+
+@kernel
+def struck(p, state, volts):
+    return multirotor_multibody.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+
+
+@kernel
+def euler_struck(p, state, volts):
+    return multirotor_euler.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+
+
+@kernel
+def hinges(p, x, volts):
+    return multirotor_multibody.joints(MultirotorDrive(p, p.body, (), volts), 0.0, x)
+
+
+def bodies(x):
+    x = x if hasattr(x, "chassis") else on_se3(x)
+    return (x.chassis, *x.propellers)
+
+
+def spin(p, b):
+    """Angular momentum of each body about its own centre of mass, in the world, shape (5, 3)."""
+    d = p.layout.bodies.drone
+    moments = np.array([d.inertia, *d.propeller_inertia])
+    turned = [np.array(rotation_matrix(q.attitude)).reshape(3, 3) for q in b]
+    return np.array([R @ (i * q.omega_body) for R, i, q in zip(turned, moments, b, strict=True)])
+
+
+def momenta(p, x):
+    """(linear, angular about the origin) of the five bodies, shape (6,)."""
+    d, b = p.layout.bodies.drone, bodies(x)
+    masses = np.array([d.mass, *d.propeller_mass])
+    linear = masses[:, None] * [q.velocity_world for q in b]
+    angular = np.cross([q.position_world for q in b], linear) + spin(p, b)
+    return np.concatenate([linear.sum(axis=0), angular.sum(axis=0)])
+
+
+def flown(p, state, ticks, begin=0):
+    for tick in range(begin, begin + ticks):
+        state = multirotor.advance(RK4, p, (0, 0), tick, state, VOLTS, H, N)
+    return state
+
+
+def before(coordinates, drive):
+    form = FORMS[coordinates]
+    p = form.parameters(DRONE, (), drive)
+    start = form.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA)
+    return form, p, start, flown(p, start, 10)
+
+
+@pytest.mark.parametrize("coordinates", FORMS)
+@pytest.mark.parametrize("drive", ["torque", "speed"])
+@pytest.mark.parametrize("becomes", BECOMES)
+def test_momentum_is_kept_across_the_event(coordinates, drive, becomes):
+    form, p, start, state = before(coordinates, drive)
+    after = form.after(p, 1, becomes)
+    kept = momenta(p, state.motion)
+    assert np.abs(kept - momenta(p, start.motion)).max() < 1e-7
+    if becomes == "locked":
+        strike = struck if coordinates == "se3" else euler_struck
+        state = state._replace(motion=strike(after, state, VOLTS))
+        assert np.abs(momenta(after, state.motion) - kept).max() < 1e-11
+    end = flown(after, state, 10, 10)
+    assert np.abs(momenta(after, end.motion) - kept).max() < 1e-7
+
+
+def test_a_locked_propeller_gives_its_spin_to_the_chassis():
+    """The naive way, which just stops it, loses the spin."""
+    _, p, _, state = before("se3", "torque")
+    after = multirotor_multibody.after(p, 1, "locked")
+    speed = seen(p, state.motion).rotor_speed[1]
+    motion = struck(after, state, VOLTS)
+    assert seen(after, motion).rotor_speed[1] == pytest.approx(0.0, abs=1e-11)
+    assert np.abs(np.subtract(motion.chassis.omega_body, state.motion.chassis.omega_body))[2] > 0.5 * IZ * speed / 0.5
+    old = state.motion.propellers[1]
+    still = old._replace(omega_body=(*old.omega_body[:2], state.motion.chassis.omega_body[2]))
+    naive = state.motion._replace(propellers=(state.motion.propellers[0], still, *state.motion.propellers[2:]))
+    lost = np.linalg.norm((momenta(p, naive) - momenta(p, state.motion))[3:])
+    assert lost == pytest.approx(IZ * abs(speed), rel=1e-6)
+    end = flown(after, state._replace(motion=motion), 20, 10).motion
+    assert seen(after, end).rotor_speed[1] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(seen(after, end).rotor_speed)[[0, 2, 3]].min() > SPEED
+
+
+@pytest.mark.parametrize("drive", ["torque", "speed"])
+def test_a_free_propeller_keeps_its_spin_without_air(drive):
+    _, p, _, state = before("se3", drive)
+    after = multirotor_multibody.after(p, 1, "free")
+    end = flown(after, state, 20, 10)
+    axial = [bodies(x)[2].omega_body[2] for x in (state.motion, end.motion)]
+    # uneven blades trade a trace of it with the body rates
+    assert axial[1] == pytest.approx(axial[0], rel=1e-4)
+    assert seen(after, end.motion).rotor_speed[3] > seen(after, state.motion).rotor_speed[3] + 10.0
+    assert hinges(after, end.motion, VOLTS)[2][1][2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("coordinates", FORMS)
+def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
+    """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held."""
+    form, p, _, state = before(coordinates, "speed")
+    after = form.after(p, 1, "torn_off")
+    if coordinates == "euler":
+        arrays = after.layout.bodies.arrays
+        assert (len(arrays.joint_bodies), len(arrays.drive_bodies)) == (3, 3)
+    end = flown(after, state, 20, 10)
+    t = 20 * N * H
+    b, e = bodies(state.motion), bodies(end.motion)
+    straight = np.array(b[2].position_world) + t * np.array(b[2].velocity_world)
+    np.testing.assert_allclose(e[2].position_world, straight, atol=1e-12)
+    np.testing.assert_allclose(spin(p, e)[2], spin(p, b)[2], atol=1e-8)
+    assert seen(after, end.motion).rotor_speed[1] == 0.0
+    if coordinates == "se3":
+        forces = hinges(after, end.motion, VOLTS)
+        assert forces[2] == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        assert np.linalg.norm(forces[1][0]) > 0.0
+    gap = [
+        np.subtract(e[k + 1].position_world, e[0].position_world)
+        - np.array(rotation_matrix(e[0].attitude)).reshape(3, 3) @ DRONE.rotors.position[k]
+        for k in range(4)
+    ]
+    assert np.abs([gap[k] for k in (0, 2, 3)]).max() < 1e-10
+    assert np.abs(gap[1]).max() > 1e-4
+
+
+def test_both_coordinates_tear_alike():
+    ends = []
+    for coordinates in FORMS:
+        form, p, _, state = before(coordinates, "torque")
+        ends.append(bodies(flown(form.after(p, 1, "torn_off"), state, 10, 10).motion))
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-8)
+        np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-6)
+
+
+def test_thrust_of_what_is_gone_is_gone():
+    active = effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE)
+    p = multirotor_multibody.after(multirotor_multibody.parameters(DRONE, active), 1, "torn_off")
+    state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=SPEED)
+    assert multirotor.observe(p, 0, H, state, VOLTS).thrust[1] == 0.0
+    end = flown(p, state, 50)
+    fallen = np.subtract(bodies(end.motion)[2].position_world, bodies(state.motion)[2].position_world)
+    np.testing.assert_allclose(fallen, (0.0, 0.0, -0.5 * 9.80665 * (50 * N * H) ** 2), atol=1e-12)
