@@ -153,8 +153,8 @@ class Autopilot:
         """What the pilot wants, having heard the operator."""
         pilot = self._pilot
         if tick % LOOK == 0 or pilot.looks_closely:
-            pilot.estimate = read(self._navigation.believed)
-            pilot.health = pilot.estimate.health
+            passed = self._interval * (1 if pilot.looks_closely else LOOK)
+            pilot.look(read(self._navigation.believed), passed)
         for given in commands.commands if commands else ():
             obey(pilot, given)
         if pilot.parameters_changed:
