@@ -137,20 +137,22 @@ def _ranks(a):
     return held, held + len(a.drive_bodies)
 
 
+@leaf
+def _upright(b):
+    """Whether a pitch is apart from 90 degrees; it passes there without a jump, so that no step leaps over it."""
+    return math.cos(b.angles[1]) > NEAR
+
+
 @kernel
-def _upright(x):
-    """Whether all pitches are apart from 90 degrees; they pass it without a jump, so none is overlooked."""
-    for i in range(5):
-        if not math.cos(x.body[i].angles[1]) > NEAR:
-            return False
-    return True
+def _all_upright(x):
+    b = x.body
+    return _upright(b[0]) and _upright(b[1]) and _upright(b[2]) and _upright(b[3]) and _upright(b[4])
 
 
 @leaf
 def _stopped(b):
     """The tangent of one body where angles end: infinite for a pitch that is there, and nothing else."""
-    pitch = 0.0 if math.cos(b.angles[1]) > NEAR else math.inf
-    return EulerBody(ZERO, (0.0, pitch, 0.0), ZERO, ZERO)
+    return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
 
 
 @kernel
@@ -162,7 +164,7 @@ def seen(layout, x):
 @kernel
 def rate(drive, t, x):
     """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
-    if not _upright(x):
+    if not _all_upright(x):
         b = x.body
         return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
     p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
@@ -188,7 +190,7 @@ def struck(drive, x):
 def held(drive, x):
     """The bodies brought together again, as the assembly says."""
     given = drive.parameters.layout.bodies
-    if given.hold == hold.NONE or not _upright(x):
+    if given.hold == hold.NONE or not _all_upright(x):
         return x
     if given.hold == hold.PROJECTION:
         return struck(drive, x)

@@ -15,6 +15,7 @@ from services.scene import Scene, load, sections
 from services.sections import Exchange, Rates, Run
 from services.single import run_single
 from services.table import lockstep_services
+from studies.accuracy.plant import longest_step
 from studies.flight import Messages
 
 LONGEST = 20.0  # [s] of a flight that is flown so often
@@ -69,8 +70,7 @@ def errors(scene: Scene, overrides: Iterable[str] = ()) -> list[Part]:
     coupling = scene[Exchange].coupling
     parts = []
     exact = flown(1, coupling, fine(1))
-    for n in STEPS:
-        step = interval / n
+    for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
         track = flown(1, coupling, [f"solver.step={step!r}"])
         parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", track, exact))
     sequential = {factor: flown(factor, "sequential", fine(factor)) for factor in (*FINER, FINEST_RATE)}

@@ -1,5 +1,6 @@
 """The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
 
+import importlib
 import math
 from collections.abc import Callable
 from typing import Any
@@ -14,9 +15,9 @@ from dynamics.lie.quaternion import exp
 from dynamics.noise import stream_key
 from dynamics.tree import flatten
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe
+from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
 from services.scene import Scene
-from services.sections import Exchange, Run, Vehicle, active, airframe
+from services.sections import Exchange, Run, Vehicle
 from studies.accuracy.coordinates import coordinates, defect
 from studies.accuracy.integrate import SAMPLES, applicable
 from studies.accuracy.problem import Outcome, Problem, Way
@@ -41,31 +42,42 @@ def flight(method, p, key, state, volts, phase, h, n, every, out):
             for _ in range(every):
                 state = advance(method, p, key, tick, state, each(_wave, tick * n * h, volts, phase), h, n)
                 tick += 1
-        numbers = flatten(state.motion)
+        numbers = flatten(seen(p.layout, state.motion))
         for i in range(len(numbers)):
             out[row, i] = numbers[i]
 
 
 def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
-    """(parameters, start) of a scene whose model is the reduced one: in the air, moving and turning."""
-    p = multirotor.parameters(airframe(scene), active(scene))
-    state = multirotor.initial_state(p, (0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p))
-    motion = state.motion._replace(velocity_world=(3.0, 1.0, -0.5), omega_body=(0.4, -0.6, 0.3))
-    return p, state._replace(motion=motion)
+    """(parameters, start) of a scene with a multirotor of one or several bodies: in the air, moving and turning."""
+    form, p = model(scene).described(scene)
+    start = ((0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p), (3.0, 1.0, -0.5), (0.4, -0.6, 0.3))
+    return p, form.initial_state(p, *start)
+
+
+def model(scene: Scene) -> Any:
+    """The module of the scene's plant model."""
+    return importlib.import_module(f"services.plant.models.{scene[Vehicle].model}")
+
+
+def longest_step(scene: Scene) -> float:
+    """The longest step [s] that the scene's model accepts."""
+    found = getattr(model(scene), "longest_step", None)
+    return found(scene) if found else math.inf
 
 
 def problem(scene: Scene) -> Problem:
     """The plant of such a scene, and the ways to integrate it."""
     exchange = scene[Exchange]
-    p, state = physics(scene)
-    volts = tuple(speed / p.layout.speed_per_volt for speed in state.motion.rotor_speed)
+    (p, state), longest = physics(scene), longest_step(scene)
+    motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
+    volts = (hover_speed(p) / p.layout.speed_per_volt,) * len(motion.rotor_speed)
     phase = tuple(2.4 * i for i in range(len(volts)))
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval
     key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
 
     def flown(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
-        out = np.empty((rows, len(flatten(state.motion))))
+        out = np.empty((rows, len(flatten(motion))))
         token, h = method.Method(), exchange.interval / steps
         return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
 
@@ -78,9 +90,9 @@ def problem(scene: Scene) -> Problem:
             each_step = getattr(method, "EVALUATIONS", None)
             evaluations = each_step and SAMPLES * every * round(exchange.interval / step) * each_step
             times = np.linspace(0.0, duration, SAMPLES + 1)
-            return Outcome(times, coordinates(state.motion, out), defect(state.motion, out[-1]), evaluations)
+            return Outcome(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
 
-        settings = [exchange.interval / 2**k for k in range(6)]
+        settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return Way(
             name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
             flown(method, 1, rows=1),
@@ -91,7 +103,7 @@ def problem(scene: Scene) -> Problem:
         "s",
         duration,
         [way(name) for name in applicable(state.motion)],
-        lambda: coordinates(state.motion, flown(rkmk54, FINEST)())[-1],
+        lambda: coordinates(motion, flown(rkmk54, FINEST)())[-1],
         f"rkmk54 with {FINEST} steps in an exchange interval",
         {},
     )

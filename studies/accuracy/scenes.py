@@ -1,6 +1,5 @@
 """Scenes as problems: the plant that a scene flies, and the exchange interval that its steps divide."""
 
-import importlib
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ def problem(scene: Scene) -> Problem:
     Raises:
         ValueError: its model is none that this study knows how to integrate.
     """
-    if scene[Vehicle].model == "reduced":
+    if hasattr(plant.model(scene), "described"):
         return plant.problem(scene)
     return _marched(scene, *physics(scene))
 
@@ -35,13 +34,13 @@ def physics(scene: Scene) -> tuple[Any, Any]:
     Raises:
         ValueError: its model is none that this study knows how to integrate.
     """
-    model = scene[Vehicle].model
-    if model == "reduced":
+    model = plant.model(scene)
+    if hasattr(model, "described"):
         return plant.physics(scene)
-    module = importlib.import_module(f"services.plant.models.{model}")
-    if not hasattr(module, "system"):
-        raise ValueError(f"{scene.path}: vehicle.model: the integrators of {model} cannot be compared")
-    return module.system(scene)
+    if not hasattr(model, "system"):
+        name = scene[Vehicle].model
+        raise ValueError(f"{scene.path}: vehicle.model: the integrators of {name} cannot be compared")
+    return model.system(scene)
 
 
 def _marched(scene: Scene, p: Any, x: Any) -> Problem:

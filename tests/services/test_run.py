@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from messages import BodyStates
 from services.flight import fly_single
 from services.log import LogReader
 from services.progress import Display
@@ -135,6 +136,21 @@ def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
     with LogReader(tmp_path / "test-first.mcap") as log:
         assert log.digest() == first["digest"]
         assert log.attachments["scene.toml"].startswith(SCENE.read_bytes())
+
+
+def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_path):
+    broken = ", ".join(
+        f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, becomes="{fate}"}}'
+        for k, fate in enumerate(("locked", "free", "torn_off"))
+    )
+    bodies = ["vehicle.model=multibody", f"multibody.event=[{broken}]"]
+    alone = single(tmp_path, *bodies)
+    assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
+    with LogReader(tmp_path / "test-broken.mcap") as log:
+        told = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/bodies"])]
+        assert b"torn_off" in log.attachments["scene.toml"]
+    assert told[60].force[3].z != 0.0
+    assert told[-1].force[3].z == 0.0
 
 
 def test_another_seed_gives_other_bits(tmp_path):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal
 
 from numba.extending import overload
@@ -21,7 +22,7 @@ from services.plant import outputs
 from services.plant.config import Solver
 from services.plant.models import reduced
 from services.scene import Scene, Section, WrongKeyError
-from services.sections import Exchange, Run, Vehicle, active, airframe, period, start_height
+from services.sections import Exchange, Run, Vehicle, active, airframe, period
 
 NAMES = ("chassis", *[f"propeller{k + 1}" for k in range(4)])
 LARGEST_TURN = 0.5  # [rad] of a propeller in a step of the redundant coordinates
@@ -75,15 +76,26 @@ def _settings(scene: Scene) -> Multibody:
 def check(scene: Scene) -> None:
     """As of the reduced model; the airframe tells of single rotors, which turn little in a step."""
     reduced.check(scene)
-    frame = airframe(scene)
     try:
-        multirotor_multibody.drone_of(frame)
+        multirotor_multibody.drone_of(airframe(scene))
     except ValueError as error:
         raise WrongKeyError("vehicle.airframe", f"{scene[Vehicle].airframe}: {error}") from None
-    fastest = frame.motor.max_voltage / frame.motor.rotor_constant
-    if scene[Solver].step * fastest > LARGEST_TURN:
-        most = LARGEST_TURN / fastest
+    if scene[Solver].step > longest_step(scene):
+        fastest, most = LARGEST_TURN / longest_step(scene), longest_step(scene)
         raise WrongKeyError("solver.step", f"propellers turn at up to {fastest:.0f} rad/s: take at most {most:.1g} s")
+
+
+def longest_step(scene: Scene) -> float:
+    """The step [s] in which no propeller turns further than LARGEST_TURN."""
+    motor = airframe(scene).motor
+    return LARGEST_TURN * motor.rotor_constant / motor.max_voltage
+
+
+def described(scene: Scene) -> tuple[ModuleType, Any]:
+    """As `reduced.described`."""
+    s = _settings(scene)
+    form = FORM[s.coordinates]
+    return form, form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
 
 
 def _tick(scene: Scene, time: float) -> int:
@@ -139,6 +151,7 @@ class FiveBodyPlant(reduced.Reduced):
     """Tells of single bodies as well: forces and torques of the hinges, a drive's torque along its propeller's axis."""
 
     outputs = (*reduced.Reduced.outputs, BODIES)  # type: ignore[assignment]
+    described = staticmethod(described)
 
     def __init__(self, scene: Scene):
         super().__init__(scene)
@@ -146,12 +159,6 @@ class FiveBodyPlant(reduced.Reduced):
         self._events: dict[int, list[Event]] = {}
         for event in _settings(scene).event:
             self._events.setdefault(_tick(scene, event.time), []).append(event)
-
-    def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
-        s = _settings(scene)
-        form = FORM[s.coordinates]
-        p = form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
-        return p, form.initial_state(p, (0.0, 0.0, start_height(scene)))
 
     def prepare(self) -> None:
         """Compile or load the kernels."""

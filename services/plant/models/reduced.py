@@ -1,6 +1,7 @@
 """A multirotor as one rigid body with rotors: motor voltages in, the vehicle's true state out."""
 
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from dynamics.cell import Cell
@@ -25,6 +26,11 @@ def check(scene: Scene) -> None:
     needs(scene, "autopilot")
     if not scene.lookup("autopilot.operator"):
         needs(scene, "trajectory")
+
+
+def described(scene: Scene) -> tuple[ModuleType, Any]:
+    """(module that makes the states, parameters)."""
+    return multirotor, multirotor.parameters(airframe(scene), active(scene))
 
 
 def create(scene: Scene) -> "Reduced":
@@ -60,6 +66,7 @@ class Reduced:
     """Integrates the vehicle from tick to tick under the newest command."""
 
     outputs = (TRUTH, POSE, ODOM, TF, CLOCK, BATTERY)
+    described = staticmethod(described)
 
     def __init__(self, scene: Scene):
         exchange, vehicle, frame = scene[Exchange], scene[Vehicle], airframe(scene)
@@ -71,8 +78,8 @@ class Reduced:
         self._pose_every, self._battery_every = period(scene, POSE), period(scene, BATTERY)
         self._method, self._steps, self._step = method(scene)
         self._key = stream_key(scene[Run].seed, vehicle.name, "plant")
-        parameters, start = self._vehicle(scene)
-        self._parameters, self._state = Cell(parameters), Cell(start)
+        form, p = self.described(scene)
+        self._parameters, self._state = Cell(p), Cell(form.initial_state(p, (0.0, 0.0, start_height(scene))))
         self._off = (0.0,) * len(frame.rotors.position)
         self._pack = frame.battery
 
@@ -80,11 +87,6 @@ class Reduced:
     def core(self) -> Core:
         """What a compiled closed loop flies with instead of `step`."""
         return Core(self._method, self._parameters, self._state, self._key, self._step, self._steps, self._interval)
-
-    def _vehicle(self, scene: Scene) -> tuple[Any, Any]:
-        """(parameters, state at the start)."""
-        p = multirotor.parameters(airframe(scene), active(scene))
-        return p, multirotor.initial_state(p, (0.0, 0.0, start_height(scene)))
 
     def prepare(self) -> None:
         """Compile or load the kernel."""
