@@ -25,9 +25,11 @@ def flown_scene(read: LogReader) -> Scene:
 
 
 def given_commands(read: LogReader, scene: Scene) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """The commands from outside, with the ticks at which they applied."""
-    interval = scene[Exchange].interval_ns
-    for _, _, time_ns, payload in read.messages([OPERATOR.key(scene[Vehicle].name)]):
+    """The commands from outside, with the ticks at which they applied; none where nobody was listened to."""
+    interval, topic = scene[Exchange].interval_ns, OPERATOR.key(scene[Vehicle].name)
+    if topic not in read.topics():
+        return
+    for _, _, time_ns, payload in read.messages([topic]):
         yield time_ns // interval, OperatorInput.decode(payload).commands
 
 
