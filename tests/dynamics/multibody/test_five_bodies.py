@@ -85,7 +85,7 @@ def test_identical_off_the_constraints_too(feedback):
         _, expected, _ = general(drone, x, wrench, speeds, drive, "torque", feedback)
         _, ours = arrays(rate(p._replace(feedback=feedback), 0.0, x))
         scale = np.abs(expected.acceleration).max()
-        np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-11)
+        np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-12)
 
 
 def test_reactions_are_the_multipliers():

@@ -70,9 +70,9 @@ def momenta(p, x):
     return np.concatenate([linear.sum(axis=0), angular.sum(axis=0)])
 
 
-def flown(p, state, ticks, begin=0):
+def flown(p, state, ticks, begin=0, volts=VOLTS):
     for tick in range(begin, begin + ticks):
-        state = multirotor.advance(RK4, p, (0, 0), tick, state, VOLTS, H, N)
+        state = multirotor.advance(RK4, p, (0, 0), tick, state, volts, H, N)
     return state
 
 
@@ -119,6 +119,7 @@ def test_a_locked_propeller_gives_its_spin_to_the_chassis():
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 def test_a_free_propeller_keeps_its_spin_without_air(drive):
+    """The naive way, a motor without voltage, brakes it."""
     _, p, _, state = before("se3", drive)
     after = multirotor_multibody.after(p, 1, "free")
     end = flown(after, state, 20, 10)
@@ -127,11 +128,14 @@ def test_a_free_propeller_keeps_its_spin_without_air(drive):
     assert axial[1] == pytest.approx(axial[0], rel=1e-4)
     assert seen(after, end.motion).rotor_speed[3] > seen(after, state.motion).rotor_speed[3] + 10.0
     assert hinges(after, end.motion, VOLTS)[2][1][2] == pytest.approx(0.0, abs=1e-12)
+    naive = flown(p, state, 20, 10, (VOLTS[0], 0.0, *VOLTS[2:]))
+    assert seen(p, naive.motion).rotor_speed[1] < 0.8 * SPEED
 
 
 @pytest.mark.parametrize("coordinates", FORMS)
 def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
-    """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held."""
+    """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held. The naive way,
+    a propeller that gives no thrust any more, stays where it is."""
     form, p, _, state = before(coordinates, "speed")
     after = form.after(p, 1, "torn_off")
     if coordinates == "euler":
@@ -142,7 +146,7 @@ def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
     b, e = bodies(state.motion), bodies(end.motion)
     straight = np.array(b[2].position_world) + t * np.array(b[2].velocity_world)
     np.testing.assert_allclose(e[2].position_world, straight, atol=1e-12)
-    np.testing.assert_allclose(spin(p, e)[2], spin(p, b)[2], atol=1e-8)
+    np.testing.assert_allclose(spin(p, e)[2], spin(p, b)[2], atol=1e-7)
     assert seen(after, end.motion).rotor_speed[1] == 0.0
     if coordinates == "se3":
         forces = hinges(after, end.motion, VOLTS)
@@ -155,6 +159,8 @@ def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
     ]
     assert np.abs([gap[k] for k in (0, 2, 3)]).max() < 1e-10
     assert np.abs(gap[1]).max() > 1e-4
+    naive = bodies(flown(form.after(p, 1, "free"), state, 20, 10).motion)
+    assert np.abs(np.subtract(naive[2].position_world, straight)).max() > 1e-4
 
 
 def test_both_coordinates_tear_alike():
@@ -164,7 +170,7 @@ def test_both_coordinates_tear_alike():
         ends.append(bodies(flown(form.after(p, 1, "torn_off"), state, 10, 10).motion))
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-8)
-        np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-6)
+        np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-5)
 
 
 def test_thrust_of_what_is_gone_is_gone():
