@@ -2,9 +2,10 @@
 
     python -m benchmarks.mavlink [--soak]
 
-Processor time: an adapter with one client at PX4's rates in real time, fed by a process of its own kind of messages.
-Jitter: of ATTITUDE at 50 Hz as a client on UDP sees it, in a run at real time. Lock step: the same scene at top speed
-with and without a link. The soak: a client flies 30 simulated minutes at ten times real time, and counts heartbeats.
+Processor time: an adapter with one client at PX4's rates in real time, fed by a run. Jitter: of ATTITUDE at 50 Hz as a
+client on UDP sees it, in a run at real time. Lock step: the same scene at top speed without an operator, with one who
+says nothing, and with a link; the best of repeats in turn. The soak: a client flies 30 simulated minutes at ten times
+real time, and counts heartbeats.
 """
 
 import json
@@ -21,7 +22,7 @@ from pymavlink import mavutil
 
 MISSION = "scenes/delivery_mission.toml"
 SECONDS = 30.0  # of real time for jitter and processor time
-REPEATS = 3
+REPEATS = 5
 SOAK, SOAK_SPEED = 1800.0, 10.0  # [s] simulated, simulated seconds per second
 QUIET = 3.0  # [s] of simulation time: a gap between heartbeats that a client takes for a lost link
 
@@ -125,13 +126,19 @@ def main():
         print(f"one client at PX4's rates: {100.0 * share:.1f} % of a core, {rate:.0f} messages/s")
         print(f"50 Hz as the client sees it: jitter median {middle:.2f} ms, p99 {p99:.2f} ms, worst {worst:.1f} ms")
         print(f"as the link sees it: {report}")
-        factors = {"without": [], "with": []}
+        variants = {
+            "nobody listens": [],
+            "an operator is listened to": ["--set", "autopilot.operator=true"],
+            "with a link": ["--mavlink", f"udpout:127.0.0.1:{free_port()}"],
+        }
+        factors = {name: [] for name in variants}
         for _ in range(REPEATS):
-            factors["without"].append(top_speed(folder))
-            link = ["--mavlink", f"udpout:127.0.0.1:{free_port()}"]
-            factors["with"].append(top_speed(folder, *link))
-        a, b = median(factors["without"]), median(factors["with"])
-        print(f"lock step at top speed: {a:.2f} x real time, with a link {b:.2f}: {100.0 * (b / a - 1):+.1f} %")
+            for name, more in variants.items():
+                factors[name].append(top_speed(folder, *more))
+        best = max(factors["nobody listens"])
+        for name, found in factors.items():
+            change = 100.0 * (max(found) / best - 1.0)
+            print(f"lock step at top speed, {name}: {max(found):.2f} x real time, {change:+.1f} %")
 
 
 if __name__ == "__main__":

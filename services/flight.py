@@ -3,10 +3,12 @@
 import os
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from messages.topics import POSE, STATUS, Topic
 from services.bus import ZenohBus, mesh
@@ -56,12 +58,23 @@ class Stop:
             raise Interrupted(self.number)
 
 
+AGAIN = 0.5  # [s]
+
+
 def end_at_once() -> None:
     """Let SIGINT and SIGTERM raise `Interrupted` wherever the program is; a flight has its gentler `Stop`."""
 
     def raise_(number: int, _: object) -> None:
+        # An exception that is raised inside a call from the compiler's library is lost there: raise it again, later.
+        signal.signal(signal.SIGALRM, lambda *_: raise_(number, None))
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
         raise Interrupted(number)
 
+    def lost(fault: Any) -> None:
+        if not isinstance(fault.exc_value, Interrupted):
+            sys.__unraisablehook__(fault)
+
+    sys.unraisablehook = lost
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, raise_)
 

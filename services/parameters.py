@@ -1,9 +1,11 @@
 """The autopilot's parameters that can be changed in flight: what each means, its default and its bounds.
 
 Names are PX4's where the meaning is the same; at most 16 characters, as MAVLink wants. All are in SI units. The
-defaults of the gains are those of the scene's gain set; `[autopilot.parameters]` of a scene sets others.
+defaults of the gains are those of the scene's gain set; `[autopilot.parameters]` of a scene sets others, or
+`parameters` in its `[autopilot]` names a file of them (services/parameter_file.py).
 """
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from services.scene import Scene, sections
@@ -23,9 +25,13 @@ class Parameter(NamedTuple):
     meaning: str
     whole: bool = False  # only whole numbers
 
+    def allows(self, value: float) -> bool:
+        """Whether it can have this value."""
+        return self.least <= value <= self.most and not (self.whole and value != int(value))
+
     def check(self, value: float) -> None:
         """ValueError (one line) if it cannot have this value."""
-        if not self.least <= value <= self.most or (self.whole and value != int(value)):
+        if not self.allows(value):
             kind = "a whole number" if self.whole else "a number"
             raise ValueError(f"{self.name}: expected {kind} from {self.least:g} to {self.most:g}, got {value:g}")
 
@@ -82,12 +88,22 @@ def table(scene: Scene) -> dict[str, Parameter]:
     """
     config: Any = scene[sections()["autopilot"]]
     known = {p.name: p for p in (*_gains(config.gain_set(scene)), *_FLIGHT, *_FAILSAFES)}
-    for name, value in config.parameters.items():
+    for name, value in config.given_parameters(scene).items():
         if name not in known:
             raise ValueError(f"unknown parameter {name}; expected one of {', '.join(known)}")
         known[name].check(value)
         known[name] = known[name]._replace(default=float(value))
     return known
+
+
+def changed(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, float]:
+    """The values after an operator's commands, as the autopilot has taken them."""
+    values = {p.name: p.default for p in table.values()}
+    for command in commands:
+        known = table.get(command.text) if command.kind == "parameter" else None
+        if known and command.values and known.allows(command.values[0]):
+            values[known.name] = command.values[0]
+    return values
 
 
 def _gains(gains: Any) -> list[Parameter]:

@@ -1,7 +1,9 @@
 """Flies a recorded run again: its scene, and what came from outside at the ticks at which it applied."""
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -10,8 +12,23 @@ from messages.topics import OPERATOR
 from services import flight
 from services.log import LogReader
 from services.progress import Display
-from services.scene import recorded_scene
+from services.scene import Scene, recorded_scene
 from services.sections import Exchange, Run, Vehicle
+
+
+def flown_scene(read: LogReader) -> Scene:
+    """The scene of a run's log, with the overrides of the run; ValueError if it carries none."""
+    if "scene.toml" not in read.attachments or "scene" not in read.metadata:
+        raise ValueError(f"{read.path}: carries no scene; expected a log that `lapwing run` has written")
+    folder = Path(read.metadata.get("folder", "scenes"))
+    return recorded_scene(read.metadata["scene"], folder, read.attachments["scene.toml"].decode())
+
+
+def given_commands(read: LogReader, scene: Scene) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """The commands from outside, with the ticks at which they applied."""
+    interval = scene[Exchange].interval_ns
+    for _, _, time_ns, payload in read.messages([OPERATOR.key(scene[Vehicle].name)]):
+        yield time_ns // interval, OperatorInput.decode(payload).commands
 
 
 def refly(log: Path, console: Console) -> tuple[str, str]:
@@ -21,16 +38,10 @@ def refly(log: Path, console: Console) -> tuple[str, str]:
         ValueError: no log, or none of a run.
     """
     with LogReader(log) as read:
-        if "scene.toml" not in read.attachments or "scene" not in read.metadata:
-            raise ValueError(f"{log}: carries no scene; expected a log that `lapwing run` has written")
-        folder = Path(read.metadata.get("folder", "scenes"))
-        scene = recorded_scene(read.metadata["scene"], folder, read.attachments["scene.toml"].decode())
-        interval, topic = scene[Exchange].interval_ns, OPERATOR.key(scene[Vehicle].name)
-        given, last = {}, 0
-        for name, _, time_ns, payload in read.messages(read.deterministic_topics()):
-            last = max(last, time_ns // interval)
-            if name == topic:
-                given[time_ns // interval] = OperatorInput.decode(payload).commands
+        scene = flown_scene(read)
+        interval = scene[Exchange].interval_ns
+        given = dict(given_commands(read, scene))
+        last = max((time_ns // interval for _, _, time_ns, _ in read.messages(read.deterministic_topics())), default=0)
         before = read.digest()
     flight.prepare(scene, console.print)
     with tempfile.TemporaryDirectory() as place, Display(console, scene[Run].duration) as display:

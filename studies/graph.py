@@ -5,6 +5,7 @@ python -m studies.graph scenes/delivery_mission.toml docs/pictures/services.png
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -38,7 +39,8 @@ def draw(services: dict[str, Service], vehicle: str, path: Path) -> None:
     places = {name: (4.6 * x, 2.8 * y) for name, (x, y) in PLACES.items() if name in services}
     for name in services.keys() - places.keys():
         places[name] = (4.6 * (1 + len(places) - len(PLACES)), 1.0)
-    for (producer, consumer), names in topics_between(services, vehicle).items():
+    between = topics_between(services, vehicle)
+    for (producer, consumer), names in between.items():
         (x0, y0), (x1, y1) = places[producer], places[consumer]
         axes.annotate(
             "",
@@ -48,8 +50,17 @@ def draw(services: dict[str, Service], vehicle: str, path: Path) -> None:
                 "arrowstyle": "-|>", "color": BLUE, "lw": 1.6, "shrinkA": 34, "shrinkB": 34,
             },
         )  # fmt: skip
-        middle = ((x0 + x1) / 2, (y0 + y1) / 2)
-        axes.text(*middle, "\n".join(names), ha="center", va="center", fontsize=8, color=GREY, backgroundcolor="white")
+        share = 0.3 if (consumer, producer) in between else 0.5  # names for both ways must not meet
+        there = (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+        label: Any = {
+            "ha": "center",
+            "va": "center",
+            "fontsize": 8,
+            "color": GREY,
+            "backgroundcolor": "white",
+            "zorder": 4,
+        }
+        axes.text(*there, "\n".join(names), **label)
     for name, (x, y) in places.items():
         style = {"boxstyle": "round,pad=0.6", "fc": "white", "ec": BLUE, "lw": 1.8}
         axes.text(x, y, name, ha="center", va="center", fontsize=12, bbox=style)

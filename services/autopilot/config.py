@@ -6,6 +6,7 @@ from pydantic import Field
 
 from services import parameters
 from services.autopilot.gains import GainSet, load
+from services.parameter_file import read
 from services.scene import Scene, Section
 from services.sections import airframe
 
@@ -22,12 +23,17 @@ class Autopilot(Section):
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
     operator: bool = False  # whether commands from outside are listened to
     trajectory: bool = True  # follow the scene's [trajectory]; false: stand disarmed and wait for commands
-    parameters: dict[str, float] = Field(default_factory=dict)  # of services/parameters.py, by name
+    parameters: dict[str, float] | str = Field(default_factory=dict)  # by name, or a file of them beside the scene
 
     def gain_set(self, scene: Scene) -> GainSet:
         """The gain set that the scene names; ValueError if there is none."""
         name = str(scene.path.parent / self.gains) if self.gains.endswith(".toml") else self.gains
         return load(name)
+
+    def given_parameters(self, scene: Scene) -> dict[str, float]:
+        """The values that the scene sets; ValueError if its file of them cannot be read."""
+        given = self.parameters
+        return read(scene.path.parent / given) if isinstance(given, str) else given
 
     def check(self, scene: Scene) -> None:
         """The gain set is there, the vehicle suits the controller, and the sensors that it needs are carried."""

@@ -53,6 +53,7 @@ class Airframe(NamedTuple):
     voltage_max: float  # [V]
     resting_height: float  # world z of the vehicle's origin when it stands [m]
     gravity: float = 9.80665  # [m/s^2]
+    yaw_lead: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
 
 
 def names() -> list[str]:

@@ -1,6 +1,6 @@
 """Stability margins of the loops about hover, from their frequency responses (theory.md, eqs. (4.30)-(4.34))."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,15 +36,22 @@ def open_loops(
         gain: true over believed acceleration per thrust, as a lighter or stronger vehicle has it.
     """
     s = 1j * FREQUENCIES
+    return loops(p, airframe, s, gain * np.exp(-(delay + 0.5) * tick * s))
+
+
+def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any]:
+    """The loops of `open_loops` at the complex frequencies `s` [rad/s], where the loop's delay and gain come to `late`.
+
+    Both may also be transfer functions, s that of a derivative.
+    """
     lag = 1.0 / (1.0 + airframe.motor.time_constant * s)
-    late = gain * np.exp(-(delay + 0.5) * tick * s)
     arm_x = sum(abs(y) for y in airframe.rotor_y)
     arm_y = sum(abs(x) for x in airframe.rotor_x)
     arm_z = 4.0 * airframe.torque_per_thrust
     i_x, i_y, i_z = airframe.inertia_body
-    loops = {
+    found = {
         "lift": _pid(p.lift, s) * 4.0 / airframe.mass * lag * late / s**2,
-        "yaw": _pid(p.yaw, s) * arm_z / i_z * lag * late / s**2,
+        "yaw": _pid(p.yaw, s) * arm_z / i_z * (1.0 + airframe.yaw_lead * s) * lag * late / s**2,
     }
     smooth = p.smoothing.bandwidth**2 / (
         s**2 + 2.0 * p.smoothing.damping * p.smoothing.bandwidth * s + p.smoothing.bandwidth**2
@@ -58,10 +65,10 @@ def open_loops(
         if p.smoothing.lag > 0.0:
             demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
         position = _pid(outer, s) * p.gravity / s**2  # tilt asked for over tilt
-        loops[tilt] = turn * feedback
-        loops[way] = position * turn * demand / (1.0 + turn * feedback)
-        loops[f"{way}_motors"] = turn * (feedback + position * demand)
-    return loops
+        found[tilt] = turn * feedback
+        found[way] = position * turn * demand / (1.0 + turn * feedback)
+        found[f"{way}_motors"] = turn * (feedback + position * demand)
+    return found
 
 
 def margins(loop: np.ndarray) -> Margins:
@@ -90,5 +97,16 @@ def stable(loop: np.ndarray) -> bool:
     return bool(abs(angle[-1] - angle[0] - 0.5 * np.pi * integrators) < np.pi)
 
 
-def _pid(g: Pid, s: np.ndarray) -> np.ndarray:
+def excess(loop: np.ndarray) -> float:
+    """Factor by which the gain of an unstable loop is too high (below 1: too low); 1 for a stable one, NaN for none."""
+    if stable(loop):
+        return 1.0
+    for decibels in np.arange(0.5, 60.0, 0.5):
+        for factor in (10.0 ** (decibels / 20.0), 10.0 ** (-decibels / 20.0)):
+            if stable(loop / factor):
+                return float(factor)
+    return np.nan
+
+
+def _pid(g: Pid, s: Any) -> Any:
     return g.p + g.i / s + g.d * s

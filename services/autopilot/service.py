@@ -1,5 +1,6 @@
 """The autopilot as a service: sensors (or the truth) and setpoints in, motor voltages out."""
 
+import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -20,7 +21,17 @@ from services.autopilot.motor import Motor
 from services.autopilot.stage import FLYING, LANDED, STANDING
 from services.lockstep import Input
 from services.scene import Scene
-from services.sections import Exchange, Rates, airframe, follows_trajectory, gravity, period, start_height, ticks
+from services.sections import (
+    Effects,
+    Exchange,
+    Rates,
+    airframe,
+    follows_trajectory,
+    gravity,
+    period,
+    start_height,
+    ticks,
+)
 
 LOOK = 5  # ticks between two looks of the pilot at the estimate
 
@@ -141,9 +152,9 @@ class Autopilot:
     def _ask(self, tick: int, setpoint: Any, commands: Any) -> Any:
         """What the pilot wants, having heard the operator."""
         pilot = self._pilot
-        if tick % LOOK == 0:
-            pilot.estimate = read(self._navigation.believed)
-            pilot.health = pilot.estimate.health
+        if tick % LOOK == 0 or pilot.looks_closely:
+            passed = self._interval * (1 if pilot.looks_closely else LOOK)
+            pilot.look(read(self._navigation.believed), passed)
         for given in commands.commands if commands else ():
             obey(pilot, given)
         if pilot.parameters_changed:
@@ -220,6 +231,11 @@ def known_airframe(scene: Scene) -> gains.Airframe:
     """What the autopilot is told of the vehicle: nominal numbers, at standard density."""
     frame = airframe(scene)
     propeller = RotorThrust.from_scene({}, frame)
+    torque_per_thrust = propeller.torque_constant / propeller.thrust_constant
+    thrust_coefficient = STANDARD_DENSITY * propeller.thrust_constant
+    weight = 0.25 * frame.mass.total * gravity(scene)
+    slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
+    spins_up = "rotor_gyro" in scene[Effects].tables and slope > 0.0
     x, y, _ = zip(*frame.rotors.position, strict=True)
     a, b, c, d = frame.rotors.yaw_sign
     engine = frame.motor
@@ -229,13 +245,12 @@ def known_airframe(scene: Scene) -> gains.Airframe:
         x,
         y,
         (a, b, c, d),
-        propeller.torque_constant / propeller.thrust_constant,
-        Motor(
-            STANDARD_DENSITY * propeller.thrust_constant, engine.belt_ratio, engine.speed_constant, engine.time_constant
-        ),
+        torque_per_thrust,
+        Motor(thrust_coefficient, engine.belt_ratio, engine.speed_constant, engine.time_constant),
         engine.max_voltage,
         start_height(scene),
         gravity(scene),
+        frame.rotors.inertia / (slope * torque_per_thrust) if spins_up else 0.0,
     )
 
 

@@ -22,3 +22,11 @@ def decided(path: Path, overrides: list[str]) -> tuple["Scene", list[str]]:
     chosen = choice.overrides(scene, typer.echo)
     typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: chosen {', '.join(chosen)}")
     return load(path, [*overrides, *chosen]), [*overrides, *chosen]
+
+
+def warn_of_gains(scene: "Scene") -> None:
+    """Say which of the autopilot's loops are unstable, a line each; the scene may be flown all the same."""
+    from services.autopilot.unstable import unstable_loops
+
+    for line in unstable_loops(scene):
+        typer.echo(f"lapwing: warning: {line}", err=True)

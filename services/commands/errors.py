@@ -1,5 +1,6 @@
 """What the user can mend ends in one line and exit code 2, a failed run in one line and exit code 1."""
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -23,6 +24,7 @@ def user_errors() -> Iterator[None]:
     except (RunFailed, LockStepError) as error:
         fail(str(error), 1)
     except Interrupted as interrupted:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         fail(str(interrupted), 128 + interrupted.signal)
 
 

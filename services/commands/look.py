@@ -1,20 +1,17 @@
-"""What there is to fly, whether it is valid, what a log shows; and kernels compiled ahead."""
+"""What there is to fly, whether it is valid, what it is tuned to, what a log shows; and kernels compiled ahead."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from services.commands.app import app
-from services.commands.choice import decided
+from services.commands.choice import decided, warn_of_gains
 from services.commands.errors import user_errors
 from services.commands.options import (
     Overrides,
     SceneFile,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @app.command()
@@ -46,6 +43,7 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
         loaded, _ = decided(scene, set_ or [])
         vehicle, exchange = loaded[Vehicle], loaded[Exchange]
         typer.echo(f"{scene}: ok")
+        warn_of_gains(loaded)
         for label, line in {
             "title": loaded[Run].title or loaded.name,
             "vehicle": f"{vehicle.name}, {vehicle.airframe}",
@@ -81,3 +79,35 @@ def report(log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log
 
     with user_errors():
         typer.echo(study.write(log))
+
+
+@app.command()
+def parameters(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a scene, or an MCAP log of a run")],
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write them as QGroundControl does; a scene can name the file")
+    ] = None,
+) -> None:
+    """List the autopilot's parameters: those of a scene, or those that a run ended with."""
+    from services import parameter_file
+    from services.log import LogReader
+    from services.parameters import changed, table
+    from services.refly import flown_scene, given_commands
+    from services.scene import sections
+
+    with user_errors():
+        commands: list = []
+        if file.suffix == ".toml":
+            scene, _ = decided(file, [])
+        else:
+            with LogReader(file) as read:
+                scene = flown_scene(read)
+                commands = [command for _, given in given_commands(read, scene) for command in given]
+        if not scene.has(sections()["autopilot"]):
+            raise ValueError(f"{file}: nobody steers there; expected a scene with [autopilot], or a log of one")
+        known = table(scene)
+        values = changed(known, commands)
+        if save:
+            parameter_file.write(save, known.values(), values)
+        for p in known.values():
+            typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<6} {p.least:g} to {p.most:g}: {p.meaning}")

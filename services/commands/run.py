@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from services.commands.app import app
-from services.commands.choice import decided
+from services.commands.choice import decided, warn_of_gains
 from services.commands.errors import user_errors
 from services.commands.files import check_distinct, check_writable, left_as_it_was, log_path
 from services.commands.links import mavlink_arguments
@@ -69,6 +69,7 @@ def run(
         if plan:
             read_plan(plan)
         loaded, overrides = decided(scene, set_)
+        warn_of_gains(loaded)
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if mavlink else None)
         pace = parse_speed(speed)
         needed = [*lockstep_services(loaded), RECORDER, WATCHER]

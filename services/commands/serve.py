@@ -59,6 +59,9 @@ def service(
             raise ValueError(f"--peers: no endpoint for {name} itself")
         loaded = load(scene, set_ or [])
         flying = lockstep_services(loaded)
+        if name not in flying and hasattr(modules()[name], "create"):
+            typer.echo(f"{name}: {scene} does not call for it")  # compose starts every service there is
+            return
         listen, connect = mesh(name, table)
         with ZenohBus([*listen, *(open_ or [])], connect, getattr(modules()[name], "MODE", "peer")) as bus:
             watched = WATCHER in table and not with_parent
@@ -73,7 +76,8 @@ def service(
                     flying[name].prepare()
                     run_lockstep(process, flying[name], operator(plan))
                 elif name == MAVLINK:
-                    modules()[name].run(process, mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed)))
+                    options = mavlink_options(mavlink, mavlink_key, insecure, parse_speed(speed))
+                    modules()[name].run(process, options, operator(plan)(0))
                 else:
                     modules()[name].run(process, log)
             except Stopped:

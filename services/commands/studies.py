@@ -1,7 +1,7 @@
 """The studies: performance, effects, accuracy, campaign, tune."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +12,7 @@ from services.commands.options import (
     Overrides,
     SceneFile,
 )
-
-if TYPE_CHECKING:
-    pass
+from studies.tune.bandwidths import Bandwidths
 
 
 @app.command()
@@ -119,31 +117,50 @@ def campaign(
 def tune(
     scene: SceneFile,
     set_: Overrides = None,
-    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = 13.0,
-    yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = 22.0,
+    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = Bandwidths().lift,
+    yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = Bandwidths().yaw,
     attitude: Annotated[
         float, typer.Option(metavar="RAD/S", help="bandwidth of the inner roll and pitch loops")
-    ] = 26.0,
-    position: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")] = 4.9,
+    ] = Bandwidths().attitude,
+    position: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")
+    ] = Bandwidths().position,
+    log: Annotated[
+        Path | None, typer.Option("--from", metavar="LOG", help="identify the plant from this flight (MCAP)")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML), for a scene to name")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write Bode plots, steps and tables (HTML)")
+    ] = None,
 ) -> None:
-    """Design gains about hover for given bandwidths, slowed down until 45 degrees and 6 dB hold in every loop."""
+    """Design gains about hover for bandwidth, 45 degrees and 6 dB in every loop, then polish them in flight."""
     from rich.console import Console
+    from rich.progress import Progress
 
     from services.scene import load
-    from studies.tune import study
-    from studies.tune.design import Bandwidths
+    from studies.tune import polish, show, study
+    from studies.tune import report as page
 
     with user_errors():
-        check_distinct({"SCENE": scene, "--out": out})
-        if out and out.suffix != ".toml":
-            raise ValueError(f"--out {out}: expected a name that ends in .toml")
-        check_writable(out)
-        wanted = Bandwidths(lift, yaw, attitude, position)
-        found = study.tune(load(scene, set_ or []), wanted, typer.echo)
-        Console().print(study.table(found))
+        check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
+        for option, path, ending in (("--out", out, ".toml"), ("--report", report, ".html")):
+            if path and path.suffix != ending:
+                raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
+            check_writable(path)
+        wanted, console = Bandwidths(lift, yaw, attitude, position), Console()
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
+
+            def say(text: str) -> None:
+                progress.console.print(text, highlight=False, soft_wrap=True)
+
+            found = study.tune(load(scene, set_ or []), wanted, say, log, lambda: progress.advance(task))
+        show.show(console, found)
         if out:
             study.write(out, found.gains)
             typer.echo(f'{out}: a scene beside it names it with [autopilot] gains = "{out.name}"')
+        if report:
+            page.write(report, found)
+            typer.echo(f"{report}: Bode plots, margins and steps")

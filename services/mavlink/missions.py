@@ -105,6 +105,11 @@ class Missions:
         self._accepted += ((a.source, a.id) for a in answers if a.result == mavlink.MAV_RESULT_ACCEPTED)
         for command in [c for c in self._overheard if (c.source, c.id) in self._accepted]:
             self._overheard.remove(command)
+            self.hold(command)
+
+    def hold(self, command: Any) -> None:
+        """The autopilot has what this command brought, if it is an upload."""
+        if command.kind in _KIND_OF:
             kind = _KIND_OF[command.kind]
             self.held[kind] = express(command.items, kind)
 

@@ -4,7 +4,8 @@ It takes no part in the lock step: nobody waits for it, and when it dies the fli
 subscribes to; all else it reads from the services' journals, which wakes nobody up for a message.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS
 from services.journal import JOURNAL_KEY, entries
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 AT_ONCE = (ESTIMATE, STATUS, ANSWERS)
 
 
-def run(process: Process, options: "Options") -> None:
+def run(process: Process, options: "Options", given: Iterable[Any] = ()) -> None:
     """Serve the links until the flight has ended, or until asked to stop; then say how it went.
+
+    `given` are the commands that the autopilot begins with: it may have taken them before this process is there.
 
     Raises:
         ValueError: a link cannot be opened.
@@ -30,9 +33,13 @@ def run(process: Process, options: "Options") -> None:
     from services.mavlink.vehicle import Vehicle
 
     interval = process.scene[Exchange].interval_ns
-    topics = {process.key(topic): topic for topic in AT_ONCE}
+    # A run as fast as it goes is slowed by every message that wakes somebody; the journals come often enough for it.
+    at_once = AT_ONCE if process.speed else ()
+    topics = {process.key(topic): topic for topic in at_once}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
     with Hub(Vehicle.of(process.scene), options, table(process.scene).values(), lambda payload: put(payload, 0)) as hub:
+        for command in given:
+            hub.adapter.missions.hold(command)
         arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
         process.join()
         flying = True
@@ -40,19 +47,18 @@ def run(process: Process, options: "Options") -> None:
             hub.wait()
             while flying and (news := arrived.get_with_key(timeout=0.0)) is not None:
                 key, time_ns, payload = news
-                topic = topics.get(key)
-                if topic:
-                    flying = bool(payload)
+                flying = bool(payload)
+                if topic := topics.get(key):
                     if flying:
                         hub.take(topic, time_ns, payload)
-                else:
-                    newest = {}
-                    for other, tick, words in entries(payload):
-                        if other is OPERATOR:  # of commands every one counts
-                            hub.take(other, tick * interval, words)
-                        elif other not in AT_ONCE:
-                            newest[other] = tick, words
-                    for other, (tick, words) in newest.items():
+                    continue
+                newest = {}
+                for other, tick, words in entries(payload):
+                    if other is OPERATOR or (other in AT_ONCE and not at_once):  # of these every one counts
                         hub.take(other, tick * interval, words)
+                    elif other not in AT_ONCE:
+                        newest[other] = tick, words
+                for other, (tick, words) in newest.items():
+                    hub.take(other, tick * interval, words)
         for line in hub.report():
             print(line, flush=True)

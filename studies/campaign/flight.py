@@ -8,8 +8,10 @@ from dynamics.cell import Cell
 from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from messages import VehicleState
 from messages.topics import STATUS
+from services.autopilot import control
 from services.autopilot.commander.pilot import POSITION_LOST
 from services.autopilot.config import Autopilot
+from services.plant.models import reduced
 from services.plant.models.multibody import Multibody
 from services.scene import Scene
 from services.sections import Exchange, Run, follows_trajectory, gravity, period
@@ -49,10 +51,23 @@ def _doubtful(record: FlightRecord, rate: int) -> bool:
     return bool(np.diff(sure).max() - 1 > DOUBT * rate)
 
 
-def fly_compiled(scene: Scene) -> tuple[Flown, int]:
-    """Fly the scene to its end in the compiled loop, without a pilot; and the number of a failed motor."""
+def fly_compiled(
+    scene: Scene, plant: reduced.Core | None = None, controller: control.Parameters | None = None
+) -> tuple[Flown, int]:
+    """Fly the scene to its end in the compiled loop, without a pilot.
+
+    Args:
+        scene: what to fly.
+        plant: another plant than the scene's.
+        controller: other parameters of the controller than the scene's.
+
+    Returns:
+        The flight, and the number of a motor that the autopilot took for failed (0: none).
+    """
     services: dict[str, Any] = lockstep_services(scene)
     core = services["autopilot"].core
+    if controller is not None:
+        core = core._replace(parameters=Cell(controller))
     path, final = services["trajectory"].core
     exchange, run = scene[Exchange], scene[Run]
     timing = loop.Timing(
@@ -66,7 +81,7 @@ def fly_compiled(scene: Scene) -> tuple[Flown, int]:
     carried = None if core.navigation.state is None else _carried(services["sensors"], exchange.interval_ns)
     record = blank(timing.last + 1)
     ticks, finite, finished, failed_motor = loop.fly(
-        services["plant"].core, carried, core, path, around, timing, record
+        plant or services["plant"].core, carried, core, path, around, timing, record
     )
     record = FlightRecord(*(column[:ticks] for column in record))
     return Flown(record, finite, finished), failed_motor

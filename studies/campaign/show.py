@@ -29,6 +29,8 @@ def show(console: Console, found: Campaign) -> None:
         console.print(f"Truth within 3 sigma of the estimate: {shares} of the time", highlight=False)
         least = ", ".join(f"{axis} {s.worst:.1%} (seed {s.seed})" for axis, s in found.inside.items())
         console.print(f"Least of a flight: {least}", highlight=False)
+    if len(seeds) > 1 and all(s.low == s.worst for s in found.rmse.values()):
+        console.print("Every seed gives the same flight: nothing in this scene is random", highlight=False)
     console.print(f"Crashes: {len(found.crashes)} of {len(seeds)}", highlight=False)
     for f in found.crashes[:10]:
         console.print(f"  seed {f.seed}: {f.crash}", highlight=False)
@@ -82,10 +84,11 @@ def plot(path: Path, found: Campaign) -> None:
                 panel.axvline(found.published[axis], color=REFERENCE, linewidth=1.1, label=found.source)
                 third = THIRD * found.published[axis]
                 panel.axvline(third, color=REFERENCE, linestyle=(0, (4, 3)), linewidth=1.1, label="a third of it")
-            panel.set_xscale("log")
-            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            if min(f.rmse[axis] for f in found.flights) > 0.0:
+                panel.set_xscale("log")
+                panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                panel.xaxis.set_minor_formatter(NullFormatter())
             panel.xaxis.set_major_formatter("{x:g}")
-            panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_xlabel(f"RMSE of {axis} [{unit}]")
             panel.set_ylim(0.0, 1.0)
             panel.yaxis.set_major_formatter(PercentFormatter(1.0))

@@ -58,7 +58,11 @@ def campaign(scene: Scene, seeds: Iterable[int], progress: Callable[[], None]) -
     first, *others = seeds
     flights = [one(first)]  # alone: it compiles
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        flights += pool.map(one, others)
+        try:
+            flights += pool.map(one, others)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)  # Ctrl-C ends with the flights that are in the air
+            raise
     return summary(scene, flights)
 
 

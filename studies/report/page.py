@@ -3,16 +3,18 @@
 import base64
 import io
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from jinja2 import Template
+from jinja2 import Environment, FileSystemLoader
 from matplotlib.figure import Figure
 
 from studies.flown import AXES, Flown
 from studies.report import plots
 from studies.report.style import DPI, NotRecordedError, styled
 
-_TEMPLATE = Path(__file__).with_name("template.html")
+_TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
+)
 
 
 class Section(NamedTuple):
@@ -44,9 +46,8 @@ def write(log: Path) -> Path:
     flown = Flown(log)
     scene = flown.scene
     published = scene.get("published", {})
-    page = Template(
-        _TEMPLATE.read_text(encoding="utf-8"), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    ).render(
+    page = render(
+        "flight.html",
         log=log.name,
         title=scene.get("run", {}).get("title", ""),
         scene=flown.metadata.get("scene", ""),
@@ -61,6 +62,11 @@ def write(log: Path) -> Path:
     except OSError as fault:
         raise ValueError(f"{target}: cannot write the report: {fault.strerror or fault}") from None
     return target
+
+
+def render(template: str, **values: Any) -> str:
+    """The page of a template of this folder."""
+    return _TEMPLATES.get_template(template).render(**values)
 
 
 def facts(flown: Flown) -> dict[str, str]:
@@ -102,12 +108,12 @@ def _section(module, flown: Flown) -> Section:
     try:
         with styled():
             figure, caption = module.draw(flown)
-            return Section(name, module.TITLE, _png(figure), caption)
+            return Section(name, module.TITLE, png(figure), caption)
     except NotRecordedError as reason:
         return Section(name, module.TITLE, missing=str(reason))
 
 
-def _png(figure: Figure) -> str:
+def png(figure: Figure) -> str:
     """The figure as PNG in base64."""
     file = io.BytesIO()
     # Compression level 3 is faster than the usual 6; the file is a tenth larger.

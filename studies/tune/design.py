@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from services.autopilot.gains import Airframe, GainSet, build
-from services.autopilot.margins import Margins, margins, open_loops, stable
+from services.autopilot.margins import margins, open_loops, stable
+from studies.tune.bandwidths import Bandwidths
 from studies.tune.linearise import Hover
 
 PHASE, GAIN = 45.0, 6.0  # [deg], [dB] the least margins
@@ -15,15 +15,6 @@ CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each 20 % wrong
 DELAY = 1  # [ticks] that of the parallel coupling, the later of the two
 BACK_OFF = 0.95
 ATTEMPTS = 60
-
-
-class Bandwidths(NamedTuple):
-    """What each loop is to reach: its high-frequency gain, which is nearly its crossover [rad/s]."""
-
-    lift: float = 13.0
-    yaw: float = 22.0
-    attitude: float = 26.0
-    position: float = 4.9
 
 
 def believed(airframe: Airframe, model: Hover) -> Airframe:
@@ -35,7 +26,10 @@ def believed(airframe: Airframe, model: Hover) -> Airframe:
     )
     x, y, z = (arm / k for arm, k in zip(arms, (model.roll, model.pitch, model.yaw), strict=True))
     return airframe._replace(
-        mass=4.0 / model.lift, inertia_body=(x, y, z), motor=airframe.motor._replace(time_constant=model.lag)
+        yaw_lead=model.yaw_lead,
+        mass=4.0 / model.lift,
+        inertia_body=(x, y, z),
+        motor=airframe.motor._replace(time_constant=model.lag),
     )
 
 
@@ -81,10 +75,8 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
     return found
 
 
-def design(
-    model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]
-) -> tuple[GainSet, dict[str, Margins]]:
-    """The fastest gain set at or below the bandwidths `wanted` whose margins hold, and its margins.
+def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]) -> Bandwidths:
+    """The fastest bandwidths at or below those `wanted` whose gain set keeps its margins.
 
     Args:
         model: the plant about hover.
@@ -99,14 +91,12 @@ def design(
     plant, now = believed(airframe, model), wanted
     first: dict[str, str] = {}
     for _ in range(ATTEMPTS):
-        gains = gain_set(model, now)
-        loops = open_loops(build(gains, airframe), plant, tick, DELAY)
-        wrong = shortfalls(loops)
+        wrong = shortfalls(open_loops(build(gain_set(model, now), airframe), plant, tick, DELAY))
         if not wrong:
             for loop, was in wanted._asdict().items():
                 if (value := getattr(now, loop)) < was:
                     say(f"{loop}: backed off from {was:.3g} to {value:.3g} rad/s ({first[loop]})")
-            return gains, {name: margins(response) for name, response in loops.items()}
+            return now
         slower = {}
         for name, why in wrong.items():
             loop = _owner(name, wrong)

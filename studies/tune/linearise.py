@@ -26,7 +26,8 @@ class Hover(NamedTuple):
     lift: float  # [m/s^2 / N] acceleration upwards over the force quota of every rotor
     roll: float  # [rad/s^2 / N]
     pitch: float  # [rad/s^2 / N]
-    yaw: float  # [rad/s^2 / N]
+    yaw: float  # [rad/s^2 / N] of steady rotor speeds
+    yaw_lead: float  # [s] that of changing speeds over it: (1 + yaw_lead s) is the rotors' spin-up reaction
     tilt: float  # [m/s^2 / rad] acceleration ahead over the pitch
 
 
@@ -42,10 +43,11 @@ def hover(scene: Scene) -> Hover:
     signs = np.sign(np.array([[y, -x, 0.0] for x, y, _ in frame.rotors.position]))
     signs[:, 2] = frame.rotors.yaw_sign
 
-    def seen(speeds: np.ndarray, voltage: float, attitude=NO_ROTATION):
+    def seen(speeds: np.ndarray, voltage: float | np.ndarray, attitude=NO_ROTATION):
         state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)
         motion = state.motion._replace(rotor_speed=tuple(float(v) for v in speeds))
-        return observe(p, 0, INTERVAL, state._replace(motion=motion), (float(voltage),) * len(signs))
+        volts = tuple(float(v) for v in np.broadcast_to(voltage, len(signs)))
+        return observe(p, 0, INTERVAL, state._replace(motion=motion), volts)
 
     def unbalance(x: np.ndarray) -> tuple[float, float]:
         o = seen(np.full(len(signs), x[0]), x[1])
@@ -68,15 +70,23 @@ def hover(scene: Scene) -> Hover:
     ahead = [
         seen(rotors, voltage, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
     ]
-    roll, pitch, yaw = (slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3))
+    roll, pitch, turn = (slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3))
+    lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
+    # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
+    more, less = (seen(rotors, voltage + sign * STEP * voltage * signs[:, 2]) for sign in (1.0, -1.0))
+    per_acceleration = (more.angular_acceleration_body[2] - less.angular_acceleration_body[2]) / float(
+        signs[0, 2] * (more.rotor_acceleration[0] - less.rotor_acceleration[0])
+    )
+    yaw = turn + per_acceleration / (lag * thrust)  # a speed perturbed at constant voltage falls back by 1 / lag
     return Hover(
         float(speed),
         float(voltage),
-        float(-1.0 / slope(one, lambda o: o.rotor_acceleration[0])),
+        float(lag),
         float(thrust),
         float(slope(one, lambda o: o.acceleration_world[2]) / thrust),
         float(roll),
         float(pitch),
         float(yaw),
+        float(per_acceleration / (thrust * yaw)),
         float((ahead[1] - ahead[0]) / (2.0 * STEP)),
     )

@@ -1,60 +1,103 @@
-"""The whole of `lapwing tune`: linearise, look at the gains that are there, design new ones, show both, write them."""
+"""The whole of `lapwing tune`: a linear model, the gains that are there, a design for margins, a polish in flight."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.table import Table
-
 from services.autopilot.config import Autopilot
-from services.autopilot.gains import GainSet, build
+from services.autopilot.control import Parameters
+from services.autopilot.gains import Airframe, GainSet, build
 from services.autopilot.margins import Margins, margins, open_loops
 from services.autopilot.service import known_airframe
 from services.scene import Scene
-from services.sections import Exchange
-from studies.tune.design import DELAY, Bandwidths, believed, design, shortfalls
+from services.sections import Exchange, Vehicle, follows_trajectory
+from studies.campaign.figures import Figures
+from studies.flown import Flown
+from studies.tune import corners, polish
+from studies.tune.bandwidths import Bandwidths
+from studies.tune.design import DELAY, believed, design, gain_set, shortfalls
+from studies.tune.identify import Identified, identify
 from studies.tune.linearise import Hover, hover
 
 
+class Judged(NamedTuple):
+    """A gain set and what it is worth."""
+
+    name: str
+    parameters: Parameters
+    margins: dict[str, Margins]
+    shortfalls: dict[str, str]
+
+
 class Tuned(NamedTuple):
-    """What has been found: margins of each loop with the scene's own gains and with the new ones."""
+    """What has been found."""
 
-    model: Hover
+    scene: str
+    tick: float  # [s] the controller's period
+    compiled: Hover  # from the model
+    identified: Identified | None  # from a log
+    believed: Airframe  # what the design is for
+    before: Judged
+    after: Judged
     gains: GainSet
-    before: dict[str, Margins]
-    after: dict[str, Margins]
+    polished: polish.Polished | None  # None where nothing is flown along
+    corners: dict[corners.Corner, Figures]
+
+    @property
+    def model(self) -> Hover:
+        """The linear model that was designed for."""
+        return self.identified.model if self.identified else self.compiled
 
 
-def tune(scene: Scene, wanted: Bandwidths, say: Callable[[str], None]) -> Tuned:
-    """Design a gain set for the scene's vehicle about hover.
+def tune(
+    scene: Scene,
+    wanted: Bandwidths,
+    say: Callable[[str], None],
+    log: Path | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Tuned:
+    """Design a gain set for the scene's vehicle about hover, and polish it on the scene's flight.
+
+    Args:
+        scene: whose vehicle, path and wind.
+        wanted: bandwidths to begin with.
+        say: told of everything that is not as it ought to be.
+        log: a flight to identify the plant from, instead of linearising the compiled model.
+        progress: called after every gain set that was flown.
 
     Raises:
-        ValueError: the scene has no autopilot, its vehicle cannot hover, or no gains hold the margins.
+        ValueError: the scene has no autopilot, its vehicle cannot hover, the log does not tell enough, or no gains hold
+            the margins.
     """
     if not scene.has(Autopilot):
         raise ValueError(f"{scene.path}: has no [autopilot] to tune; expected a scene whose vehicle it flies")
     for name, value in wanted._asdict().items():
-        if not 0.0 < value < math.inf:
+        if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
-    airframe, tick = known_airframe(scene), scene[Exchange].interval
-    model = hover(scene)
-    config = scene[Autopilot]
-    loops = open_loops(build(config.gain_set(scene), airframe), believed(airframe, model), tick, DELAY)
-    for name, why in shortfalls(loops).items():
+    airframe, tick, config = known_airframe(scene), scene[Exchange].interval, scene[Autopilot]
+    own = build(config.gain_set(scene), airframe)
+    compiled = hover(scene)
+    identified = identify(Flown(log), own, compiled) if log else None
+    model = identified.model if identified else compiled
+    plant = believed(airframe, model)
+    before = _judged(config.gains, own, plant, tick)
+    for name, why in before.shortfalls.items():
         say(f"warning: gains {config.gains}: {name}: {why}")
-    gains, after = design(model, airframe, tick, wanted, say)
-    return Tuned(model, gains, {name: margins(response) for name, response in loops.items()}, after)
+    reached = design(model, airframe, tick, wanted, say)
+    gains, polished, at_corners = gain_set(model, reached), None, {}
+    if follows_trajectory(scene) and scene[Vehicle].model == "reduced" and not config.operator:
+        polished = polish.polish(scene, model, airframe, tick, reached, progress)
+        gains = polished.gains
+        at_corners = {corner: corners.flown(scene, gains, airframe, corner) for corner in corners.CORNERS}
+    else:
+        say("not polished: there is no [trajectory] that the vehicle flies along by itself")
+    after = _judged("new", build(gains, airframe), plant, tick)
+    return Tuned(scene.name, tick, compiled, identified, plant, before, after, gains, polished, at_corners)
 
 
-def table(found: Tuned) -> Table:
-    """Margins before and after, a loop a row."""
-    rows = Table("loop", title="crossover in rad/s, phase margin in degrees, gain margin up/down in dB")
-    rows.add_column("before", justify="right")
-    rows.add_column("after", justify="right")
-    for name in found.after:
-        rows.add_row(name, _cell(found.before[name]), _cell(found.after[name]))
-    return rows
+def _judged(name: str, parameters: Parameters, plant: Airframe, tick: float) -> Judged:
+    loops = open_loops(parameters, plant, tick, DELAY)
+    return Judged(name, parameters, {loop: margins(response) for loop, response in loops.items()}, shortfalls(loops))
 
 
 def write(path: Path, gains: GainSet) -> None:
@@ -66,8 +109,3 @@ def write(path: Path, gains: GainSet) -> None:
         text = f'"{value}"' if isinstance(value, str) else str(value).lower()
         lines.append(f"{key} = {text}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _cell(m: Margins) -> str:
-    up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
-    return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"

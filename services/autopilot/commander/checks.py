@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from services.autopilot.commander.pilot import Pilot
 
 LEVEL = 0.35  # [rad] from the vertical at the most
+SINGLE = 0.5  # [s] for which a source may be refused: single readings always are now and then
 _UNSURE = {64: "the position is uncertain", 128: "the attitude is uncertain"}
 
 
@@ -17,7 +18,8 @@ def reasons(pilot: "Pilot") -> list[str]:
     """Why the vehicle cannot be armed; empty: it can."""
     if pilot.estimate is None or pilot.health == NOT_STARTED:
         return ["the estimator has not started"]
-    found = [f"no good readings of the {name}" for bit, name in enumerate(SOURCES) if pilot.health >> bit & 1]
+    bad = (name for name, time in zip(SOURCES, pilot.refusing, strict=True) if time > SINGLE)
+    found = [f"no good readings of the {name}" for name in bad]
     found += [text for bit, text in _UNSURE.items() if pilot.health & bit]
     q = pilot.estimate.attitude
     if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(LEVEL):

@@ -16,6 +16,7 @@ from services.autopilot.commander.guide import Guide, Limits
 from services.autopilot.commander.modes import modes
 from services.autopilot.commander.modes.base import FlightMode
 from services.autopilot.commander.route import ACTIVE, COMPLETE, MISSING, PAUSED, WAITING, Route
+from services.autopilot.estimator import SOURCES
 from services.autopilot.estimator.state import GPS
 from services.autopilot.interface import Setpoint
 from services.parameters import Parameter
@@ -63,6 +64,7 @@ class Pilot:
         self.home = (0.0, 0.0)
         self.estimate: Any = None
         self.health: int = 0
+        self.refusing: list[float] = [0.0] * len(SOURCES)  # how long each source has been lost or refused [s]
         self.charge: float = math.nan  # of the battery, fraction; NaN: nobody knows
         self.failed_motor: int = 0  # its number, from 1; 0: none
         self.mode_name: str = PHASES if trajectory else "hold"
@@ -130,6 +132,11 @@ class Pilot:
         """Whether the vehicle follows the scene's own trajectory."""
         return self.mode is None
 
+    @property
+    def looks_closely(self) -> bool:
+        """Whether the setpoint was made from the estimate, which must then be that of the same tick."""
+        return self._direct is not None
+
     def lift_off(self) -> None:
         """Let the guide leave the ground, from where the vehicle is believed to stand."""
         if not self.flying and self.armed:
@@ -143,6 +150,11 @@ class Pilot:
         self.guide = Guide(setpoint.position_world, setpoint.yaw, setpoint.velocity_world)
 
     # What changes its state.
+
+    def look(self, estimate: Any, dt: float) -> None:
+        """Take in an estimate, dt [s] after the one before."""
+        self.estimate, self.health = estimate, estimate.health
+        self.refusing = [t + dt if self.health >> bit & 1 else 0.0 for bit, t in enumerate(self.refusing)]
 
     def say(self, text: str) -> None:
         """Tell the pilot on the ground."""

@@ -1,11 +1,18 @@
 """What the vehicle does by itself when something is lost, in flight."""
 
+import os
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 import pytest
 from flights import REJECTED, UP, at, command, fly, height, mode, place, results, said
+from rich.console import Console
+
+from services.flight import fly_single
+from services.progress import Display
+from services.scene import load
+from studies.flown import Flown
 
 
 def airframe(tmp_path, capacity):
@@ -114,3 +121,17 @@ def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back(t
     assert height(flown, 20.0) == pytest.approx(0.35, abs=0.05)
     assert flown.landed
     assert at(flown, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # what it follows, not the trajectory
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("wind", [(3.0, 1.0), (8.0, 3.0)])
+def test_sound_motors_raise_no_alarm_in_the_delivery_mission(tmp_path, seed, wind):
+    mean, sigma = wind
+    sets = [f"run.seed={seed}", f"effects.wind_random.mean=[{mean}, 1.0, 0.0]", f"effects.wind_random.sigma={sigma}"]
+    log = tmp_path / "mission.mcap"
+    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
+        fly_single(load(Path("scenes/delivery_mission.toml"), sets), log, None, display)
+    flown = Flown(log)
+    assert set(flown.column("status", lambda m: m.failed_motor)) == {0}
+    assert set(flown.column("status", lambda m: m.mode)) == {"mission"}
+    assert flown.landed

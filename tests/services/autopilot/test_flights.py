@@ -1,10 +1,13 @@
 """Flights by command: the modes do what they are called after, and what is lost is noticed."""
 
+import math
+
 import pytest
 from flights import (
     ACCEPTED,
     DENIED,
     REJECTED,
+    SCENE,
     UP,
     at,
     command,
@@ -16,6 +19,9 @@ from flights import (
     results,
     said,
 )
+
+from services.parameters import table
+from services.scene import load
 
 
 def test_takeoff_goto_land_and_disarm_by_itself(tmp_path):
@@ -103,3 +109,79 @@ def test_a_fence_turns_it_back(tmp_path):
     flown = fly(tmp_path, 12, script, "autopilot.parameters.FS_FENCE_ACT=1")
     assert "the vehicle has left the fence: hold" in said(flown)
     assert 5.0 < place(flown, 12.0)[0] < 9.0
+
+
+def test_what_stands_disarmed_cannot_return_or_land_and_says_so(tmp_path):
+    flown = fly(tmp_path, 1.0, {0.04: [command("return", id=1), command("land", id=2)]})
+    assert results(flown) == {1: REJECTED, 2: REJECTED}
+    assert said(flown) == ["return: the vehicle does not fly", "land: the vehicle does not fly"]
+    assert mode(flown, 1.0) == "hold"
+
+
+def test_the_setpoint_is_what_is_followed_also_after_the_trajectory_was_left(tmp_path):
+    script = {4.0: [command("goto", 2.0, 0.0, 1.5)]}
+    flown = fly(tmp_path, 10, script, "autopilot.operator=true", operated=False)
+    assert mode(flown, 3.9) == "mission"
+    assert at(flown, "setpoint", 3.9, lambda m: m.phase) == "hover"
+    assert at(flown, "setpoint", 9.9, lambda m: tuple(m.position)) == pytest.approx((2.0, 0.0, 1.5), abs=0.01)
+    assert place(flown, 9.9) == pytest.approx((2.0, 0.0, 1.5), abs=0.1)
+
+
+def test_polygons_are_kept_out_of_and_in(tmp_path):
+    def polygon(action, *corners):
+        return [item(action, x, y, 0.0, values=(len(corners),)) for x, y in corners]
+
+    yard = polygon("fence_inclusion", (-5, -5), (15, -5), (15, 5), (-5, 5))
+    tower = polygon("fence_exclusion", (6, -2), (10, -2), (10, 2), (6, 2))
+    stick = command("manual", 0.4, 0.0, 0.0, 0.0)
+    script = UP | {
+        5: [command("fence_upload", items=yard + tower, id=1), command("goto", 8.0, 0.0, 3.0, id=2)],
+        5.1: [command("goto", 30.0, 0.0, 3.0, id=3), command("goto", 12.0, 4.0, 3.0, id=4), command("hold")],
+        5.2: [command("fence_upload", items=yard[:2], id=5), command("position_control")],
+        (5.3, 12): [stick],
+    }
+    flown = fly(tmp_path, 14, script, "autopilot.parameters.FS_FENCE_ACT=1")
+    assert [results(flown)[k] for k in (1, 2, 3, 4, 5)] == [ACCEPTED, REJECTED, REJECTED, ACCEPTED, DENIED]
+    assert "the vehicle has left the fence: hold" in said(flown)
+    assert 6.0 < place(flown, 14.0)[0] < 8.0  # it stopped behind the edge of the tower
+
+
+def test_it_returns_to_the_nearest_rally_point(tmp_path):
+    points = [item("rally", 8.0, 3.0, 3.0), item("rally", -20.0, 0.0, 3.0)]
+    script = UP | {5: [command("rally_upload", items=points), command("goto", 6.0, 0.0, 3.0)], 10: [command("return")]}
+    flown = fly(tmp_path, 30, script, "autopilot.parameters.RTL_RETURN_ALT=4.0")
+    assert place(flown, 30.0) == pytest.approx((8.0, 3.0, 0.35), abs=0.1)
+    assert not at(flown, "status", 30.0, lambda m: m.armed)
+
+
+def test_offboard_attitude_tilts_by_the_angle_along_the_heading(tmp_path):
+    angle, yaw = 0.1, 0.5
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    q = (c * math.cos(0.5 * yaw), -s * math.sin(0.5 * yaw), s * math.cos(0.5 * yaw), c * math.sin(0.5 * yaw))
+    tilted = command("offboard_attitude", *q, *[float("nan")] * 4)  # nose down: forward along the heading
+    script = UP | {5.9: [tilted], (6, 9): [tilted], 6.1: [command("offboard", id=1)]}
+    flown = fly(tmp_path, 9, script)
+    assert results(flown)[1] == ACCEPTED
+    _, _, z, w = at(flown, "truth", 8.5, lambda m: tuple(m.pose.orientation))
+    assert 2.0 * math.acos(math.hypot(w, z)) == pytest.approx(angle, abs=0.02)
+    east, north, up = (at(flown, "truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
+    assert math.atan2(north, east) == pytest.approx(yaw, abs=0.1)
+    assert math.hypot(east, north) == pytest.approx(9.80665 * math.tan(angle) * 2.3, rel=0.1)
+    assert up == pytest.approx(-9.80665 * (1.0 - math.cos(angle)) * 2.4, abs=0.1)  # the thrust of hovering, tilted
+
+
+def test_gains_change_in_flight_and_act(tmp_path):
+    lift = table(load(SCENE))["MPC_Z_P"].default
+    weak = [
+        command("parameter", 0.3 * lift, text="MPC_Z_P", id=1),
+        command("parameter", 99 * lift, text="MPC_Z_P", id=2),
+    ]
+    script = UP | {5: weak, 8: [command("goto", 0.0, 0.0, 6.0)]}
+    changed, same = (fly(tmp_path, 11, each) for each in (script, UP | {8: script[8]}))
+    assert [results(changed)[k] for k in (1, 2)] == [ACCEPTED, DENIED]
+    lag = []
+    for flown in (changed, same):
+        asked, flew = (flown.column(topic, value) for topic, value in (
+            ("setpoint", lambda m: m.position.z), ("truth", lambda m: m.pose.position.z)))  # fmt: skip
+        lag.append(max(abs(asked - flew)[2000:]))
+    assert lag[0] > 1.2 * lag[1]

@@ -4,18 +4,24 @@ import math
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
+from rich.console import Console
 from stand_in import StandIn, free_port, until
 
+from services.flight import fly_single
 from services.launcher import loopback_endpoints
 from services.log import LogReader, LogWriter
 from services.mavlink.dialect import mavlink
 from services.mavlink.links import check
+from services.progress import Display
+from services.scene import load
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -134,3 +140,48 @@ def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
         process.terminate()
         process.communicate(timeout=30)
     station.close()
+
+
+def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
+    port, sent = free_port(), 0
+    frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
+    more = ["--mavlink", f"udpin:127.0.0.1:{port}", "--speed", "2"]
+    with run(tmp_path, "test-mavlink-flood", *more) as process, socket.socket(type=socket.SOCK_DGRAM) as attacker:
+        attacker.connect(("127.0.0.1", port))
+        adapter_of(process)
+        while process.poll() is None:
+            for _ in range(200):  # about 100 000 a second
+                try:
+                    attacker.send(frame)
+                    sent += 1
+                except OSError:  # nobody listens yet, or any more
+                    break
+            time.sleep(0.001)
+        said, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, said
+    assert sent > 100_000
+    assert re.search(r"\d+ faster than a link takes", said), said
+    quiet = tmp_path / "quiet.mcap"
+    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
+        fly_single(load(HOVER, ["autopilot.operator=true"]), quiet, None, display)
+    with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:
+        assert flooded.digest() == read.digest()
+
+
+def test_the_mission_of_a_plan_can_be_downloaded(tmp_path):
+    port = free_port()
+    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "scenes/plans/delivery.plan", "--speed", "2"]
+    with run(tmp_path, "test-mavlink-plan", *more) as process:
+        heard(station, "HEARTBEAT")
+        station.mav.mission_request_list_send(1, 1, 0)
+        found = []
+        for number in range(heard(station, "MISSION_COUNT").count):
+            station.mav.mission_request_int_send(1, 1, number, 0)
+            found.append(heard(station, "MISSION_ITEM_INT"))
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    station.close()
+    assert [m.command for m in found] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
+    assert found[5].param1 == 5.0
+    assert found[4].z == pytest.approx(10.35, abs=0.02)

@@ -1,36 +1,106 @@
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from typer.testing import CliRunner
 
 from services.autopilot.gains import load
+from services.autopilot.unstable import unstable_loops
+from services.cli import app
 from services.scene import load as load_scene
 from studies.flight import fly
-from studies.tune.design import Bandwidths
+from studies.tune import report, show
+from studies.tune.bandwidths import Bandwidths
+from studies.tune.polish import rmse
 from studies.tune.study import tune, write
 
 SCENES = Path(__file__).parents[3] / "scenes"
+HOVER = SCENES / "hover.toml"
 
 
-def test_what_is_written_can_be_read_and_flown(tmp_path):
+@pytest.fixture(scope="module")
+def found():
+    return tune(load_scene(HOVER), Bandwidths(), lambda _: None)
+
+
+def test_what_is_written_can_be_read_and_flown(found, tmp_path):
     path = tmp_path / "new.toml"
-    scene = load_scene(SCENES / "hover.toml")
-    found = tune(scene, Bandwidths(), lambda _: None)
     write(path, found.gains)
     assert load(str(path)) == found.gains
-    flown = fly(load_scene(SCENES / "hover.toml", [f"autopilot.gains={path}"]))
+    flown = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
     assert flown.failure == ""
     stand = flown.position_world[0, 2]
     assert flown.position_world[:, 2].max() - stand == pytest.approx(1.0, abs=0.05)
 
 
+def test_polishing_keeps_the_margins_and_lessens_the_error(found):
+    assert found.after.shortfalls == {}
+    assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
+    moved, asked = found.polished.bandwidths, Bandwidths()
+    assert moved.lift != asked.lift
+    assert moved.position == asked.position  # nothing of this flight goes along x or y
+
+
+def test_the_same_scene_gives_the_same_gains(found):
+    assert tune(load_scene(HOVER), Bandwidths(), lambda _: None).gains == found.gains
+
+
+def test_every_corner_lands(found):
+    assert len(found.corners) == 8
+    assert not [f.crash for f in found.corners.values() if f.crash]
+    assert max(f.worst for f in found.corners.values()) < 0.3
+    assert len({f.worst for f in found.corners.values()}) == 8  # the corners are different vehicles
+
+
+def test_page_and_tables(found, tmp_path):
+    path = tmp_path / "tune.html"
+    report.write(path, found)
+    page = path.read_text()
+    assert page.count("data:image/png") == 2
+    assert "Open loops" in page
+    assert "mass +20 %, inertia -20 %, thrust -20 %" in page
+    console = Console(record=True, width=120)
+    show.show(console, found)
+    assert "x_motors" in console.export_text()
+
+
 def test_weak_gains_of_the_scene_are_warned_about_with_the_margin():
     said = []
-    tune(load_scene(SCENES / "hover.toml", ["autopilot.gains=paper"]), Bandwidths(), said.append)
+    tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), said.append)
     assert any(line.startswith("warning: gains paper: roll: phase margin 2") for line in said)
 
 
-def test_bad_input_is_one_line():
+def gains_with(tmp_path, **changes):
+    path = tmp_path / "changed.toml"
+    write(path, load("tuned").model_copy(update=changes))
+    return path
+
+
+def test_unstable_gains_are_warned_about_before_a_flight(tmp_path):
+    path = gains_with(tmp_path, lift=(160.0, 120.0, 3200.0))
+    assert unstable_loops(load_scene(HOVER)) == []
+    result = CliRunner().invoke(app, ["check", str(HOVER), "--set", f"autopilot.gains={path}"])
+    assert result.exit_code == 0
+    warned = [line for line in result.output.splitlines() if "warning" in line]
+    assert len(warned) == 1
+    assert "lift: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
+
+
+def test_no_scene_that_is_shipped_is_unstable():
+    for path in sorted(SCENES.glob("*.toml")):
+        assert unstable_loops(load_scene(path)) == [], path
+
+
+def test_bad_input_is_one_line(tmp_path):
     with pytest.raises(ValueError, match=r"^--lift -1: expected a bandwidth above 0 rad/s$"):
-        tune(load_scene(SCENES / "hover.toml"), Bandwidths(lift=-1.0), lambda _: None)
+        tune(load_scene(HOVER), Bandwidths(lift=-1.0), lambda _: None)
     with pytest.raises(ValueError, match=r"has no \[autopilot\] to tune"):
         tune(load_scene(SCENES / "gyrostat_attitude.toml"), Bandwidths(), lambda _: None)
+    for arguments, message in (
+        (["--from", str(tmp_path / "no.mcap")], "no.mcap"),
+        (["--report", "page.txt"], "--report page.txt: expected a name that ends in .html"),
+        (["--out", "gains.txt"], "--out gains.txt: expected a name that ends in .toml"),
+    ):
+        result = CliRunner().invoke(app, ["tune", str(HOVER), *arguments])
+        assert result.exit_code == 2
+        assert message in result.output.replace("\n", "")

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, Any
 
-from dynamics.vector import ZERO, norm, subtract
+from dynamics.vector import ZERO, Vec3, norm, subtract
 from services.autopilot.commander.guide import turn
 from services.autopilot.commander.modes import land, return_, takeoff
 from services.autopilot.commander.modes.base import FlightMode, value
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 NAME = "mission"
 TURNED = 0.05  # [rad]
+ARRIVED = 0.05  # [m]
 
 
 class Mode(FlightMode):
@@ -31,6 +32,7 @@ class Mode(FlightMode):
         self._since = 0.0  # [s] that the item's place has been reached
         self._inner: Any = None  # another mode that flies the item
         self._start = ZERO
+        self._last: Vec3 | None = None  # place of the last waypoint [m]
         self.count = len(route.items)
 
     @property
@@ -46,7 +48,7 @@ class Mode(FlightMode):
         item = route.item
         if item is None:
             self._number = None
-            self.next = "hold"
+            self._stay(pilot, dt)
             return
         if not pilot.flying and item.action not in ("takeoff", "land", "return"):
             self._rise(pilot, item)
@@ -55,6 +57,14 @@ class Mode(FlightMode):
         if self._fly(pilot, item, dt):
             self._number = None if route.current == len(route.items) - 1 else self._number
             route.advance()
+
+    def _stay(self, pilot: "Pilot", dt: float) -> None:
+        """The mission is over: hold where its last waypoint is, whose radius may have been wide."""
+        if self._last is None or not pilot.flying or norm(subtract(self._last, pilot.guide.position)) < ARRIVED:
+            self.next = "hold"
+        else:
+            pilot.guide.to(self._last, pilot.limits, dt)
+            pilot.guide.turn_at(0.0, pilot.limits, dt)
 
     def _begin(self, pilot: "Pilot", item: Any) -> None:
         self._number, self._since, self._inner = pilot.route.current, 0.0, None
@@ -85,6 +95,8 @@ class Mode(FlightMode):
         if item.action == "takeoff":
             return True
         target = self._target(pilot, item)
+        if item.action in ("waypoint", "loiter_time"):
+            self._last = target
         guide, limits = pilot.guide, pilot.limits
         guide.to(target, limits, dt)
         guide.turn_to(item.yaw, limits, dt)

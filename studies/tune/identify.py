@@ -1,0 +1,121 @@
+"""The plant about hover from a recorded flight: gains and lag that explain what was flown (theory.md, section 4.8).
+
+The input is what the controller asked of the rotors, not the setpoint: so it does not matter which controller flew, nor
+whether the excitation was a chirp, steps or a square wave. Both sides go through the same low-pass filter, which turns
+the rates of the gyroscopes into angular accelerations without differentiating noise.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import bilinear, lfilter
+
+from services.autopilot.control import Parameters
+from studies.flown import Flown
+from studies.tune.linearise import Hover
+
+CUT = 60.0  # [rad/s] of the filter, above the loops' bandwidths
+CLEAR = 0.5  # [m] over the start below which the ground may have a say
+LAGS = (2e-3, 0.5)  # [s] between which the rotors' lag is sought
+QUIET = 2e-3  # share of the hovering thrust below which a quota counts as not moved
+LEAST_FIT = 50.0  # [%]
+LOOPS = ("lift", "roll", "pitch", "yaw")
+
+
+class Identified(NamedTuple):
+    """What a flight tells of the plant."""
+
+    model: Hover
+    fit: dict[str, float]  # [%] of each loop: 100 (1 - |y - model| / |y - mean|), filtered
+
+
+class _Signals(NamedTuple):
+    quota: np.ndarray  # (n, 4) [N] asked of every rotor, as LOOPS
+    response: np.ndarray  # (n, 4) filtered acceleration along z [m/s^2] and angular accelerations [rad/s^2]
+    used: np.ndarray  # (n,) bool: in the air
+
+
+def identify(flown: Flown, p: Parameters, guess: Hover) -> Identified:
+    """Fit acceleration = gain * lag(quota) + constant to a log.
+
+    Args:
+        flown: the log; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
+        p: a controller of the vehicle, for the signs and the hovering thrust.
+        guess: the linear model, for what the log cannot tell.
+
+    Raises:
+        ValueError: the log has no such topics, too little of it is in the air, or a loop was not moved or does not fit.
+    """
+    lacking = [name for name in ("actuators", "setpoint") if not flown.has(name)]
+    if lacking:
+        raise ValueError(f"{flown.path}: no topic {', '.join(lacking)}; expected the log of a flight")
+    tick = float(np.median(np.diff(flown.times("actuators"))))
+    signals = _signals(flown, p, tick)
+    if signals.used.sum() * tick < 2.0:
+        raise ValueError(f"{flown.path}: {signals.used.sum() * tick:.1f} s above {CLEAR:g} m; expected 2 s or more")
+    hovering = float(signals.quota[signals.used, 0].mean())
+    for k, name in enumerate(LOOPS):
+        moved = float(signals.quota[signals.used, k].std())
+        if moved < QUIET * hovering:
+            raise ValueError(
+                f"{flown.path}: {name} was not moved ({moved:.2g} N); fly scenes/excitation.toml and give its log"
+            )
+    found = minimize_scalar(
+        lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
+        bounds=np.log(LAGS),
+        method="bounded",
+    )
+    lag = float(np.exp(found.x))
+    gains, fit = {}, {}
+    for k, name in enumerate(LOOPS):
+        (gains[name], *lead), left = _fitted(signals, k, lag, tick)
+        if lead:
+            gains["yaw_lead"] = lead[0] / gains[name]
+        fit[name] = float(100.0 * (1.0 - np.sqrt(left)))
+        if fit[name] < LEAST_FIT:
+            raise ValueError(
+                f"{flown.path}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
+                "fly scenes/excitation.toml in less wind and give its log"
+            )
+    return Identified(guess._replace(lag=lag, **gains), fit)
+
+
+def _signals(flown: Flown, p: Parameters, tick: float) -> _Signals:
+    """Quotas and filtered responses tick by tick."""
+    thrust = flown.column("actuators", lambda m: m.thrust)
+    sensed = flown.has("imu") and len(flown.times("imu")) >= len(thrust)
+    if sensed:
+        rates = flown.column("imu", lambda m: m.angular_velocity)
+        lift = flown.column("imu", lambda m: m.linear_acceleration.z)
+    else:
+        rates = flown.column("truth", lambda m: m.angular_velocity)
+        lift = flown.column("truth", lambda m: m.acceleration.z)
+    height = flown.column("setpoint", lambda m: m.position.z)
+    armed = flown.column("actuators", lambda m: m.armed)
+    n = min(len(thrust), len(rates), len(height))
+    delay = 1 if flown.metadata.get("coupling", "sequential") == "sequential" else 2
+    signs = np.column_stack([np.ones(4), np.array(p.signs)])
+    quota = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ signs / 4.0])
+    smooth, differ = _filters(tick)
+    response = np.column_stack([lfilter(*smooth, lift[:n]), lfilter(*differ, rates[:n], axis=0)])
+    flying = armed[:n] & (height[:n] > height[0] + CLEAR)
+    settled = np.convolve(~flying, np.ones(round(10.0 / CUT / tick)))[:n] == 0  # the filters have forgotten the ground
+    return _Signals(quota, response, settled)
+
+
+def _filters(tick: float) -> tuple[tuple, tuple]:
+    """Digital 1 / (s/CUT + 1)^2 and s / (s/CUT + 1)^2."""
+    below = [1.0 / CUT**2, 2.0 / CUT, 1.0]
+    return bilinear([1.0], below, 1.0 / tick), bilinear([1.0, 0.0], below, 1.0 / tick)
+
+
+def _fitted(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
+    """Gains of a loop's thrust, for yaw also of its rate, for a lag [s]; and the share of variance that is left."""
+    keep, used = np.exp(-tick / lag), signals.used
+    thrust = lfilter([1.0 - keep], [1.0, -keep], signals.quota[:, k])
+    regressors = [lfilter(*way, thrust)[used] for way in _filters(tick)[: 2 if LOOPS[k] == "yaw" else 1]]
+    response = signals.response[used, k]
+    found, *_ = np.linalg.lstsq(np.column_stack([*regressors, np.ones(used.sum())]), response)
+    left = response - np.column_stack(regressors) @ found[:-1] - found[-1]
+    return [float(g) for g in found[:-1]], float(left.var() / response.var())

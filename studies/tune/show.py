@@ -1,0 +1,102 @@
+"""What `lapwing tune` has found, as tables."""
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Console
+from rich.table import Table
+
+from services.autopilot.margins import Margins
+from studies.tracking import AXES
+from studies.tune.identify import LOOPS
+from studies.tune.polish import rmse
+from studies.tune.study import Tuned
+
+UNITS = {
+    "lift": "m/s^2 / N",
+    "roll": "rad/s^2 / N",
+    "pitch": "rad/s^2 / N",
+    "yaw": "rad/s^2 / N",
+    "yaw_lead": "s",
+    "lag": "s",
+}
+
+
+class Rows:
+    """A table before it is drawn: title, heads and rows of text; the first column names the row."""
+
+    def __init__(self, title: str, *heads: str):
+        self.title, self.heads = title, heads
+        self.rows: list[tuple[str, ...]] = []
+
+    def add(self, *cells: str) -> None:
+        """One more row."""
+        self.rows.append(cells)
+
+
+def tables(found: Tuned) -> Iterator[Rows]:
+    """Every table of the study, the answer first."""
+    yield _margins(found)
+    if found.polished:
+        yield _errors(found)
+        yield _corners(found)
+    yield _model(found)
+
+
+def show(console: Console, found: Tuned) -> None:
+    """Print the tables for people."""
+    for rows in tables(found):
+        table = Table(title=rows.title, title_justify="left")
+        for k, head in enumerate(rows.heads):
+            table.add_column(head, justify="right" if k else "left", no_wrap=True)
+        for row in rows.rows:
+            table.add_row(*row)
+        console.print(table)
+
+
+def cell(m: Margins) -> str:
+    """Margins in few words."""
+    up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
+    return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
+
+
+def _margins(found: Tuned) -> Rows:
+    rows = Rows(
+        "Crossover in rad/s, phase margin in degrees, gain margin up/down in dB", "loop", found.before.name, "new"
+    )
+    for name in found.after.margins:
+        rows.add(name, cell(found.before.margins[name]), cell(found.after.margins[name]))
+    return rows
+
+
+def _errors(found: Tuned) -> Rows:
+    p = found.polished
+    assert p is not None
+    title = f"RMSE of {len(p.after)} flights of the scene: as designed, and polished ({p.candidates} gain sets flown)"
+    rows = Rows(title, "axis", "designed", "polished")
+    for axis, unit in AXES.items():
+        rows.add(f"{axis} [{unit}]", f"{rmse(p.before, axis):.4f}", f"{rmse(p.after, axis):.4f}")
+    return rows
+
+
+def _corners(found: Tuned) -> Rows:
+    rows = Rows("The flight with a vehicle that is not as the controller believes", "vehicle", "furthest off, m", "end")
+    for corner, f in found.corners.items():
+        rows.add(str(corner), f"{f.worst:.3f}", f.crash or "landed")
+    return rows
+
+
+def _model(found: Tuned) -> Rows:
+    if found.identified is None:
+        rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit")
+        for name, unit in UNITS.items():
+            rows.add(name, f"{getattr(found.compiled, name):.4g}", unit)
+        return rows
+    rows = Rows(
+        "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %"
+    )
+    for name, unit in UNITS.items():
+        a, b = getattr(found.identified.model, name), getattr(found.compiled, name)
+        fit = f"{found.identified.fit[name]:.1f}" if name in LOOPS else ""
+        rows.add(name, f"{a:.4g}", f"{b:.4g}", unit, fit)
+    return rows

@@ -1,0 +1,233 @@
+"""MAVSDK, a client that we did not write, flies the whole vehicle: plant, sensors, estimator, autopilot, link.
+
+The run is faster than real time; whatever the client waits for is bounded by END.
+"""
+
+import asyncio
+import math
+import signal
+import socket
+import subprocess
+import sys
+from itertools import pairwise
+
+import pytest
+from stand_in import free_port
+
+mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
+from mavsdk.action import ActionError  # noqa: E402
+from mavsdk.mission import MissionItem, MissionPlan  # noqa: E402
+from mavsdk.offboard import (  # noqa: E402
+    Attitude,
+    OffboardError,
+    PositionNedYaw,
+    VelocityNedYaw,
+)
+from mavsdk.param import ParamError  # noqa: E402
+from rich.console import Console  # noqa: E402
+
+from services.log import LogReader  # noqa: E402
+from services.refly import refly  # noqa: E402
+
+SCENE = "scenes/groundstation.toml"
+END = 150.0  # [s] of wall time a session is held to have failed after
+SPEED = 3.0  # simulated seconds per second
+
+
+async def first(stream, true, seconds=60.0):
+    """The first value of a stream of which something is so."""
+
+    async def look():
+        async for value in stream:
+            if true(value):
+                return value
+
+    return await asyncio.wait_for(look(), seconds)
+
+
+def session(tmp_path, space, story, *sets):
+    """Tell a story to the drone of a live run; its log."""
+    port, log = free_port(), tmp_path / f"{space}.mcap"
+    command = [sys.executable, "-m", "services.cli", "run", SCENE, "--space", space, "--log", str(log)]
+    command += ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", f"{SPEED:g}"]
+    command += [part for each in ("run.duration=900", *sets) for part in ("--set", each)]
+
+    async def tell():
+        drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
+        await drone.connect(system_address=f"udpin://127.0.0.1:{port}")
+        try:
+            await first(drone.core.connection_state(), lambda state: state.is_connected, 120.0)
+            await first(drone.telemetry.health_all_ok(), bool)
+            await story(drone)
+        finally:
+            drone._stop_mavsdk_server()
+
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        try:
+            asyncio.run(asyncio.wait_for(tell(), END))
+        except BaseException:
+            process.send_signal(signal.SIGTERM)
+            print(process.communicate(timeout=60)[0])
+            raise
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    return log
+
+
+def near(position, place):
+    """Whether the vehicle is where it was sent: (latitude, longitude, height)."""
+    north, east = (position.latitude_deg - place[0]) * 111_049, (position.longitude_deg - place[1]) * 84_418
+    return math.hypot(north, east) < 0.5 and abs(position.relative_altitude_m - place[2]) < 0.5
+
+
+def test_arm_take_off_go_to_return_disarm_and_the_log_is_flown_again(tmp_path):
+    async def story(drone):
+        health = await first(drone.telemetry.health(), lambda h: h.is_armable)
+        assert health.is_global_position_ok
+        assert health.is_home_position_ok
+        with pytest.raises(ActionError):  # not armed
+            await drone.action.return_to_launch()
+        battery = await first(drone.telemetry.battery(), lambda b: b.voltage_v > 0.0)
+        assert battery.remaining_percent == pytest.approx(100.0, abs=1.0)
+        await drone.action.set_takeoff_altitude(4.0)
+        assert await drone.action.get_takeoff_altitude() == 4.0
+        await drone.action.arm()
+        await drone.action.takeoff()
+        up = await first(drone.telemetry.position(), lambda p: p.relative_altitude_m > 3.8)
+        assert await first(drone.telemetry.in_air(), bool)
+        there = up.latitude_deg + 10.0 / 111_049, up.longitude_deg, up.relative_altitude_m + 2.0
+        await drone.action.goto_location(*there[:2], up.absolute_altitude_m + 2.0, 90.0)
+        await first(drone.telemetry.position(), lambda p: near(p, there))
+        await first(drone.telemetry.heading(), lambda h: abs(h.heading_deg - 90.0) < 3.0)
+        await drone.action.hold()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await drone.action.return_to_launch()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "RETURN_TO_LAUNCH")
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+        home = await first(drone.telemetry.home(), lambda _: True)
+        assert near(
+            await first(drone.telemetry.position(), lambda _: True), (home.latitude_deg, home.longitude_deg, 0.35)
+        )
+        await drone.action.arm()
+        await drone.action.takeoff()
+        await first(drone.telemetry.in_air(), bool)
+        await drone.action.land()
+        await first(drone.telemetry.landed_state(), lambda state: str(state) == "ON_GROUND")
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+    log = session(tmp_path, "test-mavsdk-go", story, "autopilot.parameters.RTL_RETURN_ALT=6.0")
+    with LogReader(log) as read:
+        assert read.complete
+    before, again = refly(log, Console(quiet=True))
+    assert before == again
+
+
+def test_missions_are_uploaded_flown_paused_and_cleared(tmp_path):
+    def item(north, up):
+        return MissionItem(
+            40.7686 + north / 111_049, 14.7907, up, 5.0, True, math.nan, math.nan, MissionItem.CameraAction.NONE,
+            math.nan, math.nan, math.nan, math.nan, math.nan, MissionItem.VehicleAction.NONE,
+        )  # fmt: skip
+
+    async def story(drone):
+        plan = MissionPlan([item(5.0, 5.0), item(20.0, 8.0), item(0.0, 4.0)])
+        await drone.mission.upload_mission(plan)
+        down = await drone.mission.download_mission()
+        assert [(i.latitude_deg, i.relative_altitude_m) for i in down.mission_items] == [
+            (pytest.approx(i.latitude_deg, abs=1e-7), i.relative_altitude_m) for i in plan.mission_items
+        ]
+        await drone.action.arm()
+        await drone.mission.start_mission()
+        await first(drone.mission.mission_progress(), lambda p: p.current >= 1)
+        await drone.mission.pause_mission()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await drone.mission.start_mission()
+        await first(drone.mission.mission_progress(), lambda p: p.current == p.total == 3)
+        assert await drone.mission.is_mission_finished()
+        await first(drone.telemetry.position(), lambda p: near(p, (40.7686, 14.7907, 4.0)))
+        await drone.mission.clear_mission()
+        assert (await drone.mission.download_mission()).mission_items == []
+        await drone.action.land()
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+    session(tmp_path, "test-mavsdk-mission", story)
+
+
+def test_offboard_by_position_velocity_and_attitude(tmp_path):
+    async def story(drone):
+        state = drone.telemetry.position_velocity_ned
+        await drone.action.arm()
+        with pytest.raises(OffboardError):  # no setpoints come
+            await drone.offboard.start()
+        await drone.offboard.set_position_ned(PositionNedYaw(3.0, 2.0, -4.0, 90.0))
+        await asyncio.sleep(0.2)
+        await drone.offboard.start()
+        place = 3.0, 2.0, -4.0
+        await first(
+            state(), lambda o: math.dist((o.position.north_m, o.position.east_m, o.position.down_m), place) < 0.4
+        )
+        await drone.offboard.set_velocity_ned(VelocityNedYaw(0.0, 2.0, -1.0, 90.0))
+        await first(state(), lambda o: o.velocity.east_m_s > 1.7 and o.velocity.down_m_s < -0.8)
+        await drone.offboard.set_attitude(Attitude(0.0, -8.0, 90.0, 0.36))
+        await first(drone.telemetry.attitude_euler(), lambda a: a.pitch_deg < -5.0)
+        await drone.offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, 90.0))
+        await first(state(), lambda o: math.hypot(o.velocity.north_m_s, o.velocity.east_m_s, o.velocity.down_m_s) < 0.3)
+        await drone.offboard.stop()
+        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
+        await drone.action.land()
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+    session(tmp_path, "test-mavsdk-offboard", story)
+
+
+def test_parameters_rates_sticks_and_refusals(tmp_path):
+    async def story(drone):
+        before = await drone.param.get_param_float("MPC_XY_CRUISE")
+        assert before == pytest.approx(5.0)
+        await drone.param.set_param_float("MPC_XY_CRUISE", 3.25)
+        assert await drone.param.get_param_float("MPC_XY_CRUISE") == 3.25
+        await drone.param.set_param_int("NAV_DLL_ACT", 1)
+        assert await drone.param.get_param_int("NAV_DLL_ACT") == 1
+        for wrong in (drone.param.set_param_float("MPC_XY_CRUISE", 1e6), drone.param.get_param_float("NO_SUCH")):
+            with pytest.raises(ParamError):
+                await wrong
+        everything = await drone.param.get_all_params()
+        assert len(everything.float_params) + len(everything.int_params) > 30
+
+        await drone.telemetry.set_rate_attitude_euler(10.0)
+        stamps = []
+        async for attitude in drone.telemetry.attitude_euler():
+            stamps.append(attitude.timestamp_us * 1e-6)
+            if len(stamps) == 30:
+                break
+        gaps = [b - a for a, b in pairwise(stamps[5:])]
+        assert sum(gaps) / len(gaps) == pytest.approx(0.1, rel=0.1)  # simulated seconds
+
+        with pytest.raises(ActionError):  # it stands on the ground
+            await drone.action.land()
+        await drone.action.arm()
+        stick = drone.manual_control.set_manual_control_input
+        await stick(0.0, 0.0, 0.5, 0.0)
+        await drone.manual_control.start_position_control()
+
+        async def push(forward, throttle, true):
+            stream = drone.telemetry.position_velocity_ned()
+            looking = asyncio.ensure_future(first(stream, true, 30.0))
+            while not looking.done():
+                await stick(forward, 0.0, throttle, 0.0)
+                await asyncio.sleep(0.05)
+            return looking.result()
+
+        await push(0.0, 0.9, lambda o: o.position.down_m < -2.0)
+        start = await push(0.0, 0.5, lambda o: abs(o.velocity.down_m_s) < 0.1)
+        # it faces east
+        await push(0.6, 0.5, lambda o: o.position.east_m > start.position.east_m + 4.0)
+        told = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "flies" in s.text))
+        await asyncio.sleep(0.3)
+        with pytest.raises(ActionError):
+            await drone.action.disarm()
+        assert "disarming refused: the vehicle flies" in (await told).text
+        await drone.action.land()
+        await first(drone.telemetry.armed(), lambda armed: not armed)
+
+    session(tmp_path, "test-mavsdk-sticks", story)

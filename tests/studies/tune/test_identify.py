@@ -1,0 +1,81 @@
+"""The plant found again from flights whose plant is known, whatever excited it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from services.autopilot.gains import build, load
+from services.autopilot.service import known_airframe
+from services.flight import fly_single
+from services.outside import nobody
+from services.scene import load as load_scene
+from services.scene import parse
+from studies.flown import Flown
+from studies.tune.identify import identify
+from studies.tune.linearise import hover
+
+SCENES = Path(__file__).parents[3] / "scenes"
+UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, duration = 4.0 }\n'
+CLOSE = {"lift": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "yaw_lead": 0.15, "lag": 0.1}
+
+
+class Silent:
+    """Shows nothing of a run."""
+
+    def begin(self):
+        pass
+
+    def show(self, *_):
+        pass
+
+
+def logged(scene, path):
+    fly_single(scene, path, None, Silent(), nobody)
+    return Flown(path)
+
+
+def found(scene, path):
+    return identify(logged(scene, path), build(load("tuned"), known_airframe(scene)), hover(scene))
+
+
+def excited(kind, overrides=()):
+    """The excitation scene with another path: steps or a square wave (what a relay makes) of every axis."""
+    text = (SCENES / "excitation.toml").read_text()
+    head = text[: text.index("[[trajectory.phase]]")]
+    phases = [UP]
+    for axis, size in (("z", 0.3), ("yaw", 0.3), ("x", 0.3), ("y", 0.3)):
+        base = 3.0 if axis == "z" else 0.0
+        count, pause = (1, 3.0) if kind == "step" else (6, 0.4)
+        for k in range(2 * count):
+            to = base + (size if k % 2 == 0 else 0.0)
+            segment = f'{axis} = {{ kind = "step", to = {to} }}'
+            phases.append(f'[[trajectory.phase]]\nname = "{axis}{k}"\nduration = {pause}\n{segment}\n')
+    return parse(SCENES / "excited.toml", head + "".join(phases), ["run.duration=40.0", *overrides])
+
+
+@pytest.mark.parametrize("kind", ["chirp", "step", "relay"])
+def test_gains_and_lag_are_found_again(kind, tmp_path):
+    scene = load_scene(SCENES / "excitation.toml") if kind == "chirp" else excited(kind)
+    true, it = hover(scene), found(scene, tmp_path / "flight.mcap")
+    for name, within in CLOSE.items():
+        assert getattr(it.model, name) == pytest.approx(getattr(true, name), rel=within), name
+    assert min(it.fit.values()) > 75.0
+
+
+def test_a_vehicle_that_is_heavier_than_believed_shows(tmp_path):
+    airframe = (SCENES / "vehicles" / "delivery_drone.toml").read_text()
+    heavy_file = tmp_path / "heavy.toml"
+    heavy_file.write_text(re.sub(r"^total = .*$", "total = 12.0", airframe, count=1, flags=re.MULTILINE))
+    light = load_scene(SCENES / "excitation.toml")
+    heavy = load_scene(SCENES / "excitation.toml", [f"vehicle.airframe={heavy_file}"])
+    flown = logged(heavy, tmp_path / "flight.mcap")
+    it = identify(flown, build(load("tuned"), known_airframe(light)), hover(light))
+    assert it.model.lift == pytest.approx(hover(heavy).lift, rel=0.03)
+    assert it.model.lift == pytest.approx(4.0 / 12.0, rel=0.03)
+
+
+def test_a_flight_that_moves_nothing_is_refused(tmp_path):
+    scene = load_scene(SCENES / "hover.toml")
+    with pytest.raises(ValueError, match=r"roll was not moved .* fly scenes/excitation.toml"):
+        found(scene, tmp_path / "flight.mcap")

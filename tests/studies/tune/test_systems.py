@@ -1,0 +1,52 @@
+"""python-control against the frequency responses and margins of our own."""
+
+import math
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from services.autopilot.gains import build, load
+from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
+from services.autopilot.service import known_airframe
+from services.scene import load as load_scene
+from studies.tune.systems import closed, step, systems
+
+TICK, DELAY = 0.004, 1
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+@pytest.fixture(scope="module", params=["hover", "delivery_mission"])
+def airframe(request):
+    return known_airframe(load_scene(SCENES / f"{request.param}.toml"))
+
+
+@pytest.mark.parametrize("name", ["tuned", "paper"])
+def test_the_same_responses_margins_and_stability(name, airframe):
+    p = build(load(name), airframe)
+    own = open_loops(p, airframe, TICK, DELAY)
+    for loop, system in systems(p, airframe, TICK, DELAY).items():
+        seen = FREQUENCIES < 200.0
+        response = system(1j * FREQUENCIES[seen])
+        assert np.allclose(response, own[loop][seen], rtol=1e-4), loop
+        up, phase, _, _ = control.margin(system)
+        m = margins(own[loop])
+        assert math.radians(phase) == pytest.approx(m.phase, abs=5e-3), loop
+        assert any(up == pytest.approx(g, rel=5e-3) for g in (m.gain, m.reduction)), loop
+        assert stable(own[loop]) == (closed(system).poles().real.max() < 0.0), loop
+
+
+def test_step_of_a_first_order_loop_is_the_closed_form():
+    w = 4.0
+    found = step(control.tf([w], [1.0, 0.0]), 3.0)
+    assert np.allclose(found.value, 1.0 - np.exp(-w * found.time), atol=1e-6)
+    assert found.rise == pytest.approx(math.log(9.0) / w, rel=0.02)
+    assert found.overshoot == pytest.approx(0.0, abs=1e-4)
+    assert found.settling == pytest.approx(math.log(50.0) / w, rel=0.02)
+
+
+def test_steps_settle_at_the_setpoint(airframe):
+    loops = systems(build(load("tuned"), airframe), airframe, TICK, DELAY)
+    for loop in ("lift", "yaw", "x", "y"):
+        assert step(loops[loop], 6.0).value[-1] == pytest.approx(1.0, abs=0.01)

@@ -1,0 +1,94 @@
+"""docker-compose.yml, without Docker: it is sound, and its commands on this machine make a ground station's vehicle."""
+
+import math
+import re
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+
+yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+
+ROOT = Path(__file__).parent.parent
+SET = {"SCENE": "scenes/groundstation.toml", "SPEED": "2"}
+
+
+def compose():
+    """The services of the file, its variables set."""
+    text = (ROOT / "docker-compose.yml").read_text()
+    text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: SET.get(m[1], m[2]), text)
+    return yaml.safe_load(text)["services"]
+
+
+def free_port(kind=socket.SOCK_STREAM):
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def test_every_service_has_a_known_command_and_needs_only_what_is_there():
+    services = compose()
+    for name, service in services.items():
+        assert set(service.get("depends_on", ())) <= set(services), name
+        if command := service.get("command"):
+            assert command[0] == "lapwing"
+            assert command[1] in ("run", "service", "replay")
+
+
+def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
+    services, ports = compose(), {}
+
+    def here(word):
+        """A container's address as one of this machine."""
+        for pattern, kind in ((r"(?<==)tcp/[a-z]+:7447", 1), (r"tcp/0\.0\.0\.0:7448", 1), (r"0\.0\.0\.0:\d+", None)):
+            for found in re.findall(pattern, word):
+                datagrams = kind is None and word.startswith("udp")
+                port = ports.setdefault(found, free_port(socket.SOCK_DGRAM if datagrams else socket.SOCK_STREAM))
+                prefix = "tcp/" if kind else ""
+                word = word.replace(found, f"{prefix}127.0.0.1:{port}")
+        return word.replace("recordings/", f"{tmp_path}/")
+
+    names = [*services["groundstation"]["depends_on"], "groundstation"]
+    running = []
+    try:
+        for name in names:
+            command = [sys.executable, "-m", "services.cli", *map(here, services[name]["command"][1:])]
+            with (tmp_path / f"{name}.txt").open("w") as said:
+                running.append(subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT))
+        port = ports["0.0.0.0:5760"]
+        station = None
+        for _ in range(120):
+            try:
+                station = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
+                break
+            except OSError:
+                time.sleep(0.5)
+        assert station, (tmp_path / "groundstation.txt").read_text()
+
+        def order(number, *params):
+            station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
+            while (ack := station.recv_match(type="COMMAND_ACK", blocking=True, timeout=60)).command != number:
+                pass
+            return ack.result
+
+        assert station.recv_match(type="HEARTBEAT", blocking=True, timeout=120)
+        ready = mavutil.mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        while (
+            not station.recv_match(type="SYS_STATUS", blocking=True, timeout=60).onboard_control_sensors_health & ready
+        ):
+            pass
+        assert order(400, 1.0, 0.0) == 0
+        assert order(22) == 0
+        while station.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=60).relative_alt < 1500:
+            pass
+        station.close()
+        assert "does not call for it" in (tmp_path / "trajectory.txt").read_text()
+    finally:
+        for process in running:
+            process.terminate()
+        for process in running:
+            process.wait(timeout=30)
