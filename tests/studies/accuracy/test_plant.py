@@ -1,0 +1,27 @@
+"""Scenes with a multirotor of five bodies as problems: the steps that they accept, and the order of the method."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from services.plant.models.multibody import longest_step
+from services.scene import load
+from studies.accuracy import plant, scenes
+from studies.accuracy.coordinates import error
+
+HOVER = Path(__file__).parents[3] / "scenes/hover.toml"
+
+
+def test_five_bodies_are_integrated_in_steps_that_their_scene_accepts(monkeypatch):
+    monkeypatch.setattr(plant, "applicable", lambda x: ["rk4_renormalised"])
+    scene = load(HOVER, ["vehicle.model=multibody", "solver.accuracy=1e-4"])
+    problem = scenes.problem(scene)
+    (way,) = problem.ways
+    assert way.settings == pytest.approx([1e-3, 5e-4, 2.5e-4, 1.25e-4])
+    assert way.settings[0] <= longest_step(scene) < 2.0 * way.settings[0]
+    exact = problem.reference()
+    errors = [error(way.read(h, way.prepare(h)()).samples[-1], exact) for h in way.settings]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.7), errors
+    for h in way.settings:
+        load(HOVER, ["vehicle.model=multibody", f"solver.step={h!r}"])
