@@ -34,6 +34,7 @@ from services.sections import (
 )
 
 LOOK = 5  # ticks between two looks of the pilot at the estimate
+BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
 
 
 def create(scene: Scene) -> "Autopilot | None":
@@ -93,6 +94,7 @@ class Autopilot:
         self._parameters = Cell(built)
         self._watch = Cell(motor_watch.build(self._airframe))
         self._stand()
+        self._still_from = 0  # tick from which a vehicle that stands does not move
         self._weight = self._airframe.mass * self._airframe.gravity
         share = self._weight / (4.0 * built.thrust_max)
         self._pilot = Pilot(
@@ -143,7 +145,7 @@ class Autopilot:
         battery = next(arrived)
         if battery is not None:
             self._pilot.charge = battery.percentage
-        self._navigation.update(tick, self._stage == STANDING, *arrived)
+        self._navigation.update(tick, self._stage == STANDING and tick >= self._still_from, *arrived)
         wanted = self._ask(tick, setpoint, commands)
         command, self._stage, self._pilot.failed_motor = self._steer(self._state, self._watched, wanted)
         self._thrust = sum(command.thrust)
@@ -164,6 +166,7 @@ class Autopilot:
         wanted = pilot.step(self._interval, setpoint, carried, self._stage == LANDED)
         if not pilot.on_trajectory and not pilot.flying and self._stage != STANDING:
             self._stand()
+            self._still_from = tick + round(BOUNCE / self._interval)
         return wanted
 
     def _tell(self, tick: int, setpoint: Any, wanted: Any, command: Any) -> Iterator[tuple[Topic, Any]]:

@@ -185,3 +185,19 @@ def test_gains_change_in_flight_and_act(tmp_path):
             ("setpoint", lambda m: m.position.z), ("truth", lambda m: m.pose.position.z)))  # fmt: skip
         lag.append(max(abs(asked - flew)[2000:]))
     assert lag[0] > 1.2 * lag[1]
+
+
+def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again(tmp_path):
+    sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
+    sets = ["autopilot.estimator=sensors", *[f"sensors.{each}" for each in sensors]]
+    for seed in (1, 2, 3):
+        again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}
+        script = {1: UP[0.04], 7: [command("land")]} | again
+        flown = fly(tmp_path, 20, script, *sets, f"run.seed={seed}")
+        assert said(flown)[:3] == ["armed", "landed", "disarmed: landed"]
+        assert results(flown)[6] == ACCEPTED
+        for t in (13.0, 15.9):
+            z = [at(flown, topic, t, lambda m: m.pose.orientation.z) for topic in ("estimate", "truth")]
+            assert 2.0 * abs(z[0] - z[1]) < 0.01  # yaw [rad]
+            assert at(flown, "estimate", t, lambda m: m.health) == 0
+        assert height(flown, 20.0) > 1.5

@@ -45,6 +45,18 @@ async def first(stream, true, seconds=60.0):
     return await asyncio.wait_for(look(), seconds)
 
 
+async def started(url):
+    """MAVSDK, listening; its server now and then does not come up on a busy machine, and is then started again."""
+    for seconds in (20.0, 60.0):
+        drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
+        try:
+            await asyncio.wait_for(drone.connect(system_address=url), seconds)
+            return drone
+        except asyncio.TimeoutError:
+            drone._stop_mavsdk_server()
+    raise AssertionError("MAVSDK's server does not start")
+
+
 def session(tmp_path, space, story, *sets):
     """Tell a story to the drone of a live run; its log."""
     port, log = free_port(), tmp_path / f"{space}.mcap"
@@ -53,8 +65,7 @@ def session(tmp_path, space, story, *sets):
     command += [part for each in ("run.duration=900", *sets) for part in ("--set", each)]
 
     async def tell():
-        drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
-        await drone.connect(system_address=f"udpin://127.0.0.1:{port}")
+        drone = await started(f"udpin://127.0.0.1:{port}")
         try:
             await first(drone.core.connection_state(), lambda state: state.is_connected, 120.0)
             await first(drone.telemetry.health_all_ok(), bool)
