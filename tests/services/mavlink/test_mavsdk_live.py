@@ -52,7 +52,7 @@ async def started(url):
         try:
             await asyncio.wait_for(drone.connect(system_address=url), seconds)
             return drone
-        except asyncio.TimeoutError:
+        except TimeoutError:
             drone._stop_mavsdk_server()
     raise AssertionError("MAVSDK's server does not start")
 
