@@ -34,7 +34,9 @@ RUN useradd --uid 1000 --home-dir /app --no-create-home --shell /usr/sbin/nologi
 COPY --from=dependencies /opt/lapwing /opt/lapwing
 WORKDIR /app
 COPY pyproject.toml README.md ./
+COPY cosim cosim
 COPY dynamics dynamics
+COPY lapwing lapwing
 COPY messages messages
 COPY services services
 COPY studies studies

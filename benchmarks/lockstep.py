@@ -3,7 +3,7 @@
     python -m benchmarks.lockstep [CYCLES] [REPEATS]
 
 The ping: three processes hand 200 bytes round in a circle over the same Zenoh configuration, nothing else. The lock
-step: plant, sensors, autopilot and trajectory with messages of real size (encoded, stamped, attached, decoded), but no
+step: plant, sensors, autopilot and trajectory with bundles of real size, the plant's messages in batches, but no
 physics and no recorder, so that what is compared is the exchange.
 """
 
@@ -15,93 +15,66 @@ import time
 from itertools import pairwise
 from statistics import median
 
-from messages import Actuators, Clock, Imu, Setpoint, VehicleState, header, stamp
-from messages.topics import ACTUATORS, CLOCK, IMU, SETPOINT, TRUTH
-from services.bus import ZenohBus, mesh
-from services.launcher import loopback_endpoints
-from services.lockstep import Input
-from services.process import Process, pin, run_lockstep
-from services.sections import Exchange, Rates, Vehicle
+from cosim.bus import ZenohBus, mesh
+from cosim.graph import Service
+from cosim.launcher import loopback_endpoints
+from cosim.process import Process, pin, run_lockstep
+from cosim.schedule import Input, Port
+from cosim.setup import ServiceSetup, Setup
+from dynamics.rows import to_row
+from services.common import ports
+from services.common.ports import MotorCommand, Reference, TrueState
+from services.plant.wire import PlantWiring
+from services.plant.wire import wires as plant_wires
 
-INTERVAL = 4_000_000
-FOUR = (1.0, 2.0, 3.0, 4.0)
 HOPS = 3
+NONE = PlantWiring(5, False, 0, 0.0, ())
+PARTS = {  # inputs and ports of the mission's services
+    "plant": (
+        (Input(ports.ACTUATORS, 1),),
+        (Port(ports.TRUTH, TrueState(*[(1.0,) * 4 if v == () else v for v in TrueState()])),),
+    ),
+    "sensors": ((Input(ports.TRUTH),), (Port(ports.IMU, ports.ImuReading()),)),
+    "autopilot": (
+        (Input(ports.IMU), Input(ports.TRAJECTORY)),
+        (Port(ports.ACTUATORS, MotorCommand((1.0,) * 4, True, (1.0,) * 4, (0.0,) * 3)),),
+    ),
+    "trajectory": ((Input(ports.TRUTH, 25),), (Port(ports.TRAJECTORY, Reference()),)),
+}
 
 
-class Plant:
-    inputs, outputs = (Input(ACTUATORS, 1),), (TRUTH, CLOCK)
+class Constant:
+    """Gives the same values at every tick, without physics; the plant's notes the time and ends the run."""
 
-    def __init__(self, cycles):
-        self.finished, self.cycles, self.stamps = False, cycles, []
+    def __init__(self, name, cycles):
+        self.name, self.inputs, self.outputs = name, *PARTS[name]
+        self.rows = [(port.name, to_row(port.like)) for port in self.outputs]
+        self.cycles, self.stamps = cycles, []
 
-    def step(self, tick, actuators):
-        self.stamps.append(time.perf_counter())
-        self.finished = tick == self.cycles
-        yield (
-            TRUTH,
-            VehicleState(
-                header(tick * INTERVAL, "world"),
-                rotor_speed=FOUR,
-                motor_voltage=FOUR,
-                motor_current=FOUR,
-                motor_power=FOUR,
-                rotor_thrust=FOUR,
-                rotor_torque=FOUR,
-            ),
-        )
-        if tick % 5 == 0:
-            yield CLOCK, Clock(stamp(tick * INTERVAL))
+    def bind(self, graph):
+        self.graph = graph
 
-
-class Sensors:
-    inputs, outputs = (Input(TRUTH),), (IMU,)
-
-    def step(self, tick, truth):
-        yield IMU, Imu(header(tick * INTERVAL, "body"))
-
-
-class Autopilot:
-    inputs, outputs = (Input(IMU), Input(SETPOINT)), (ACTUATORS,)
-
-    def step(self, tick, imu, setpoint):
-        yield ACTUATORS, Actuators(header(tick * INTERVAL, "body"), motor_voltage=FOUR, armed=True)
-
-
-class Trajectory:
-    inputs, outputs = (Input(CLOCK, 25),), (SETPOINT,)
-
-    def step(self, tick, clock):
-        yield SETPOINT, Setpoint(header(tick * INTERVAL, "world"), phase="climb")
-
-
-SERVICES = {"plant": Plant, "sensors": Sensors, "autopilot": Autopilot, "trajectory": Trajectory}
-
-
-class Scene:
-    """Just what the shell asks of a scene."""
-
-    tables = {  # noqa: RUF012
-        Exchange: Exchange(),
-        Rates: Rates(),
-        Vehicle: Vehicle(),
-    }
-
-    def __getitem__(self, section):
-        return self.tables[section]
-
-    def lookup(self, dotted):
-        return getattr(self.tables[Rates], dotted.rpartition(".")[2], 250)
-
-    def period(self, rate, key):
-        return 250 // rate
+    def act(self, tick):
+        for name, row in self.rows:
+            self.graph.put_row(name, tick, row)
+        if self.name == "plant":
+            self.stamps.append(time.perf_counter())
+            if tick == self.cycles:
+                self.graph.finish()
+        return tick + 1
 
 
 def lockstep_process(name, peers, cycles, core):
-    service = SERVICES[name](cycles) if name == "plant" else SERVICES[name]()
+    services = {name: ServiceSetup(None, *parts) for name, parts in PARTS.items()}
+    setup = Setup("benchmark", "", 1, cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    part = Constant(name, cycles)
+    wires = plant_wires(setup, NONE) if name == "plant" else []
     with ZenohBus(*mesh(name, peers)) as bus:
-        run_lockstep(Process(name, Scene(), bus, "bench", list(peers), core=core), service)
+        run_lockstep(
+            Process(name, setup, bus, "bench", list(peers), core=core), Service(name, [part], wires), name == "plant"
+        )
         if name == "plant":
-            print(json.dumps(service.stamps), flush=True)
+            print(json.dumps(part.stamps), flush=True)
 
 
 def ping_process(name, peers, cycles, core):
@@ -132,7 +105,7 @@ def ping_process(name, peers, cycles, core):
             print(json.dumps(stamps), flush=True)
 
 
-KINDS = {"ping": (ping_process, ["a", "b", "c"]), "lockstep": (lockstep_process, list(SERVICES))}
+KINDS = {"ping": (ping_process, ["a", "b", "c"]), "lockstep": (lockstep_process, list(PARTS))}
 
 
 def measure(kind, cycles, core):

@@ -8,13 +8,15 @@ lane by lane and rounded as floats are, so all of `dynamics.vector` and the arit
 # mypy: disable-error-code="attr-defined"
 
 import operator
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numba.extending import intrinsic, lower_builtin, models, register_model
 
+from dynamics.generate import define, generated
 from dynamics.kernel import leaf
 from dynamics.tree import NUMBERS, unroll
 
@@ -164,31 +166,32 @@ def total(x):
     return (a + b) + (c + d)
 
 
-def beside(four):
-    """The tree of lanes whose lane k holds the numbers of the k-th of four trees of one shape."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload(beside, jit_options={"forceinline": True})
-def _beside(four):
-    names: dict[str, Any] = {"lanes": lanes}
-    paths = tuple(f"four[{k}]" for k in range(4))
+def _beside(four: Any) -> Callable:
+    paths, names = tuple(f"four[{k}]" for k in range(4)), {"lanes": lanes}
     expression = unroll(four.types[0], paths, lambda found, p, _: None if found else f"lanes({', '.join(p)})", names)
-    exec(f"def put(four):\n    return {expression}\n", names)
-    return names["put"]
+    return define("beside(four)", names, f"return {expression}")
 
 
-def separate(tree):
-    """The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `beside`."""
-    raise NotImplementedError("compiled code only")
+beside = generated(
+    "beside(four)",
+    _beside,
+    "The tree of lanes whose lane k holds the numbers of the k-th of four trees of one shape.",
+    inline=True,
+)
 
 
-@overload(separate, jit_options={"forceinline": True})
-def _separate(tree):
+def _separate(tree: Any) -> Callable:
     names: dict[str, Any] = {"apart": apart}
     parts = [
         unroll(tree, ("tree",), lambda found, p, _, k=k: None if found else f"apart({p[0]})[{k}]", names)
         for k in range(4)
     ]
-    exec(f"def take(tree):\n    return ({', '.join(parts)})\n", names)
-    return names["take"]
+    return define("separate(tree)", names, f"return ({', '.join(parts)})")
+
+
+separate = generated(
+    "separate(tree)",
+    _separate,
+    "The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `beside`.",
+    inline=True,
+)

@@ -13,10 +13,11 @@ import itertools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numba
 from numba.core import types
 from numba.core.errors import TypingError
-from numba.extending import overload
+
+from dynamics.generate import define, generated
+from dynamics.kernel import ByClass
 
 
 class Manifold(NamedTuple):
@@ -34,7 +35,7 @@ class Manifold(NamedTuple):
     transport: Callable  # (u, v) -> v parallel-transported from retract(x, u) back to x along the geodesic
 
 
-MANIFOLDS: dict[type, Manifold] = {}
+MANIFOLDS = ByClass()
 NUMBERS: list[type] = [types.Float]
 """The numba types that are numbers in a tree."""
 
@@ -68,23 +69,14 @@ def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict
 
 def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable:
     """The generic function `signature`: its source is `body(type of the argument shape, names)`, one expression."""
-    name, arguments = signature.rstrip(")").split("(")
-    position = arguments.split(", ").index(shape)
+    position = signature.rstrip(")").partition("(")[2].split(", ").index(shape)
 
     def generate(*argument_types):
         names: dict[str, Any] = {}
         expression = body(argument_types[position], names)
-        exec(f"def {name}({arguments}):\n    return {expression}\n", names)
-        return names[name]
+        return define(signature, names, f"return {expression}")
 
-    def function(*values):
-        return generate(*map(numba.typeof, values))(*values)
-
-    function.__name__, function.__qualname__, function.__doc__ = name, name, doc
-    scope = {"generate": generate}
-    exec(f"def typing({arguments}):\n    return generate({arguments})\n", scope)
-    overload(function)(scope["typing"])
-    return function
+    return generated(signature, generate, doc)
 
 
 def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float: str) -> Callable:

@@ -43,6 +43,7 @@ def make_class(definition: Definition, definitions: dict[str, Definition], class
     The class is a named tuple with the definition's fields, defaults (zero where none is given) and constants, and
 
     - `type_name`: "sensor_msgs/msg/Imu"; `schema_text`: the `ros2msg` text with all contained types;
+    - `layouts`: where its fields stand in a payload, by the lengths of its strings and sequences;
     - `encode() -> bytes` and `decode(bytes)` (static): ROS 2 CDR, little-endian. Sequences and arrays decode to
       tuples. Both raise ValueError, with the type's name, for values or payloads that do not fit.
     """
@@ -66,6 +67,7 @@ def make_class(definition: Definition, definitions: dict[str, Definition], class
     }
     for source in (_Encoder(definitions).source(definition), _Decoder(definitions).source(definition)):
         exec(compile(source, f"<codec of {definition.type_name}>", "exec"), scope)
+    cls.layouts = layouts  # type: ignore[attr-defined]
     cls.encode = scope["encode"]  # type: ignore[attr-defined]
     cls.decode = staticmethod(scope["decode"])  # type: ignore[attr-defined]
     return cls

@@ -3,6 +3,8 @@
 import hashlib
 import struct
 
+import numpy as np
+
 _ENTRY = struct.Struct("<qQ")  # time [ns], payload length
 _FOLD = 4096  # parts kept per topic before they are hashed: one long update is cheaper than many short ones
 
@@ -21,11 +23,36 @@ class Digest:
         """Add one message of a topic."""
         parts = self._parts.get(topic)
         if parts is None:
-            parts = self._parts[topic] = []
-            self._hashes[topic] = hashlib.blake2b(digest_size=32)
+            parts = self._open(topic)
         parts += (_ENTRY.pack(time_ns, len(payload)), payload)
         if len(parts) >= _FOLD:
             self._fold(topic)
+
+    def update_page(self, topic: str, times_ns: np.ndarray, payloads: np.ndarray) -> None:
+        """Add n messages of a topic that have the same size, as n calls of `update` do.
+
+        Args:
+            topic: its name.
+            times_ns: int64, shape (n,).
+            payloads: uint8, shape (n, size).
+
+        Raises:
+            ValueError: as many times as payloads are needed.
+        """
+        n, size = payloads.shape
+        if len(times_ns) != n:
+            raise ValueError(f"{topic}: {len(times_ns)} times for {n} payloads")
+        if not n:
+            return
+        entries = np.empty((n, _ENTRY.size + size), np.uint8)
+        entries[:, :8] = np.ascontiguousarray(times_ns, "<i8")[:, None].view(np.uint8)
+        entries[:, 8:16] = np.frombuffer(size.to_bytes(8, "little"), np.uint8)
+        entries[:, 16:] = payloads
+        if topic in self._parts:
+            self._fold(topic)
+        else:
+            self._open(topic)
+        self._hashes[topic].update(entries.reshape(-1).data)
 
     def hexdigest(self) -> str:
         """The digest so far: 32 hexadecimal digits."""
@@ -35,6 +62,12 @@ class Digest:
             name = topic.encode()
             total.update(len(name).to_bytes(4, "little") + name + self._hashes[topic].digest())
         return total.hexdigest()
+
+    def _open(self, topic: str) -> list[bytes]:
+        self._hashes[topic] = hashlib.blake2b(digest_size=32)
+        parts: list[bytes] = []
+        self._parts[topic] = parts
+        return parts
 
     def _fold(self, topic: str) -> None:
         self._hashes[topic].update(b"".join(self._parts[topic]))

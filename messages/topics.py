@@ -19,6 +19,7 @@ from messages.types import (
     OperatorInput,
     PoseStamped,
     Range,
+    Reading,
     Setpoint,
     Status,
     TFMessage,
@@ -70,5 +71,6 @@ ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
 OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
 ANSWERS = Topic("{vehicle}/answers", Answers, rate="rates.operator")
+OWN_SENSOR = Topic("{vehicle}/own_sensor", Reading)  # at its own rate
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

@@ -1,34 +1,101 @@
-"""The process table: which services there are, and which of them a scene calls for.
-
-A service is a folder with a `service.py`. One that takes part in the lock step defines `create(scene)`, which gives
-its `Service`, or None where the scene does not call for it; any other defines `run(process, ...)`.
-"""
+"""From a scene to a run: what a scene may say, and the set-up that all services of a run are given."""
 
 import importlib
 import importlib.util
 import pkgutil
+from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import services
-from services.lockstep import Service
-from services.scene import Scene
+from cosim import scene as scenes
+from cosim.scene import Overrides, Scene, Vocabulary
+from cosim.setup import Setup
+from services.common import sections
+from services.common.sections import Exchange, Run, Vehicle
+from services.plant import models
+from services.processes import PROCESSES, entry
 
-RECORDER, ROUTER, MAVLINK = "recorder", "router", "mavlink"  # the services that take no part in the lock step
+
+def _configurations() -> list[ModuleType]:
+    """The module `config` of every service that has one."""
+    folders = sorted(p.name for p in pkgutil.iter_modules(services.__path__) if p.ispkg)
+    paths = [f"services.{name}.config" for name in folders]
+    return [importlib.import_module(path) for path in paths if importlib.util.find_spec(path)]
 
 
 @cache
-def modules() -> dict[str, ModuleType]:
-    """The `service` module of every service folder, by folder name."""
-    names = [p.name for p in pkgutil.iter_modules(services.__path__) if p.ispkg]
-    return {
-        name: importlib.import_module(f"services.{name}.service")
-        for name in sorted(names)
-        if importlib.util.find_spec(f"services.{name}.service")
-    }
+def vocabulary() -> Vocabulary:
+    """Every table that a scene may have: of several services, of one, and of the plant's models."""
+    tables = [sections, *_configurations(), *map(models.get, models.names())]
+    return Vocabulary.of(tables, models.check)
 
 
-def lockstep_services(scene: Scene) -> dict[str, Service]:
-    """The services that fly this scene, by name."""
-    created = {name: module.create(scene) for name, module in modules().items() if hasattr(module, "create")}
-    return {name: service for name, service in created.items() if service is not None}
+def load(scene: str | Path, overrides: Overrides = ()) -> Scene:
+    """Read a scene and all that it names, override, and validate.
+
+    Args:
+        scene: path of its TOML file, or the name of one that ships.
+        overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key; of any
+            key that the scene resolves to: "airframe.mass.total=9.5".
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+    """
+    return scenes.load(scene, overrides, vocabulary(), sections.SHIPPED)
+
+
+def parse(path: Path, text: str, overrides: Overrides = ()) -> Scene:
+    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    return scenes.parse(path, text, overrides, vocabulary())
+
+
+def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
+    """The scene whose `resolved` is `tree`, without opening a file; SceneError if it is no longer a sound one."""
+    return scenes.from_resolved(tree, vocabulary(), name)
+
+
+def reseed(setup: Setup, seed: int) -> Setup:
+    """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again."""
+    services_of = dict(setup.services)
+    for name, given in services_of.items():
+        module = importlib.import_module(f"{entry(name).package}.resolve")
+        if hasattr(module, "reseed"):
+            services_of[name] = module.reseed(given, seed, setup.vehicle)
+    run = {**setup.resolved[Run.TABLE], "seed": seed}
+    return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
+
+
+def resolve(scene: Scene, plan: tuple[Any, ...] = ()) -> Setup:
+    """The set-up of a run of this scene.
+
+    Args:
+        scene: what to fly.
+        plan: operator commands that the autopilot gets at the first tick.
+    """
+    exchange, run = scene[Exchange], scene[Run]
+    found: dict[str, Any] = {}
+    beside: dict[str, Any] = {}
+    for process in PROCESSES:
+        if process.lock_step or process.resolves:
+            given = importlib.import_module(f"{process.package}.resolve").resolve(scene)
+            if given is not None:
+                (found if process.lock_step else beside)[process.name] = given
+    if plan:
+        autopilot = found["autopilot"]
+        found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
+    return Setup(
+        scene.name,
+        run.title,
+        run.seed,
+        round(run.duration * exchange.rate),
+        exchange.rate,
+        exchange.interval_ns,
+        exchange.coupling,
+        scene[Vehicle].name,
+        found,
+        beside,
+        dict(scene.resolved),
+    )

@@ -1,51 +1,227 @@
-"""A scene flown in this process without a log: what a study looks at many times over."""
+"""A flight, recorded or flown in memory: what every topic said by time, and its figures of merit."""
 
-from typing import Any, NamedTuple
+from collections.abc import Collection, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
-from messages.topics import TRUTH, Topic
-from services.lockstep import LockStepError
-from services.scene import Scene
-from services.sections import Exchange, Vehicle
-from services.single import run_single
-from services.table import lockstep_services
+from cosim.graph import Graph
+from cosim.log import LogReader
+from cosim.setup import Setup
+from messages import TYPES
+from messages.digest import Digest
+from messages.topics import TOPICS, Topic
+from studies import tracking
+from studies.origin import Origin
+from studies.port_columns import columns_of
+from studies.topic_view import TopicView
+
+AXES = tuple(tracking.AXES)
+SLOW = 0.5  # [m/s] a vehicle that has landed moves less
+UPRIGHT = np.cos(np.radians(30.0))  # and is tilted less
+RESTING = 0.1  # [m] from the height at which it stood at first; for plants that tell of no contact
 
 
-class Messages:
-    """Takes the place of a log: keeps the messages of the topics that are wanted."""
+class Flight:
+    """What was said in a flight, topic by topic, and what that comes to.
 
-    def __init__(self, scene: Scene, wanted: tuple[Topic, ...]):
-        self._kept: dict[str, list[Any]] = {topic.key(scene[Vehicle].name): [] for topic in wanted}
-        self.of = {topic: self._kept[topic.key(scene[Vehicle].name)] for topic in wanted}
+    `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
 
-    def write(self, topic: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
-        """Keep what is wanted, decoded."""
-        if topic in self._kept:
-            self._kept[topic].append(message.decode(payload))
+    Attributes:
+        origin: where it comes from, with the log's metadata.
+        vehicle: name.
+        failure: why it ended before its time; "" where it did not, or where a log does not say.
+    """
 
+    def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = ""):
+        """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        self.origin, self.vehicle, self.failure = origin, origin.vehicle, failure
+        self._topics = dict(topics)
 
-class Trace(NamedTuple):
-    """A flight tick by tick; `failure` says why it ended early, "" if it did not."""
+    @classmethod
+    def read(cls, path: str | Path, vehicle: str | None = None) -> Self:
+        """A recorded flight.
 
-    interval: float  # [s] between two rows
-    position_world: np.ndarray  # [m] shape (n, 3)
-    power: np.ndarray  # [W] electrical, of all motors, shape (n,)
-    failure: str = ""
+        Args:
+            path: of the MCAP log.
+            vehicle: its name; by default that of the first topic /NAME/truth.
+
+        Raises:
+            ValueError: no such file, no MCAP log, no flight in it, or a damaged message.
+        """
+        with LogReader(path) as log:
+            known = [name for name, kind in log.topics().items() if kind in TYPES]
+            named = vehicle or next((name.split("/")[1] for name in known if name.endswith("/truth")), None)
+            if named is None or f"/{named}/truth" not in known:
+                raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
+            prefix = f"/{named}/"
+            own = [name for name in known if name.startswith(prefix) or "/" not in name[1:]]
+            views = {
+                name.removeprefix(prefix).removeprefix("/"): TopicView(*columns)
+                for name, columns in log.histories(own).items()
+            }
+            return cls(views, Origin.of_log(str(path), named, log.metadata, log.attachments))
+
+    @classmethod
+    def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "") -> Self:
+        """A flight that was flown in this process.
+
+        Args:
+            graph: at the end; its rows keep all ticks of what these topics are made of.
+            only: the topics wanted, None for all that are recorded.
+            failure: why it ended before its time.
+        """
+        said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
+        return cls(said, Origin.of_setup(graph.setup), failure)
+
+    @property
+    def setup(self) -> Setup:
+        """What was flown.
+
+        Raises:
+            ValueError: the log carries no set-up, or one that this version cannot read.
+        """
+        return self.origin.setup
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """What the log says about its making: scene, seed, mode, version, digest and more."""
+        return self.origin.metadata
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest over the deterministic messages: as the log states it ("": it has no end), or of the topics here."""
+        if self.origin.recorded:
+            return self.metadata.get("digest", "")
+        digest = Digest()
+        for topic in TOPICS:
+            if topic.recorded and topic.deterministic and self.has(_short(topic)):
+                for time_ns, payload in self.topic(_short(topic)).payloads():
+                    digest.update(topic.key(self.vehicle), time_ns, payload)
+        return digest.hexdigest()
+
+    @property
+    def truth(self) -> TopicView:
+        """The true state."""
+        return self.topic("truth")
+
+    @property
+    def setpoint(self) -> TopicView:
+        """Where the vehicle ought to be, as the autopilot follows it."""
+        return self.topic("setpoint")
+
+    @property
+    def actuators(self) -> TopicView:
+        """What the autopilot commands."""
+        return self.topic("actuators")
+
+    @property
+    def estimate(self) -> TopicView:
+        """What the estimator tells."""
+        return self.topic("estimate")
+
+    @property
+    def status(self) -> TopicView:
+        """What the autopilot is doing."""
+        return self.topic("status")
+
+    @property
+    def topics(self) -> list[str]:
+        """The names of all topics."""
+        return sorted(self._topics)
+
+    def topic(self, name: str) -> TopicView:
+        """A topic by its name without the vehicle's, for example "gps/fix".
+
+        Raises:
+            ValueError: it is not there; names those that are.
+        """
+        if name not in self._topics:
+            raise ValueError(f"{self.origin.source}: has no topic {name}; it has {', '.join(self.topics)}")
+        return self._topics[name]
+
+    def has(self, topic: str) -> bool:
+        """Whether there is this topic."""
+        return topic in self._topics
+
+    def times(self, topic: str) -> np.ndarray:
+        """Simulation times of a topic [s], shape (n,)."""
+        return self.topic(topic).times
+
+    def column(self, topic: str, field: str) -> np.ndarray:
+        """A field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
+        return self.topic(topic)[field]
+
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "truth", shape (n, 6).
+
+        The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
+        The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
+        """
+        if not (self.has("setpoint") and self.has("actuators")):
+            return np.empty((0, len(AXES)))
+        setpoint, actuators = self.setpoint, self.actuators
+        n = min(len(self.truth), len(setpoint), len(actuators))
+        return np.column_stack([setpoint.position[:n], actuators.attitude_reference[:n, :2], setpoint.yaw[:n]])
+
+    @cached_property
+    def armed(self) -> np.ndarray:
+        """Whether the motors are armed, at the times of `reference`, shape (n,) of bool."""
+        n = len(self.reference)
+        return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
+
+    @cached_property
+    def errors(self) -> dict[str, np.ndarray]:
+        """Reference minus truth of each axis [m], [rad] while the motors are armed; empty without a reference."""
+        n = len(self.reference)
+        if n == 0:
+            return {}
+        found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
+        return dict(zip(AXES, found.T, strict=True))
+
+    @cached_property
+    def rmse(self) -> dict[str, float]:
+        """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
+        return tracking.rmse(np.column_stack(list(self.errors.values()))) if self.errors else {}
 
     @property
     def energy(self) -> float:
-        """Electrical energy taken [J]."""
-        return float(self.power.sum() * self.interval)
+        """Electrical energy that the motors have taken [J]."""
+        return float(self.truth.motor_power.sum() * self.setup.interval)
+
+    @cached_property
+    def finished(self) -> bool:
+        """Whether the autopilot says that the mission is over."""
+        return self.has("status") and bool(self.status.finished[-1])
+
+    @cached_property
+    def landed(self) -> bool:
+        """Whether the mission has ended on the ground: as the autopilot says, and upright, slow and in contact."""
+        if not (self.finished and self.status.landed[-1]):
+            return False
+        truth = self.truth
+        height, (x, y) = truth.position[:, 2], truth.orientation[-1, :2]
+        resting = truth.ground_contact[-1] or abs(height[-1] - height[0]) < RESTING
+        upright = 1.0 - 2.0 * (x * x + y * y) > UPRIGHT
+        return bool(resting and upright and np.linalg.norm(truth.velocity[-1]) < SLOW)
+
+    def to_dataframe(self, topic: str = "truth") -> Any:
+        """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe: pandas is not installed; pip install pandas") from None
+        view = self.topic(topic)
+        return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
 
 
-def fly(scene: Scene) -> Trace:
-    """Fly `scene` to its end, or until its numbers are not finite."""
-    messages, failure = Messages(scene, (TRUTH,)), ""
-    try:
-        run_single(scene, lockstep_services(scene), messages, None, lambda *_: False)
-    except (LockStepError, ValueError) as error:
-        failure = str(error)
-    truth = messages.of[TRUTH]
-    position = np.array([m.pose.position for m in truth]).reshape(-1, 3)
-    return Trace(scene[Exchange].interval, position, np.array([sum(m.motor_power) for m in truth]), failure)
+def _short(topic: Topic) -> str:
+    """The topic's name without the vehicle's."""
+    return topic.name.removeprefix("{vehicle}/")

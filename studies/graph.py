@@ -1,83 +1,80 @@
-"""A picture of the services of a scene and the topics between them, read from what the services declare.
+"""A picture of the services of a run, what they hand to one another, and who listens."""
 
-python -m studies.graph scenes/delivery_mission.toml docs/pictures/services.png
-"""
-
-import sys
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+from cosim.setup import Setup
+from services.processes import MAVLINK, PROCESSES, ProcessEntry
+from studies.report.style import DPI, FLOWN
 
-from services.lockstep import Service
-from services.scene import load
-from services.sections import Vehicle
-from services.table import RECORDER, lockstep_services
+GREY, PALE = "#666666", "#F4F6F8"
+WIDE, HIGH = 4.6, 2.4  # from service to service
+PLACES = {"plant": (0, 1), "sensors": (1, 1), "trajectory": (0, 0), "autopilot": (1, 0), "formation": (1, 0)}
+TAKEN = {"recorder": "every recorded topic", "router": "every topic", MAVLINK: "telemetry"}  # by those who listen
+TOP, BOTTOM, ASIDE = -0.1, -2.5, 0.45  # arrows to those who listen: from, to, beside the middle
+NOTE = "* taken one or more ticks after it was given\nsolid: lock step; dashed outline: only where it is asked for"
 
-BLUE, GREY = "#1f5fa8", "#666666"
-PLACES = {"plant": (0.0, 1.0), "sensors": (1.0, 1.0), "autopilot": (1.0, 0.0), "trajectory": (0.0, 0.0)}
+Point = tuple[float, float]
 
 
-def topics_between(services: dict[str, Service], vehicle: str) -> dict[tuple[str, str], list[str]]:
-    """The topics' names for each pair (producer, consumer); "*" for those that wait a tick."""
+def handed(setup: Setup) -> dict[tuple[str, str], list[str]]:
+    """The ports for each pair (producer, consumer); "*" behind those that are taken later."""
     found: dict[tuple[str, str], list[str]] = {}
-    for consumer, service in services.items():
-        for needed in service.inputs:
-            for producer, other in services.items():
-                if needed.topic in other.outputs:
-                    name = needed.topic.key(vehicle) + ("*" if needed.delay else "")
-                    found.setdefault((producer, consumer), []).append(name)
+    producers = setup.producers
+    for name, service in setup.services.items():
+        for taken in service.inputs:
+            found.setdefault((producers[taken.port], name), []).append(taken.port + ("*" if taken.delay else ""))
     return found
 
 
-def draw(services: dict[str, Service], vehicle: str, path: Path) -> None:
-    """Write the picture as PNG."""
-    figure, axes = plt.subplots(figsize=(9.0, 5.4))
-    places = {name: (4.6 * x, 2.8 * y) for name, (x, y) in PLACES.items() if name in services}
-    for name in services.keys() - places.keys():
-        places[name] = (4.6 * (1 + len(places) - len(PLACES)), 1.0)
-    between = topics_between(services, vehicle)
-    for (producer, consumer), names in between.items():
-        (x0, y0), (x1, y1) = places[producer], places[consumer]
-        axes.annotate(
-            "",
-            (x1, y1),
-            (x0, y0),
-            arrowprops={
-                "arrowstyle": "-|>", "color": BLUE, "lw": 1.6, "shrinkA": 34, "shrinkB": 34,
-            },
-        )  # fmt: skip
-        share = 0.3 if (consumer, producer) in between else 0.5  # names for both ways must not meet
-        there = (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-        label: Any = {
-            "ha": "center",
-            "va": "center",
-            "fontsize": 8,
-            "color": GREY,
-            "backgroundcolor": "white",
-            "zorder": 4,
-        }
-        axes.text(*there, "\n".join(names), **label)
-    for name, (x, y) in places.items():
-        style = {"boxstyle": "round,pad=0.6", "fc": "white", "ec": BLUE, "lw": 1.8}
-        axes.text(x, y, name, ha="center", va="center", fontsize=12, bbox=style)
-    recorded = sorted(t.key(vehicle) for service in services.values() for t in service.outputs if t.recorded)
-    lines = [", ".join(recorded[i : i + 6]) for i in range(0, len(recorded), 6)]
-    box = {"boxstyle": "round,pad=0.5", "fc": "#f4f4f4", "ec": GREY}
-    text = f"{RECORDER} (journals of all services): " + ",\n".join(lines)
-    axes.text(2.3, -0.95, text, ha="center", va="center", fontsize=8, color=GREY, bbox=box)
-    note = "* taken later: the command one exchange, the clock 0.1 s (how far setpoints may be ahead)"
-    axes.text(2.3, -1.6, note, ha="center", fontsize=7.5, color=GREY)
-    axes.set_xlim(-1.0, 5.6)
-    axes.set_ylim(-1.7, 3.2)
+def listeners(setup: Setup) -> list[ProcessEntry]:
+    """The processes that stand outside of the lock step; the MAVLink link where somebody steers."""
+    return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.beside)]
+
+
+def draw(setup: Setup, path: Path) -> None:
+    """Write the picture of a run in the format of the file's ending."""
+    figure = Figure(figsize=(9.4, 6.4))
+    axes = figure.add_subplot()
+    at = {name: PLACES.get(name, (0.5, 0.5)) for name in setup.services}
+    places = {name: (WIDE * x, HIGH * y) for name, (x, y) in at.items()}
+    axes.add_patch(FancyBboxPatch((-1.0, -0.6), WIDE + 2.0, HIGH + 1.2, "round,pad=0.1", fc=PALE, ec="none"))
+    pairs = handed(setup)
+    for (producer, consumer), names in pairs.items():
+        share = 0.3 if (consumer, producer) in pairs else 0.5  # names for both ways must not meet
+        _arrow(axes, places[producer], places[consumer], "\n".join(names), FLOWN, share)
+    for name, place in places.items():
+        _box(axes, place, name, FLOWN)
+    beside = listeners(setup)
+    for k, entry in enumerate(beside):
+        x, steers = WIDE * k / max(len(beside) - 1, 1), entry.name == MAVLINK
+        _arrow(axes, (x - ASIDE * steers, TOP), (x - ASIDE * steers, BOTTOM), TAKEN[entry.name], GREY)
+        if steers:
+            _arrow(axes, (x + ASIDE, BOTTOM), (x + ASIDE, TOP), "commands", GREY)
+        _box(axes, (x, BOTTOM), entry.name, GREY, "--" if entry.optional else "-")
+    axes.text(0.5 * WIDE, BOTTOM - 1.0, NOTE, ha="center", fontsize=7.5, color=GREY)
+    axes.set(
+        xlim=(-1.3, WIDE + 1.3),
+        ylim=(BOTTOM - 1.1, HIGH + 0.8),
+        title=f"{setup.scene}: {setup.rate} Hz, {setup.coupling}",
+    )
     axes.axis("off")
-    figure.savefig(path, dpi=130, bbox_inches="tight")
-    plt.close(figure)
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
 
 
-if __name__ == "__main__":
-    scene = load(sys.argv[1])
-    draw(lockstep_services(scene), scene[Vehicle].name, Path(sys.argv[2]))
+def _arrow(axes: Axes, start: Point, end: Point, text: str, colour: str, share: float = 0.5) -> None:
+    """An arrow with a text at a `share` of its length."""
+    looks = {"arrowstyle": "-|>", "color": colour, "lw": 1.6, "shrinkA": 30, "shrinkB": 30}
+    axes.annotate("", end, start, arrowprops=looks)
+    there = (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
+    words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color": GREY, "zorder": 4}
+    axes.text(*there, text, backgroundcolor="white", **words)
+
+
+def _box(axes: Axes, place: Point, name: str, colour: str, line: str = "-") -> None:
+    style = {"boxstyle": "round,pad=0.6", "fc": "white", "ec": colour, "lw": 1.8, "ls": line}
+    axes.text(*place, name, ha="center", va="center", fontsize=12, bbox=style, zorder=5)

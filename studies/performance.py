@@ -11,8 +11,8 @@ from rich.table import Table
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import Airframe, load_airframe
-from services.scene import load
-from services.sections import airframe
+from services.common.sections import airframe
+from services.table import load
 
 
 class Row(NamedTuple):

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+TURN = 2.0 * np.pi
 AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
 
 
@@ -22,7 +23,8 @@ def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, ar
         attitude: roll, pitch, yaw [rad], shape (n, 3).
         armed: shape (n,) of bool.
     """
-    turn = np.angle(np.exp(1j * (reference[:, 3:] - attitude)))
+    turn = reference[:, 3:] - attitude
+    turn -= TURN * np.round(turn / TURN)
     return np.column_stack([reference[:, :3] - position, turn])[armed]
 
 

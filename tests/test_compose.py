@@ -11,6 +11,11 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from cosim.launcher import WATCHER
+from lapwing.runs.joined import parse_peers
+from services import processes
+from services.table import load, resolve
+
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
 ROOT = Path(__file__).parent.parent
@@ -39,6 +44,26 @@ def test_every_service_has_a_known_command_and_needs_only_what_is_there():
             assert command[1] in ("run", "service", "replay")
 
 
+def endpoints():
+    """The names in the table of participants, and who is started by `docker compose up mission`."""
+    mission = compose()["mission"]
+    table = mission["command"][mission["command"].index("--peers") + 1]
+    return parse_peers(table), {"mission", *mission["depends_on"]}
+
+
+@pytest.mark.parametrize("scene", sorted(Path("scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_every_process_that_a_scene_needs_has_a_container_and_an_endpoint(scene):
+    peers, started = endpoints()
+    needed = {WATCHER, *processes.needed(resolve(load(scene)))}
+    assert needed <= set(peers)
+    assert needed <= started
+
+
+def test_every_process_of_the_table_has_an_endpoint():
+    peers, _ = endpoints()
+    assert {entry.name for entry in processes.PROCESSES} <= set(peers)
+
+
 def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
     services, ports = compose(), {}
 
@@ -56,7 +81,7 @@ def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
     running = []
     try:
         for name in names:
-            command = [sys.executable, "-m", "services.cli", *map(here, services[name]["command"][1:])]
+            command = [sys.executable, "-m", "lapwing", *map(here, services[name]["command"][1:])]
             with (tmp_path / f"{name}.txt").open("w") as said:
                 running.append(subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT))
         port = ports["0.0.0.0:5760"]

@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
 def test_lapwing_commands_run_as_written(command, folder):
     words = command.split()[1:]
     more = ["--space", "test-readme"] if words[0] in ("run", "replay") else []
-    subprocess.run([sys.executable, "-m", "services.cli", *words, *more], cwd=folder, check=True, timeout=900)
+    subprocess.run([sys.executable, "-m", "lapwing", *words, *more], cwd=folder, check=True, timeout=900)
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("make ")])
@@ -42,6 +42,16 @@ def test_make_targets_exist(command):
 def test_compose_services_exist(command):
     service = command.split()[-1]
     assert re.search(rf"^  {service}:$", (ROOT / "docker-compose.yml").read_text(), flags=re.MULTILINE)
+
+
+def test_the_python_blocks_run_in_order(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    assert blocks
+    names: dict = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), names)
+    assert (folder / "flight.html").stat().st_size > 10_000
 
 
 def test_links_and_pictures_lead_somewhere():

@@ -3,6 +3,8 @@
 The file `body_drag.py` is the effect `body_drag`; it has a parameter NamedTuple `BodyDrag` and registers hooks for it
 (see `_hooks`). Its parameters are the keys of the scene's table, checked against the annotations, unless the class has
 `from_scene(table, airframe)`. A module constant `KIND` names what only one active effect may be.
+
+An effect of the user's own is such a file elsewhere, which Python finds; the scene's table names it with `module`.
 """
 
 import importlib
@@ -11,6 +13,7 @@ from collections.abc import Mapping
 from types import ModuleType
 
 from dynamics.effects._scene import checked
+from dynamics.errors import KeyedError
 from dynamics.vehicles.airframe import Airframe
 
 __all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
@@ -21,36 +24,55 @@ def names() -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
 
 
-def get(name: str) -> ModuleType:
-    """The module of an effect; ValueError that lists the choices if there is none."""
+def get(name: str, module: str | None = None) -> ModuleType:
+    """The module of an effect; KeyedError that lists the choices if there is none.
+
+    Args:
+        name: of the effect.
+        module: name of a module that Python finds, of an effect that is none of this folder.
+    """
+    if module is not None:
+        if name in names():
+            raise KeyedError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
+        return importlib.import_module(module)
     if name not in names():
-        raise ValueError(f"unknown effect {name!r}: choose from {', '.join(names())}")
+        raise KeyedError.unknown(f"effects.{name}", "effect", name, names())
     return importlib.import_module(f"{__name__}.{name}")
 
 
-def parameter_class(name: str) -> type:
-    """The parameter NamedTuple of an effect: `BodyDrag` for `body_drag`."""
-    return getattr(get(name), "".join(word.capitalize() for word in name.split("_")))
+def class_name(name: str) -> str:
+    """What the parameter NamedTuple of an effect is called: "BodyDrag" for "body_drag"."""
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def parameter_class(name: str, module: str | None = None) -> type:
+    """The parameter NamedTuple of an effect; arguments as of `get`."""
+    found, wanted = get(name, module), class_name(name)
+    if not hasattr(found, wanted):
+        raise KeyedError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")
+    return getattr(found, wanted)
 
 
 def from_scene(tables: Mapping[str, Mapping], airframe: Airframe) -> tuple:
     """The active effects of a scene, sorted by name, from the table of each.
 
     Raises:
-        ValueError: one line `effects.<name>.<key>: ...` for an unknown effect, a parameter that is missing, unknown,
-            of the wrong type or out of range, an effect that the vehicle cannot have, or two that exclude each other.
+        KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
+            the wrong type or out of range, an effect that the vehicle cannot have, or two that exclude each other.
     """
     active = []
     kinds: dict[str, str] = {}
     for name in sorted(tables):
-        kind = getattr(get(name), "KIND", name)
+        table = dict(tables[name])
+        module = table.pop("module", None)
+        kind = getattr(get(name, module), "KIND", name)
         if kind in kinds:
-            raise ValueError(f"effects.{name}: excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
+            raise KeyedError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
         kinds[kind] = name
-        cls = parameter_class(name)
+        cls = parameter_class(name, module)
         build = getattr(cls, "from_scene", None)
         try:
-            active.append(build(dict(tables[name]), airframe) if build else checked(cls, tables[name]))
-        except ValueError as error:
-            raise ValueError(f"effects.{name}{error}") from None
+            active.append(build(table, airframe) if build else checked(cls, table))
+        except KeyedError as error:
+            raise error.under(f"effects.{name}") from None
     return tuple(active)

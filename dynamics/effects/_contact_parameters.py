@@ -7,6 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._ground import Ground
 from dynamics.effects._scene import cannot, checked
+from dynamics.errors import KeyedError
 from dynamics.vector import Vec3
 from dynamics.vehicles.airframe import Airframe
 
@@ -18,18 +19,18 @@ Slip = Annotated[float, Ge(1e-6), Le(10)]
 class Settings(NamedTuple):
     """What a scene says."""
 
-    friction: Literal["anchor", "smooth"] = "anchor"
+    friction: Literal["anchor", "smooth"] = "anchor"  # a spring to where the foot stands, or a function of its slip
     stiffness: Stiffness = 1.0e6  # [N/m] of one foot
     damping: Annotated[float, Ge(0), Le(1e6)] = 1.0e3  # [N s/m] of one foot
     transition_width: Annotated[float, Ge(1e-7), Le(0.1)] = 1.0e-4  # [m] depth over which the normal force sets in
-    friction_static: Coefficient = 0.5
-    friction_dynamic: Coefficient = 0.3
+    friction_static: Coefficient = 0.5  # coefficient of a foot that sticks
+    friction_dynamic: Coefficient = 0.3  # coefficient of a foot that slides
     tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
     stick_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
     critical_velocity: Slip = 1.0e-3  # [m/s] slip of the highest friction; friction "smooth"
     slope: tuple[float, float] = (0.0, 0.0)  # rise of the ground along world x and y, tangent of the angle
-    bump_height: Annotated[float, Ge(0), Le(100)] = 0.0  # [m]
-    bump_length: Annotated[float, Ge(0.01), Le(1e4)] = 1.0  # [m]
+    bump_height: Annotated[float, Ge(0), Le(100)] = 0.0  # [m] amplitude of bumps A sin(k x) sin(k y)
+    bump_length: Annotated[float, Ge(0.01), Le(1e4)] = 1.0  # [m] their wavelength 2 pi / k
 
 
 class GroundContact(NamedTuple):
@@ -58,13 +59,14 @@ class GroundContact(NamedTuple):
         """With the airframe's feet and mass."""
         given = checked(Settings, table)
         if given.friction_dynamic > given.friction_static:
-            raise ValueError(f".friction_dynamic: must not exceed friction_static = {given.friction_static}")
+            expected = f"at most friction_static = {given.friction_static}"
+            raise KeyedError("friction_dynamic", f"got {given.friction_dynamic}", expected)
         points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
         feet = points.feet + points.hull
         steep = math.hypot(*given.slope, given.bump_height * 2.0 * math.pi / given.bump_length)
         if steep > 1.0:
             key = "bump_height" if given.bump_height else "slope"
-            raise ValueError(f".{key}: ground steeper than 45 degrees (tangent {steep:.2f}, expected at most 1)")
+            raise KeyedError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
         reach = max(math.hypot(*foot) for foot in feet) * math.sqrt(1.0 + steep**2) + given.bump_height
         a, b = given.slope
         normal_z = 1.0 / math.sqrt(1.0 + a * a + b * b)

@@ -36,16 +36,17 @@ The memory of an effect is a tuple of floats that its parameter class gives with
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import overload
+from numba.core.errors import TypingError
 
-from dynamics.kernel import leaf
+from dynamics.generate import define, generated
+from dynamics.kernel import ByClass, leaf
 from dynamics.vector import add, apply
 
-HOOKS: dict[str, dict[type, Callable]] = {}
+HOOKS: dict[str, ByClass] = {}
 
 
 def _hook(name: str) -> Callable:
-    registered = HOOKS.setdefault(name, {})
+    registered = HOOKS.setdefault(name, ByClass())
 
     def for_type(parameters: type) -> Callable:
         def register(function: Callable) -> Callable:
@@ -89,13 +90,15 @@ def _written_out(
     where it differs; `result` is the expression returned at the end; `default` that if no effect has the hook.
     """
 
-    def function(effects, memory, *rest):
-        raise NotImplementedError("compiled code only")
+    signature = f"{fold}(effects, memory, {arguments})"
 
-    function.__name__ = function.__qualname__ = fold
-
-    def generate(effects: Any) -> Callable:
+    def generate(effects: Any, *_rest: Any) -> Callable:
         active = [(i, e.instance_class) for i, e in enumerate(effects.types)]
+        for effect in effects.types:
+            if not any(effect.instance_class in registered for registered in HOOKS.values()):
+                raise TypingError(
+                    f"effect {effect.instance_class.__name__} has no hook: the module of its hooks is not imported"
+                )
         names: dict[str, Any] = {"add": add, "apply": apply}
         lines: list[str] = []
         members = [f"memory[{i}]" for i, _ in active]
@@ -107,14 +110,9 @@ def _written_out(
         end = default if default and not lines else result
         if end == "memory":
             end = f"({', '.join(members)}{',' if len(members) == 1 else ''})"
-        text = "\n    ".join([f"def {fold}(effects, memory, {arguments}):", *lines, f"return {end}"])
-        exec(text, names)
-        return names[fold]
+        return define(signature, names, *lines, f"return {end}")
 
-    scope = {"generate": generate}
-    exec(f"def typing(effects, memory, {arguments}):\n    return generate(effects)\n", scope)
-    overload(function, jit_options={"forceinline": True})(scope["typing"])
-    return function
+    return generated(signature, generate, f"The effects' `{hook}`, one after the other.", inline=True)
 
 
 def _chain(hook: str, before: str = "") -> Callable:
@@ -217,14 +215,14 @@ all_asleep = _written_out(
 )
 
 
-def without_sleepers(effects, values):
-    """The members of `values`, one for each effect, that belong to effects that never sleep."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload(without_sleepers, jit_options={"forceinline": True})
-def _without_sleepers(effects, values):
+def _without_sleepers(effects: Any, _: Any) -> Callable:
     kept = "".join(f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["asleep"])
-    names: dict[str, Any] = {}
-    exec(f"def without_sleepers(effects, values):\n    return ({kept})\n", names)
-    return names["without_sleepers"]
+    return define("without_sleepers(effects, values)", {}, f"return ({kept})")
+
+
+without_sleepers = generated(
+    "without_sleepers(effects, values)",
+    _without_sleepers,
+    "The members of `values`, one for each effect, that belong to effects that never sleep.",
+    inline=True,
+)

@@ -1,23 +1,9 @@
-"""The same function over every rotor or foot of a vehicle, whatever their number, as straight-line code."""
+"""Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
 
 from numba.extending import overload
 
+from dynamics.generate import INLINE, define
 from dynamics.vector import add
-
-INLINE = {"forceinline": True}
-
-
-def each(function, c, a, b):
-    """(function(c, a[0], b[0]), function(c, a[1], b[1]), ...) for a compiled function and tuples of equal length."""
-    return tuple(function(c, x, y) for x, y in zip(a, b, strict=True))
-
-
-@overload(each, jit_options=INLINE)
-def _each(function, c, a, b):
-    calls = "".join(f"function(c, a[{i}], b[{i}]), " for i in range(len(a)))
-    names: dict = {}
-    exec(f"def each(function, c, a, b):\n    return ({calls})\n", names)
-    return names["each"]
 
 
 def total(a):
@@ -31,9 +17,7 @@ def _total(a):
         half = len(terms) // 2
         return terms[0] if len(terms) == 1 else f"({pairs(terms[:half])} + {pairs(terms[half:])})"
 
-    names: dict = {}
-    exec(f"def total(a):\n    return {pairs([f'a[{i}]' for i in range(len(a))])}\n", names)
-    return names["total"]
+    return define("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
 
 
 def total_wrench(a):
@@ -43,8 +27,5 @@ def total_wrench(a):
 
 @overload(total_wrench, jit_options=INLINE)
 def _total_wrench(a):
-    lines = ["def total_wrench(a):", "    force, torque = a[0]"]
-    lines += [f"    force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
-    names: dict = {"add": add}
-    exec("\n".join([*lines, "    return force, torque"]), names)
-    return names["total_wrench"]
+    lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
+    return define("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")

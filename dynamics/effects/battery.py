@@ -6,8 +6,9 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import gauge, sample, supply
-from dynamics.effects._rotors import each, total
+from dynamics.effects._rotors import total
 from dynamics.effects._scene import cannot, checked
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vehicles.airframe import Airframe
 

@@ -19,6 +19,11 @@ class Gravity(NamedTuple):
 
     acceleration: Annotated[float, Ge(0), Le(30)] = 9.80665  # [m/s^2]
 
+    @property
+    def acceleration_at_home(self) -> float:
+        """[m/s^2] at the world frame's origin."""
+        return self.acceleration
+
 
 @field(Gravity)
 def gravity_field(e, memory):

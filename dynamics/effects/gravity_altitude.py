@@ -22,9 +22,14 @@ class GravityAltitude(NamedTuple):
     acceleration: Annotated[float, Ge(0), Le(30)] = 9.80665  # [m/s^2] at sea level
     home_altitude: Annotated[float, Ge(-500), Le(9000)] = 0.0  # [m] of the world frame's origin above the sea
 
-    def initial_memory(self):
+    @property
+    def acceleration_at_home(self) -> float:
+        """[m/s^2] at the world frame's origin."""
+        return _at(self, 0.0)
+
+    def initial_memory(self) -> tuple[float]:
         """Acceleration at home [m/s^2]."""
-        return (_at(self, 0.0),)
+        return (self.acceleration_at_home,)
 
 
 @leaf

@@ -17,7 +17,7 @@ from dynamics.effects._contact_parameters import (
 from dynamics.effects._feet import above, foot_on, stance_of
 from dynamics.effects._ground import clearance, surface
 from dynamics.effects._hooks import asleep, contact, settle, substeps, wrench
-from dynamics.effects._rotors import each
+from dynamics.generate import each
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, norm, scale, subtract

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from dynamics.effects._hooks import motor
-from dynamics.effects._rotors import each
 from dynamics.effects._scene import checked
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vehicles.airframe import Airframe
 

@@ -7,6 +7,7 @@ from annotated_types import Ge, Gt, Le
 from dynamics.effects._hooks import body, sample
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import MassProperties, body_of
+from dynamics.errors import KeyedError
 from dynamics.vehicles.airframe import Airframe
 
 Length = Annotated[float, Gt(0), Le(10)]
@@ -17,7 +18,7 @@ class Settings(NamedTuple):
 
     release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
     mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
-    size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m]
+    size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m] of the box along body x, y, z
 
 
 class Payload(NamedTuple):
@@ -37,7 +38,7 @@ class Payload(NamedTuple):
         given = checked(Settings, table)
         mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
         if mass >= total:
-            raise ValueError(f".mass: must be below the vehicle's {total} kg, got {mass}")
+            raise KeyedError("mass", f"got {mass}", f"less than the vehicle's {total} kg")
         x, y, z = given.size
         box = (mass * (y * y + z * z) / 12.0, mass * (z * z + x * x) / 12.0, mass * (x * x + y * y) / 12.0)
         inertia = airframe.mass.inertia

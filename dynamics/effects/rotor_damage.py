@@ -5,9 +5,10 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import factors, sample
-from dynamics.effects._rotors import each
 from dynamics.effects._scene import checked
 from dynamics.effects._types import Factors
+from dynamics.errors import KeyedError
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vehicles.airframe import Airframe
 
@@ -38,7 +39,7 @@ class RotorDamage(NamedTuple):
         given = checked(Settings, table)
         count = len(airframe.rotors.position)
         if given.rotor > count:
-            raise ValueError(f".rotor: the vehicle has rotors 1 to {count}, got {given.rotor}")
+            raise KeyedError("rotor", f"got {given.rotor}", f"one of the vehicle's rotors, 1 to {count}")
 
         def only_this(left):
             return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))

@@ -5,8 +5,9 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import wrench_body
-from dynamics.effects._rotors import each, total
+from dynamics.effects._rotors import total
 from dynamics.effects._scene import cannot, checked
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vector import apply_transposed, subtract
 from dynamics.vehicles.airframe import Airframe

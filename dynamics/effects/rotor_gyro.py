@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 from dynamics.effects._hooks import torque
-from dynamics.effects._rotors import each, total
+from dynamics.effects._rotors import total
 from dynamics.effects._scene import checked
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vehicles.airframe import Airframe
 

@@ -4,9 +4,9 @@ import math
 from typing import NamedTuple
 
 from dynamics.effects._hooks import loads
-from dynamics.effects._rotors import each
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import Loads
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vector import subtract
 from dynamics.vehicles.airframe import Airframe

@@ -5,8 +5,8 @@ from typing import Annotated, NamedTuple
 from annotated_types import Gt, Le
 
 from dynamics.effects._hooks import loads
-from dynamics.effects._rotors import each
 from dynamics.effects._types import Loads
+from dynamics.generate import each
 from dynamics.kernel import leaf
 
 KIND = "rotor thrust model"

@@ -24,9 +24,9 @@ class WindRandom(NamedTuple):
 
     mean: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)  # [m/s] world
     sigma: Annotated[float, Ge(0), Le(30)] = 1.0  # [m/s] of each axis
-    area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2]
-    density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3]
-    shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0
+    area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2] S
+    density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
+    shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
 
     def initial_memory(self):
         """No force before the first exchange."""

@@ -7,10 +7,9 @@ A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on th
 higher, and `REQUIRES`, the fields that the state must have.
 """
 
-import importlib
-import pkgutil
 from types import ModuleType
 
+from dynamics import discovery
 from dynamics.integrators._adaptive import adapt
 from dynamics.integrators._march import RATES, march, rate, record, step
 from dynamics.integrators._solve import check_start, not_finite, simulate, solve
@@ -33,11 +32,9 @@ __all__ = [
 
 def names() -> list[str]:
     """Every method's name: its file name."""
-    return sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+    return discovery.names(__name__)
 
 
 def get(name: str) -> ModuleType:
     """The module of a method; ValueError that lists the choices if there is none."""
-    if name not in names():
-        raise ValueError(f"unknown integrator {name!r}: choose one of {', '.join(names())}")
-    return importlib.import_module(f"{__name__}.{name}")
+    return discovery.get(__name__, name, "integrator")

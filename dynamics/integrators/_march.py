@@ -6,14 +6,13 @@ class do.
 
 import sys
 from collections import namedtuple
-from collections.abc import Callable
 
 from numba.extending import overload
 
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.tree import finite, flatten
 
-RATES: dict[type, Callable] = {}
+RATES = ByClass()
 """The compiled `rate(p, t, x)` of a system, by the NamedTuple class of its parameters."""
 
 

@@ -51,7 +51,7 @@ class Loads(NamedTuple):
     gravity_world: Vec3  # [m/s^2]
 
 
-class Motion(NamedTuple):
+class Accelerations(NamedTuple):
     """Accelerations, and the reactions between chassis and propellers."""
 
     acceleration_world: Vec3  # of the chassis' centre of mass [m/s^2]
@@ -178,7 +178,7 @@ def motion(d, loads, x):
     s = eliminate(core, _propellers(d, x, loads, g))
     held, spins = beside(d.held), beside(d.spins)
     spin = held * (s.spin + (1.0 - spins) * beside(loads.drive))
-    return Motion(
+    return Accelerations(
         apply(R, s.acceleration),
         s.angular_acceleration,
         apart(spin),

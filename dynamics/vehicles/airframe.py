@@ -2,12 +2,14 @@
 
 import math
 import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from dynamics.errors import KeyedError
+from dynamics.validation import fault
 
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
@@ -29,14 +31,14 @@ class Mass(Section):
     inertia: PositiveTriple  # [kg m^2]
 
     @model_validator(mode="after")
-    def _physical(self):
+    def _physical(self) -> "Mass":
         a, b, c = sorted(self.inertia)
         if a + b < c:
-            raise ValueError(
-                f"inertia {self.inertia} breaks the triangle inequality: the largest exceeds the others' sum"
+            raise KeyedError(
+                "inertia", f"got {list(self.inertia)}", "none above the sum of the others (triangle inequality)"
             )
         if self.payload >= self.total:
-            raise ValueError("payload must be below total")
+            raise KeyedError("payload", f"got {self.payload:g}", f"less than total = {self.total:g} kg")
         return self
 
 
@@ -50,38 +52,39 @@ class RotorPlacement(Section):
     blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
 
     @model_validator(mode="after")
-    def _one_sign_each(self):
+    def _one_sign_each(self) -> "RotorPlacement":
         if len(self.yaw_sign) != len(self.position) or any(abs(s) != 1 for s in self.yaw_sign):
-            raise ValueError(f"yaw_sign must hold +1 or -1 for each of the {len(self.position)} rotors")
+            expected = f"+1 or -1 for each of the {len(self.position)} rotors"
+            raise KeyedError("yaw_sign", f"got {list(self.yaw_sign)}", expected)
         return self
 
 
 class Propeller(Section):
     """Geometry and blade-element constants of theory.md, eq. (1.9) to (1.11)."""
 
-    diameter: Positive  # [m]
-    pitch: Positive  # [m]
-    blades: Annotated[int, Gt(0)]
-    aspect_ratio: Positive
-    downwash_factor: Annotated[float, Gt(0), Le(1)]
-    lift_correction: Annotated[float, Gt(0), Le(1)]
-    radius_weight: Annotated[float, Gt(0), Le(1)]
-    oswald_factor: Annotated[float, Gt(0), Le(1)]
-    zero_lift_drag: NotNegative
-    zero_lift_angle: float  # [rad]
-    lift_slope: Positive  # [1/rad]
+    diameter: Positive  # [m] D
+    pitch: Positive  # [m] way of a turn without slip
+    blades: Annotated[int, Gt(0)]  # how many
+    aspect_ratio: Positive  # A, of the blades
+    downwash_factor: Annotated[float, Gt(0), Le(1)]  # epsilon
+    lift_correction: Annotated[float, Gt(0), Le(1)]  # lambda
+    radius_weight: Annotated[float, Gt(0), Le(1)]  # zeta, of the section taken for the blade, over the radius
+    oswald_factor: Annotated[float, Gt(0), Le(1)]  # e
+    zero_lift_drag: NotNegative  # C_fD
+    zero_lift_angle: float  # [rad] alpha_0
+    lift_slope: Positive  # [1/rad] K_0
 
 
 class Motor(Section):
     """Brushless motor, belt and speed controller."""
 
-    speed_constant: Positive  # [rpm/V] of the motor shaft (deliberately not SI: how motors are sold)
+    speed_constant: Positive  # [rpm/V] KV of the motor shaft (deliberately not SI: how motors are sold)
     belt_ratio: Positive  # propeller speed over motor speed
-    idle_current: NotNegative  # [A]
-    resistance: Positive  # [ohm]
-    time_constant: Positive  # [s]
-    max_voltage: Positive  # [V]
-    esc_current: Positive  # [A]
+    idle_current: NotNegative  # [A] I_0, without load
+    resistance: Positive  # [ohm] of the winding
+    time_constant: Positive  # [s] of rotor speed after a step of voltage
+    max_voltage: Positive  # [V] that the controller can ask for
+    esc_current: Positive  # [A] limit of the speed controller
 
     @property
     def rotor_constant(self) -> float:
@@ -92,7 +95,7 @@ class Motor(Section):
 class Battery(Section):
     """Lithium-polymer battery."""
 
-    cells: Annotated[int, Gt(0)]
+    cells: Annotated[int, Gt(0)]  # in series
     capacity: Positive  # [A s]
     discharge_rate: Positive  # [1/h] highest current over capacity in A h
     cell_resistance: NotNegative  # [ohm] of one cell
@@ -115,13 +118,13 @@ class PublishedFigure(Section):
     """A figure from the literature, and why the one computed here may differ."""
 
     value: Positive  # in SI units
-    reason: str = ""
+    reason: str = ""  # why the one computed here may differ
 
 
 class Published(Section):
     """What others state of this vehicle; nothing computes with it."""
 
-    source: str
+    source: str  # where the figures are from
     hover_time: PublishedFigure | None = None  # [s]
     highest_payload: PublishedFigure | None = None  # [kg]
     longest_range: PublishedFigure | None = None  # [m]
@@ -143,21 +146,6 @@ class Airframe(Section):
     published: Published | None = None
 
 
-def one_line(error: ValidationError, where: str, choices: Iterable[str] = ()) -> str:
-    """The first fault that pydantic found, as one line: where, the key, what is wrong, and what stood there.
-
-    `choices` are the keys that there are, for the message about an unknown one.
-    """
-    fault = error.errors()[0]
-    key = ".".join([where, *map(str, fault["loc"])]) if fault["loc"] else where
-    if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        return f"{key}: unknown key" + (f"; expected one of {', '.join(choices)}" if choices else "")
-    message = fault["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    given = "" if fault["type"] in ("missing", "value_error") else f", got {fault['input']!r}"
-    return f"{key}: {message[0].lower()}{message[1:]}{given}{more}"
-
-
 def load_airframe(path: str | Path) -> Airframe:
     """Read an airframe from a TOML file.
 
@@ -166,17 +154,10 @@ def load_airframe(path: str | Path) -> Airframe:
     """
     path = Path(path)
     try:
-        table = tomllib.loads(path.read_text())
+        return Airframe.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        raise ValueError(f"{path}: {fault(error, Airframe)}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not valid TOML: {error}") from None
-    return airframe_from_table(table, str(path))
-
-
-def airframe_from_table(table: dict, where: str = "airframe") -> Airframe:
-    """The airframe of a parsed TOML table; `where` opens the message of a ValueError."""
-    try:
-        return Airframe.model_validate(table)
-    except ValidationError as error:
-        raise ValueError(one_line(error, where)) from None

@@ -8,10 +8,10 @@ The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which gives the
 import math
 from typing import NamedTuple
 
+from dynamics.generate import each_index
 from dynamics.integrators import RATES
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import Quaternion, exp
-from dynamics.unrolled import each
 from dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
 from dynamics.vehicles.beer_places import CORNERS, ROLLERS, SIDES, Y, contacts, frames
 
@@ -122,9 +122,9 @@ def rate(p, t, x):
         acceleration,
         angular,
         (x.door[1], door_acceleration(p, t, x, f, found.door)),
-        each(_bristle_rate, x.on_rollers, found.rollers),
-        each(_bristle_rate, x.on_door, found.door),
-        each(_bristle_rate, x.on_ground, found.ground),
+        each_index(_bristle_rate, x.on_rollers, found.rollers),
+        each_index(_bristle_rate, x.on_door, found.door),
+        each_index(_bristle_rate, x.on_ground, found.ground),
     )
 
 
@@ -158,7 +158,7 @@ def _force(touches, i):
 def forces_on_pack(p, t, x):
     """World forces [N]: (at the ten places on rollers and hinge, of the door, of the ground, of the walls)."""
     found = contacts(p, t, x)
-    rollers = each(_force, x.on_rollers, found.rollers)
+    rollers = each_index(_force, x.on_rollers, found.rollers)
     return rollers, _wrench(found.door, x)[0], _wrench(found.ground, x)[0], _wrench(found.walls, x)[0]
 
 

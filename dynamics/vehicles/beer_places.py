@@ -6,9 +6,9 @@
 import math
 from typing import NamedTuple
 
+from dynamics.generate import each_index
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.unrolled import each
 from dynamics.vector import Vec3, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 from dynamics.vehicles.beer_contact import Touch, touch
 
@@ -147,8 +147,8 @@ def contacts(p, t, x):
     """All contacts of the pack at time t."""
     f = frames(p, t, x)
     return Contacts(
-        each(roller_touch, x.on_rollers, p, x, f),
-        each(door_touch, x.on_door, p, x, f),
-        each(ground_touch, x.on_ground, p, x, f),
-        each(wall_touch, x.on_ground, p, x, f),
+        each_index(roller_touch, x.on_rollers, p, x, f),
+        each_index(door_touch, x.on_door, p, x, f),
+        each_index(ground_touch, x.on_ground, p, x, f),
+        each_index(wall_touch, x.on_ground, p, x, f),
     )

@@ -5,8 +5,8 @@ Pure: (p, t, x) -> LiftCommand, for the control service and the closed loop alik
 
 from typing import NamedTuple
 
+from dynamics.generate import each_index
 from dynamics.kernel import kernel
-from dynamics.unrolled import each
 from dynamics.vector import Vec3, add
 from dynamics.vehicles import cooperative_forces as forces
 from dynamics.vehicles import cooperative_load as formation
@@ -32,13 +32,13 @@ def formation_control(p, t, x):
     """Thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
     wanted, slope = forces.wanted_specific(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, wanted, slope)
-    thrust = each(forces.quad_thrust, x.link, p, x, wanted, slope, s, s_rate)
+    thrust = each_index(forces.quad_thrust, x.link, p, x, wanted, slope, s, s_rate)
     # these thrusts give the accelerations, and those the rates of the wanted forces
-    force = each(formation.thrust_world, x.link, x, thrust)
+    force = each_index(formation.thrust_world, x.link, x, thrust)
     specific = load_acceleration(p, x, force)
     wanted, slope = forces.wanted_specific(p, t, x, add(specific, (0.0, 0.0, -p.gravity)))
     s, s_rate = forces.shares(p, x, wanted, slope)
-    return LiftCommand(thrust, each(forces.quad_moment, x.link, p, x, wanted, slope, s, s_rate, force, specific))
+    return LiftCommand(thrust, each_index(forces.quad_moment, x.link, p, x, wanted, slope, s, s_rate, force, specific))
 
 
 COMMANDS[FormationControl] = formation_control

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
+from dynamics.generate import each_index
 from dynamics.integrators import RATES
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import Quaternion, rotation_matrix
 from dynamics.lie.ts2 import Swing, tangent
-from dynamics.unrolled import each
 from dynamics.vector import Mat3, Vec3, add, apply, cross, divide, dot, multiply, scale, subtract
 
 
@@ -59,7 +59,7 @@ class CooperativeLoadState(NamedTuple):
     link: tuple[Swing, ...]  # direction from quadrotor to load, angular velocity [rad/s]
 
 
-COMMANDS: dict[type, Any] = {}
+COMMANDS = ByClass()
 """The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
 
 
@@ -143,14 +143,14 @@ def _body_rate(p, x, given, i):
 def rate(p, t, x):
     """Tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
     given = command(p, t, x)
-    force = each(thrust_world, x.link, x, given.thrust)
+    force = each_index(thrust_world, x.link, x, given.thrust)
     specific = load_acceleration(p, x, force)
     return CooperativeLoadState(
         x.load_velocity,
         add(specific, (0.0, 0.0, -p.gravity)),
         x.omega_body,
-        each(_body_rate, x.link, p, x, given),
-        each(_link_rate, x.link, p, x, force, specific),
+        each_index(_body_rate, x.link, p, x, given),
+        each_index(_link_rate, x.link, p, x, force, specific),
     )
 
 

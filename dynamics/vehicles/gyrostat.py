@@ -11,7 +11,7 @@ from dynamics.integrators import RATES
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import Quaternion, conjugate, log, multiply
 from dynamics.vector import Vec3, add, cross, scale
-from dynamics.vector import multiply as each
+from dynamics.vector import multiply as multiply_each
 from dynamics.vehicles.rigid_body import RigidBody
 
 
@@ -52,14 +52,14 @@ def rate(p, t, x):
     o = x.omega_body
     h, h_rate = rotor_momentum(p, t)
     missing = (p.desired_rate - o[0], p.desired_rate - o[1], p.desired_rate - o[2])
-    feedback = each(missing, add(p.linear_gain, each(p.cubic_gain, each(missing, missing))))
-    torque = add(cross(add(each(p.inertia, o), h), o), scale(-1.0, h_rate))
+    feedback = multiply_each(missing, add(p.linear_gain, multiply_each(p.cubic_gain, multiply_each(missing, missing))))
+    torque = add(cross(add(multiply_each(p.inertia, o), h), o), scale(-1.0, h_rate))
     torque = add(torque, (0.0, 0.0, -p.damping * o[2]))
     if p.attitude_gain != 0.0:
         # the controller knows the rotors and takes their torque out
         torque = add(torque, add(attitude_torque(p, x), add(cross(o, h), h_rate)))
     inverse = (1.0 / p.inertia[0], 1.0 / p.inertia[1], 1.0 / p.inertia[2])
-    return RigidBody(o, each(inverse, add(torque, feedback)))
+    return RigidBody(o, multiply_each(inverse, add(torque, feedback)))
 
 
 RATES[GyrostatParameters] = rate

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from dynamics.effects import _hooks as hooks
-from dynamics.effects._rotors import each, total
+from dynamics.effects._rotors import total
 from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
-from dynamics.kernel import kernel, leaf
+from dynamics.generate import each
+from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
 from dynamics.vector import ZERO, Vec3, scale
 from dynamics.vehicles.airframe import Airframe
@@ -63,7 +64,7 @@ class Form(NamedTuple):
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
 
 
-FORMS: dict[type, Form] = {}
+FORMS = ByClass()
 
 
 class MultirotorDrive(NamedTuple):

@@ -8,9 +8,10 @@ from the bodies themselves.
 from typing import Any, NamedTuple
 
 from dynamics.effects import _hooks as hooks
-from dynamics.effects._rotors import each, total, total_wrench
+from dynamics.effects._rotors import total, total_wrench
 from dynamics.effects._types import Motion, PerRotor
 from dynamics.effects.rotor_gyro import RotorGyro
+from dynamics.generate import each
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate_back
 from dynamics.multibody import five_bodies, hold

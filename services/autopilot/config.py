@@ -1,16 +1,21 @@
 """The `[autopilot]` of a scene: gains, what the controller flies on, and the attitude loop."""
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from services import parameters
-from services.autopilot.gains import GainSet, load
-from services.parameter_file import read
-from services.scene import Scene, Section
-from services.sections import airframe
+from cosim.scene import Files, Scene, Section
+from cosim.scene.files import laid_over
+from dynamics.errors import KeyedError
+from services.autopilot.gains import FOLDER, GainSet
+from services.common import parameters, user_code
+from services.common.parameter_file import parse
+from services.common.sections import airframe, named
 
+ESTIMATORS = ("sensors", "truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
+
+Option = bool | int | float | str | list[float]
 
 
 class Autopilot(Section):
@@ -18,40 +23,50 @@ class Autopilot(Section):
 
     TABLE: ClassVar[str] = "autopilot"
     OPTIONAL: ClassVar[bool] = True
-    gains: str = "tuned"  # a gain set of services/autopilot/gains, or the path of a .toml file beside the scene
-    estimator: Literal["sensors", "truth"] = "sensors"
+    gains: str = "tuned"  # one that ships or lies in gains/ beside the scene, or the path of a .toml file
+    estimator: str = "sensors"  # the Kalman filter; "truth": the true state; or "module:Name" of one of the user's own
+    estimator_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
     attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
+    controller: str | None = None  # "module:Name" of one of the user's own, in the place of the cascaded PID
+    controller_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
     operator: bool = False  # whether commands from outside are listened to
     trajectory: bool = True  # follow the scene's [trajectory]; false: stand disarmed and wait for commands
-    parameters: dict[str, float] | str = Field(default_factory=dict)  # by name, or a file of them beside the scene
+    parameters: dict[str, float] = Field(default_factory=dict)  # by name; a scene may name a file of them instead
 
-    def gain_set(self, scene: Scene) -> GainSet:
-        """The gain set that the scene names; ValueError if there is none."""
-        name = str(scene.path.parent / self.gains) if self.gains.endswith(".toml") else self.gains
-        return load(name)
-
-    def given_parameters(self, scene: Scene) -> dict[str, float]:
-        """The values that the scene sets; ValueError if its file of them cannot be read."""
-        given = self.parameters
-        return read(scene.path.parent / given) if isinstance(given, str) else given
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The gain set becomes the table `gains`, a file of parameters their values."""
+        if isinstance(name := named(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
+            path = files.find("autopilot.gains", "gain set", name, "gains", FOLDER)
+            content = files.toml(GainSet.TABLE, "autopilot.gains", path)
+            tree[GainSet.TABLE] = laid_over(content, tree.get(GainSet.TABLE, {}))
+        for key in ("controller", "estimator"):
+            code, where = named(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
+            if key == "estimator" and isinstance(code, str) and ":" not in code:
+                if code not in ESTIMATORS:
+                    raise KeyedError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
+            elif isinstance(code, str):
+                user_code.embed(tree, files, where, user_code.parted(where, code)[0])
+        if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
+            path = files.folder / file
+            text = files.text("autopilot.parameters", "autopilot.parameters", path)
+            tree[cls.TABLE]["parameters"] = parse(text, path)
 
     def check(self, scene: Scene) -> None:
-        """The gain set is there, the vehicle suits the controller, and the sensors that it needs are carried."""
-        try:
-            self.gain_set(scene)
-        except ValueError as error:
-            raise ValueError(f"gains: {error}") from None
-        try:
-            parameters.table(scene)
-        except ValueError as error:
-            raise ValueError(f"parameters: {error}") from None
+        """The parameters are sound, the vehicle suits the controller, and the sensors that it needs are carried."""
+        parameters.table(scene)
         if not self.trajectory and not self.operator:
-            raise ValueError("trajectory: false leaves nobody to say what to fly; set operator = true too")
+            message = "false leaves nobody to say what to fly; set operator = true too"
+            raise KeyedError("autopilot.trajectory", message)
         if (n := len(airframe(scene).rotors.position)) != 4:
-            raise ValueError(f"gains: the controller flies vehicles of 4 rotors, this airframe has {n}")
+            raise KeyedError(
+                "vehicle.airframe", f"got one of {n} rotors", "a vehicle of 4 rotors, which the autopilot flies"
+            )
+        for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
+            if unused and getattr(self, f"{key}_options"):
+                message = "nobody to take them"
+                raise KeyedError(f"autopilot.{key}_options", message, f'autopilot.{key} = "module:Name" too')
         if self.estimator == "sensors":
-            missing = [name for name in NEEDED if name not in scene.tables("sensors")]
+            missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
-                raise ValueError(
-                    f'estimator: "sensors" needs {", ".join(f"[sensors.{n}]" for n in missing)}, or say "truth"'
-                )
+                raise KeyedError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')

@@ -1,19 +1,16 @@
 """Gain sets: one TOML file each in `gains/`, or anywhere by its path; validated, then put on an airframe."""
 
-import math
 import tomllib
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, ClassVar
 
 from annotated_types import Gt, Lt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
-from dynamics.vector import Vec3
-from services.autopilot.control import Parameters
-from services.autopilot.interface import Four
-from services.autopilot.motor import Motor, thrust_at
-from services.autopilot.pid import Pid
-from services.autopilot.reference import Smoothing
+from cosim.scene import Section
+from dynamics.errors import KeyedError
+from dynamics.validation import fault
+from services.autopilot.law import Gains
 
 FOLDER = Path(__file__).parent / "gains"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -21,39 +18,30 @@ Positive = Annotated[Finite, Gt(0.0)]
 Triple = tuple[Finite, Finite, Finite]  # P, I, D
 
 
-class GainSet(BaseModel):
+class GainSet(Section):
     """A gain set as its file writes it: P, I, D of each loop; outputs of lift, yaw and the inner loops are the force
     quota of every rotor [N], those of the outer loops are tilts [rad]."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    TABLE: ClassVar[str] = "gains"
+    OPTIONAL: ClassVar[bool] = True
+    FROM_FILE: ClassVar[bool] = True
+    model_config = ConfigDict(strict=False)
 
-    description: str
-    lift: Triple  # over [m]
-    yaw: Triple  # over [rad]
-    roll_inner: Triple  # over [rad] of tilt to the left, which is minus the roll: negative
-    pitch_inner: Triple  # over [rad]
-    roll_outer: Triple  # over [m]
-    pitch_outer: Triple  # over [m]
-    tilt_limit: Annotated[Positive, Lt(1.4)]  # [rad]
-    reference_bandwidth: Positive  # of the tilt references' filter [rad/s]
-    reference_damping: Positive
+    description: str  # one line
+    lift: Triple  # [N/m], [N/(m s)], [N s/m] altitude
+    yaw: Triple  # [N/rad], [N/(rad s)], [N s/rad] heading
+    roll_inner: Triple  # [N/rad], [N/(rad s)], [N s/rad] of tilt to the left, minus the roll: negative
+    pitch_inner: Triple  # [N/rad], [N/(rad s)], [N s/rad] pitch
+    roll_outer: Triple  # [rad/m], [rad/(m s)], [rad s/m] position along y
+    pitch_outer: Triple  # [rad/m], [rad/(m s)], [rad s/m] position along x
+    tilt_limit: Annotated[Positive, Lt(1.4)]  # [rad] largest roll and pitch reference
+    reference_bandwidth: Positive  # [rad/s] of the tilt references' filter
+    reference_damping: Positive  # ratio, of the tilt references' filter
     feed_forward: bool  # weight, tilt, setpoint acceleration, and the torque that the tilt references need
 
-
-class Airframe(NamedTuple):
-    """What the controller knows of the vehicle."""
-
-    mass: float  # [kg]
-    inertia_body: Vec3  # principal [kg m^2]
-    rotor_x: Four  # positions of the rotors in body axes [m]
-    rotor_y: Four
-    yaw_sign: Four  # +1 where thrust turns the vehicle to the left
-    torque_per_thrust: float  # reaction torque of a rotor over its thrust [m]
-    motor: Motor
-    voltage_max: float  # [V]
-    resting_height: float  # world z of the vehicle's origin when it stands [m]
-    gravity: float = 9.80665  # [m/s^2]
-    yaw_lead: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
+    def plain(self) -> Gains:
+        """The numbers."""
+        return Gains(*(getattr(self, name) for name in Gains._fields))
 
 
 def names() -> list[str]:
@@ -68,62 +56,12 @@ def load(name: str) -> GainSet:
     """
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if path.parent == FOLDER and path.stem not in names():
-        raise ValueError(
-            f"unknown gain set {name!r}; choose one of {', '.join(names())}, or give the path of a .toml file"
-        )
+        raise KeyedError.unknown("", "gain set", name, names())
     try:
         return GainSet.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
-        raise ValueError(f"gain set {path}: cannot be read ({error.strerror})") from None
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        raise ValueError(f"gain set {path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise ValueError(f"{path}: {fault(error, GainSet)}") from None
     except ValueError as error:  # TOML or UTF-8
-        raise ValueError(f"gain set {path}: not valid TOML: {error}") from None
-
-
-def build(gains: GainSet, airframe: Airframe, geometric: bool = False) -> Parameters:
-    """The controller's parameters: the gain set on an airframe; `geometric` takes the attitude error on SO(3).
-
-    Raises ValueError where the airframe cannot hover.
-    """
-    thrust_max = thrust_at(airframe.motor, airframe.voltage_max)
-    weight = 0.25 * airframe.mass * airframe.gravity
-    if thrust_max <= weight:
-        raise ValueError(
-            f"the rotors give at most {thrust_max:.1f} N each, less than the {weight:.1f} N that hovering needs"
-        )
-    arms = (_mean_size(airframe.rotor_y), _mean_size(airframe.rotor_x), airframe.torque_per_thrust)
-    forward = 1.0 if gains.feed_forward else 0.0
-    x, y, z = (forward * i / (4.0 * arm) for i, arm in zip(airframe.inertia_body, arms, strict=True))
-    return Parameters(
-        lift=Pid(*gains.lift),
-        yaw=Pid(*gains.yaw),
-        roll_inner=Pid(*gains.roll_inner),
-        pitch_inner=Pid(*gains.pitch_inner),
-        roll_outer=Pid(*gains.roll_outer),
-        pitch_outer=Pid(*gains.pitch_outer),
-        smoothing=Smoothing(gains.reference_bandwidth, gains.reference_damping, forward * airframe.motor.time_constant),
-        tilt_limit=gains.tilt_limit,
-        weight_quota=forward * weight,
-        gravity=airframe.gravity,
-        torque_quotas=(x, y, z),
-        geometric=geometric,
-        signs=_signs(airframe),
-        thrust_max=thrust_max,
-        motor=airframe.motor,
-        resting_height=airframe.resting_height,
-    )
-
-
-def _mean_size(values: Four) -> float:
-    return sum(abs(v) for v in values) / 4.0
-
-
-def _signs(airframe: Airframe) -> tuple[Vec3, Vec3, Vec3, Vec3]:
-    # Thrust at (x, y) turns the body by (y, -x) times the thrust: theory.md, eq. (4.20).
-    a, b, c, d = (
-        (math.copysign(1.0, y), -math.copysign(1.0, x), math.copysign(1.0, turn))
-        for x, y, turn in zip(airframe.rotor_x, airframe.rotor_y, airframe.yaw_sign, strict=True)
-    )
-    return a, b, c, d
+        raise ValueError(f"{path}: not valid TOML: {error}") from None

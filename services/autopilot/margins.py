@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from services.autopilot.control import Parameters
-from services.autopilot.gains import Airframe
+from services.autopilot.law import Airframe
 from services.autopilot.pid import Pid
 
 FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 250 Hz

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
-from services.autopilot.gains import Airframe
 from services.autopilot.interface import Four
+from services.autopilot.law import Airframe
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
 LOST = 0.3  # share of its thrust that a rotor must lack

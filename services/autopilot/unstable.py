@@ -2,12 +2,13 @@
 
 import math
 
+from cosim.scene import Scene
 from services.autopilot.config import Autopilot
-from services.autopilot.gains import build
+from services.autopilot.gains import GainSet
+from services.autopilot.law import build
 from services.autopilot.margins import excess, open_loops
-from services.autopilot.service import known_airframe
-from services.scene import Scene
-from services.sections import Exchange
+from services.autopilot.resolve import known_airframe
+from services.common.sections import Exchange
 
 MODELS = ("reduced", "multibody")  # of vehicles whose hover the margins are for
 
@@ -16,8 +17,10 @@ def unstable_loops(scene: Scene) -> list[str]:
     """A line for each loop of the scene's autopilot that is unstable about hover, with how far; empty if none is."""
     if not scene.has(Autopilot) or scene.lookup("vehicle.model") not in MODELS or not known_airframe(scene).gravity:
         return []
+    if scene[Autopilot].controller is not None:
+        return []  # whose loops are not known
     config, exchange, airframe = scene[Autopilot], scene[Exchange], known_airframe(scene)
-    p = build(config.gain_set(scene), airframe)
+    p = build(scene[GainSet].plain(), airframe)
     loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)
     found = {name: excess(response) for name, response in loops.items()}
     return [f"gains {config.gains}: {name}: unstable{_by(factor)}" for name, factor in found.items() if factor != 1.0]

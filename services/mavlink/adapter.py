@@ -1,38 +1,37 @@
-"""The adapter without its sockets: bytes of clients and messages of the vehicle in, bytes and commands out."""
+"""The adapter without its sockets: bytes of endpoints and messages of the vehicle in, bytes and commands out."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from messages import OperatorInput, header
 from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS, Topic
+from services.mavlink.announcements import Announcements
 from services.mavlink.channel import Channel, Signature
-from services.mavlink.client import Client
 from services.mavlink.clock import Clock, Instant
-from services.mavlink.dialect import id_of, mavlink
-from services.mavlink.missions import Missions
-from services.mavlink.parameters import Parameters
-from services.mavlink.protocols import HANDLERS
-from services.mavlink.requests import Requests
-from services.mavlink.telemetry import STREAMS
-from services.mavlink.vehicle import COMPONENT, Vehicle
-from services.parameters import Parameter
+from services.mavlink.command_queue import CommandQueue
+from services.mavlink.dialect import mavlink
+from services.mavlink.endpoint import Endpoint
+from services.mavlink.mission_store import MissionStore
+from services.mavlink.parameter_store import ParameterStore
+from services.mavlink.protocols import handlers
+from services.mavlink.session import Session
+from services.mavlink.vehicle import VehicleDescription
+from services.mavlink.view import VehicleView
 
 SECOND = 1_000_000_000
-FRESH = 3.5  # [s] after its last heartbeat a ground station counts as gone
+LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as gone
+COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for everybody
-TEXT = 50  # bytes of a STATUSTEXT
-NONE = 0xFFFF
-_NOTHING = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
+_EMPTY = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
 
 
 class Adapter:
-    """One vehicle and its partners."""
+    """One vehicle and the endpoints that are connected to it."""
 
     def __init__(
         self,
-        vehicle: Vehicle,
-        parameters: Sequence[Parameter],
+        description: VehicleDescription,
         operate: Callable[[Any], None] | None,
         key: bytes | None = None,
         insecure: bool = False,
@@ -40,66 +39,77 @@ class Adapter:
         """An adapter that nobody has connected to.
 
         Args:
-            vehicle: what it speaks for.
-            parameters: what can be tuned, with the scene's values.
+            description: the vehicle that it speaks for.
             operate: hands an OperatorCommand to the autopilot; None for a recorded flight.
             key: signs what is sent, and refuses what is not signed with it.
             insecure: commands are taken from other machines without a key.
         """
-        self.vehicle = vehicle
+        self.vehicle = VehicleView(description)
         self.clock = Clock()
         self.counts: Counter[str] = Counter()
-        self.requests = Requests(self.clock, operate)
-        self.missions = Missions(self.clock, self.requests, vehicle.flavour.HOME_FIRST, self.counts)
-        self.parameters = Parameters(parameters, vehicle.flavour, self.requests, self.counts)
-        self.clients: list[Client] = []
-        self._signature = Signature(key) if key else None
+        self.commands = CommandQueue(self.clock, operate)
+        flavour = self.vehicle.flavour
+        self.missions = MissionStore(
+            self.clock, self.commands, lambda: self.vehicle.datum, flavour.HOME_FIRST, self.counts
+        )
+        self.parameters = ParameterStore(description, flavour, self.commands, self.broadcast, self.counts)
+        self.sessions: dict[Endpoint, Session] = {}
+        self.signature = Signature(key) if key else None
         self._insecure = insecure
-        self._shown: tuple = ()
-        self._home = vehicle.status.home
-        self._reached, self._item = NONE, (0, 0)
-        self._texts = 0
+        self._announcements = Announcements(self.vehicle, self.broadcast)
         self._next_link = 0
 
-    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None]) -> Client:
-        """A new partner; `local`: on this machine, `datagrams`: no frame spans two pieces of its bytes."""
-        channel = Channel(self.vehicle.system, self._signature, datagrams, self.counts)
-        client = Client(channel, local, put)
-        client.plan(self.vehicle)
-        self.clients.append(client)
-        return client
+    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None]) -> Endpoint:
+        """A new endpoint; `local`: on this machine, `datagrams`: no frame spans two pieces of its bytes."""
+        channel = Channel(self.vehicle.description.system, self.signature, datagrams, self.counts)
+        endpoint = Endpoint(channel, local, put)
+        self.sessions[endpoint] = Session(
+            endpoint,
+            self.vehicle,
+            self.clock,
+            self.commands,
+            self.parameters,
+            self.missions,
+            self.counts,
+            self.trusts,
+        )
+        return endpoint
 
-    def disconnect(self, client: Client) -> None:
-        """A partner is gone."""
-        self.clients.remove(client)
-        self.parameters.forget(client)
+    def disconnect(self, endpoint: Endpoint) -> None:
+        """An endpoint is gone."""
+        del self.sessions[endpoint]
+        self.parameters.forget(endpoint)
 
-    def trusts(self, client: Client) -> bool:
+    def trusts(self, endpoint: Endpoint) -> bool:
         """Whether its commands are taken: signed ones always, unsigned ones from this machine."""
-        if self._signature or client.local or self._insecure:
+        if self.signature or endpoint.local or self._insecure:
             return True
         self.counts["command from another machine"] += 1
         return False
 
-    def receive(self, client: Client, data: bytes) -> int:
-        """Bytes have come from a partner; how many sound messages they held."""
+    def receive(self, endpoint: Endpoint, data: bytes) -> int:
+        """Bytes have come from an endpoint; how many sound messages they held."""
         sound = 0
-        for m in client.receive(data):
+        for m in endpoint.decode(data):
             sound += 1
             self.counts["received"] += 1
-            source = m.get_srcSystem(), m.get_srcComponent()
-            target = getattr(m, "target_system", getattr(m, "target", ALL))
-            component = getattr(m, "target_component", ALL)
-            if source == (self.vehicle.system, COMPONENT):
-                self.counts["in our own name"] += 1
-            elif target not in (ALL, self.vehicle.system) or component not in (ALL, COMPONENT):
-                self.counts["for another vehicle"] += 1
-            elif (handler := HANDLERS.get(m.get_msgId())) is None:
-                self.counts["message that we have no use for"] += 1
-            else:
-                client.system, client.component = source
-                handler(self, client, m)
+            self._dispatch(endpoint, m)
         return sound
+
+    def _dispatch(self, endpoint: Endpoint, m: Any) -> None:
+        system = self.vehicle.description.system
+        source = m.get_srcSystem(), m.get_srcComponent()
+        target = getattr(m, "target_system", getattr(m, "target", ALL))
+        component = getattr(m, "target_component", ALL)
+        if source == (system, COMPONENT):
+            self.counts["in our own name"] += 1
+        elif target not in (ALL, system) or component not in (ALL, COMPONENT):
+            self.counts["for another vehicle"] += 1
+        elif (handler := handlers().get(m.get_msgId())) is None:
+            self.counts["message that we have no use for"] += 1
+        else:
+            endpoint.system, endpoint.component = source
+            handler(self.sessions[endpoint], m)
 
     def take(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
         """The vehicle has published a message; an estimate moves time on, and sends what is due.
@@ -111,62 +121,39 @@ class Adapter:
             wall: monotonic wall time [s].
         """
         if topic is OPERATOR:
-            if len(payload) > _NOTHING:
-                ours = {client.name for client in self.clients} if self.requests.taken else ()
+            if len(payload) > _EMPTY:
+                ours = {endpoint.name for endpoint in self.sessions} if self.commands.connected else ()
                 given = topic.message.decode(payload).commands
-                self.missions.overhear([command for command in given if command.source not in ours], ())
+                self.missions.observe([command for command in given if command.source not in ours], ())
             return
-        self.vehicle.view.put(topic, payload)
+        self.vehicle.put(topic, payload)
         if topic is ESTIMATE:
             self.vehicle.time_ns = time_ns
             self.clock.now = Instant(time_ns, wall)
             self._step()
         elif topic is ANSWERS:
-            said = self.vehicle.view.get(ANSWERS)
-            self.requests.take(said.answers)
-            self.missions.overhear((), said.answers)
-            for text in said.text:
-                self.say(text)
+            acknowledgements = self.vehicle.get(ANSWERS)
+            self.commands.acknowledge(acknowledgements.answers)
+            self.missions.observe((), acknowledgements.answers)
+            for text in acknowledgements.text:
+                self._announcements.say(text)
         elif topic is STATUS:
-            self._announce()
+            self._announcements.step()
 
     def tick(self, wall: float) -> None:
         """Wall time goes on, also while the vehicle is silent."""
         self.clock.now = Instant(self.clock.now.time_ns, wall)
 
-    def knows(self, number: int) -> bool:
-        """Whether a message is one that the vehicle sends."""
-        return number in STREAMS
-
-    def build(self, number: int) -> Any:
-        """A message of the telemetry as it would be now, None while there is nothing to say."""
-        return STREAMS[number].build(self.vehicle)
-
-    def send_all(self, name: str) -> None:
-        """Send a message of the telemetry to everybody now."""
-        number = id_of(name)
-        if number is not None and (message := self.build(number)) is not None:
-            for client in self.clients:
-                client.send(message)
-
-    def say(self, text: str) -> None:
-        """Tell the pilots, in pieces where it is long."""
-        grave = self.vehicle.status.failsafe
-        severity = mavlink.MAV_SEVERITY_CRITICAL if grave else mavlink.MAV_SEVERITY_WARNING
-        data = text.encode()
-        number = 0
-        if len(data) > TEXT:
-            self._texts = number = self._texts % NONE + 1
-        for piece, start in enumerate(range(0, len(data), TEXT)):
-            message = mavlink.MAVLink_statustext_message(severity, data[start : start + TEXT], number, piece)
-            for client in self.clients:
-                client.send(message)
+    def broadcast(self, message: Any) -> None:
+        """Send a message to every endpoint."""
+        for endpoint in self.sessions:
+            endpoint.send(message)
 
     def _step(self) -> None:
         built: dict[int, Any] = {}
-        for client in self.clients:
-            client.step(self.vehicle, built)
-        self.requests.step()
+        for endpoint, session in self.sessions.items():
+            session.schedule.send_due(endpoint.send, built)
+        self.commands.step()
         self.missions.step()
         self.parameters.step()
         if self.vehicle.time_ns >= self._next_link:
@@ -175,27 +162,8 @@ class Adapter:
 
     def _keep_link(self) -> None:
         """Tell the autopilot once a simulated second that a ground station is there."""
-        for client in self.clients:
-            if client.heartbeat and self.clock.since(client.heartbeat) < FRESH and self.trusts(client):
-                self.requests.ask("link", client.name)
+        for endpoint in self.sessions:
+            heartbeat = endpoint.last_heartbeat
+            if heartbeat and self.clock.since(heartbeat) < LINK_TIMEOUT and self.trusts(endpoint):
+                self.commands.put("link", endpoint.name)
                 return
-
-    def _announce(self) -> None:
-        """Say at once what clients wait for: another mode, the next item."""
-        s = self.vehicle.status
-        shown = s.mode, s.armed, s.failsafe
-        if shown != self._shown:
-            self._shown = shown
-            self.send_all("HEARTBEAT")
-            self.send_all("EXTENDED_SYS_STATE")
-        if s.home != self._home:
-            self._home = s.home
-            self.send_all("HOME_POSITION")
-        if (s.mission_current, s.mission_state) != self._item:
-            self._item = s.mission_current, s.mission_state
-            self.send_all("MISSION_CURRENT")
-        if s.mission_reached != self._reached:
-            self._reached = s.mission_reached
-            if s.mission_count and s.mission_reached != NONE:
-                for client in self.clients:
-                    client.send(mavlink.MAVLink_mission_item_reached_message(s.mission_reached))

@@ -10,7 +10,7 @@ from typing import Any
 from services.mavlink.dialect import mavlink
 
 _YEAR_2015 = 1420070400  # [s] Unix time from which signatures count, in steps of 10 us
-SHORTEST = 8  # characters of a passphrase
+MIN_PASSPHRASE = 8  # characters of a passphrase
 
 
 def read_key(path: Path) -> bytes:
@@ -23,8 +23,10 @@ def read_key(path: Path) -> bytes:
         text = path.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"--mavlink-key {path}: cannot be read: {getattr(error, 'strerror', 'not a text')}") from None
-    if len(text) < SHORTEST or "\n" in text:
-        raise ValueError(f"--mavlink-key {path}: expected one line with a passphrase of {SHORTEST} or more characters")
+    if len(text) < MIN_PASSPHRASE or "\n" in text:
+        raise ValueError(
+            f"--mavlink-key {path}: expected one line with a passphrase of {MIN_PASSPHRASE} or more characters"
+        )
     return hashlib.sha256(text.encode()).digest()
 
 
@@ -40,7 +42,7 @@ class Signature:
 
 class _Codec(mavlink.MAVLink):
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
-        """As the library, but a forged time stamp does not shut out the partner whose name it bears."""
+        """As the library, but a forged time stamp does not shut out the endpoint whose name it bears."""
         times = self.signing.stream_timestamps
         stream = (msgbuf[-13], srcSystem, srcComponent)
         before = times.get(stream)
@@ -54,7 +56,7 @@ class _Codec(mavlink.MAVLink):
 
 
 class Channel:
-    """Frames of one partner."""
+    """Frames of one endpoint."""
 
     def __init__(self, system: int, signature: Signature | None, datagrams: bool, counts: Counter[str]):
         """A channel that has not spoken yet.

@@ -1,4 +1,4 @@
-"""The two clocks of a link: simulation time, which the vehicle keeps, and wall time, which its partners keep."""
+"""The two clocks of a link: simulation time, which the vehicle keeps, and wall time, which its endpoints keep."""
 
 from typing import NamedTuple
 
@@ -17,9 +17,9 @@ class Clock:
         self.now = Instant()
 
     def since(self, then: Instant) -> float:
-        """Seconds that a partner has had since `then`: by the clock on which fewer have passed.
+        """Seconds that an endpoint has had since `then`: by the clock on which fewer have passed.
 
-        In a slow run the partner waits for the simulation, in a fast one it still needs its own wall time: nobody is
-        late before he is late by both.
+        In a slow run the endpoint waits for the simulation, in a fast one it still needs its own wall time: nothing is
+        late before it is late by both.
         """
         return min((self.now.time_ns - then.time_ns) * 1e-9, self.now.wall - then.wall)

@@ -4,7 +4,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from services.scene import Section
+from cosim.scene import Section
 
 
 class Mavlink(Section):

@@ -1,11 +1,11 @@
-"""The MAVLink dialect: the common messages and the few that ArduPilot's clients need besides."""
+"""The MAVLink dialect: all that pymavlink knows, and what it leaves out."""
 
 from functools import cache
 from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from services.mavlink.extra_messages import mavlink
 
-__all__ = ["id_of", "mavlink", "name_of"]
+__all__ = ["id_of", "mavlink", "message_class", "name_of"]
 
 
 @cache
@@ -22,3 +22,8 @@ def name_of(number: int) -> str | None:
     """Name of a message, None where this dialect lacks it."""
     message: Any = mavlink.mavlink_map.get(number)
     return message.msgname if message else None
+
+
+def message_class(name: str) -> Any:
+    """The class of a message that pymavlink may lack; called with the fields in their order in common.xml."""
+    return mavlink.mavlink_map[_ids()[name]]

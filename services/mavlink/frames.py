@@ -39,8 +39,7 @@ def swap_attitude(q: Quaternion) -> Quaternion:
     w, x, y, z = q
     # (0, s, s, 0) * q * (0, 1, 0, 0), s = sqrt(1/2): C before, D behind
     a, b, c, d = -_S * (x + y), _S * (w + z), _S * (w - z), _S * (y - x)
-    turned = (-b, a, d, -c)
-    return tuple(-e for e in turned) if turned[0] < 0.0 else turned  # type: ignore[return-value]
+    return (b, -a, -d, c) if b > 0.0 else (-b, a, d, -c)
 
 
 def euler(q: Quaternion) -> Vec3:
@@ -51,21 +50,34 @@ def euler(q: Quaternion) -> Vec3:
     return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """The quaternion of roll, pitch, yaw [rad], in whatever frames they join."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
 def compass(angle: float) -> int:
     """Angle from north, to the right [rad] as hundredths of a degree, 0 to 35999; not known: 65535."""
     return round(math.degrees(angle) * 100.0) % 36000 if math.isfinite(angle) else 0xFFFF
 
 
-def whole(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
+def saturated(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
     """The nearest whole number that a field of so many bits holds.
 
     Args:
-        value: in the field's unit; what does not fit is cut off at the limit.
+        value: in the field's unit; saturates at the field's limits.
         bits: width of the field.
         unsigned: whether it has no sign.
-        unknown: what stands for a value that is not finite; None: the greatest.
+        unknown: what stands for a value that is not finite; None: the maximum.
     """
-    least, most = (0, (1 << bits) - 1) if unsigned else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    minimum, maximum = (0, (1 << bits) - 1) if unsigned else (-(1 << bits - 1), (1 << bits - 1) - 1)
     if not math.isfinite(value):
-        return most if unknown is None else unknown
-    return max(least, min(most, round(value)))
+        return maximum if unknown is None else unknown
+    return max(minimum, min(maximum, round(value)))

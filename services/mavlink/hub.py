@@ -1,30 +1,21 @@
-"""An adapter with its sockets: waits for clients and for the vehicle at once, and lets neither starve the other."""
+"""An adapter with its sockets: waits for endpoints and for the vehicle at once, and lets neither starve the other."""
 
 import selectors
 import socket
 import time
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from messages import OperatorInput
 from messages.topics import ESTIMATE, TOPICS, Topic
 from services.mavlink.adapter import Adapter
-from services.mavlink.lateness import Lateness
-from services.mavlink.links import open_link
-from services.mavlink.place import prepare
-from services.mavlink.vehicle import Vehicle
-from services.parameters import Parameter
+from services.mavlink.coordinates import load_kernels
+from services.mavlink.links import Link, open_link
+from services.mavlink.options import Options
+from services.mavlink.pacing import Pacing
+from services.mavlink.vehicle import VehicleDescription
 
 WAIT = 0.05  # [s] at most until something else is looked at
-
-
-class Options(NamedTuple):
-    """How a run is linked to the outside."""
-
-    urls: tuple[str, ...]
-    key: bytes | None = None
-    insecure: bool = False
-    speed: float | None = 1.0  # simulated seconds per second
 
 
 class Hub:
@@ -32,17 +23,15 @@ class Hub:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        description: VehicleDescription,
         options: Options,
-        parameters: Iterable[Parameter],
         operate: Callable[[bytes], None] | None,
     ):
         """Open every link.
 
         Args:
-            vehicle: what flies.
+            description: what flies.
             options: the links, and who may command.
-            parameters: what can be tuned.
             operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
 
         Raises:
@@ -54,16 +43,16 @@ class Hub:
             operate(OperatorInput(commands=(command,)).encode())
 
         operator = put if operate else None
-        self.adapter = Adapter(vehicle, tuple(parameters), operator, options.key, options.insecure)
-        self.lateness = Lateness(options.speed)
-        self._topics = {topic.key(vehicle.name): topic for topic in TOPICS}
+        self.adapter = Adapter(description, operator, options.key, options.insecure)
+        self._pacing = Pacing(options.speed)
+        self._topics = {topic.key(description.name): topic for topic in TOPICS}
         self._selector = selectors.DefaultSelector()
         self._woken, self._wake = socket.socketpair()
         self._woken.setblocking(False)
         self._wake.setblocking(False)
         self._selector.register(self._woken, selectors.EVENT_READ, self._drain)
-        self._links: list = []
-        prepare()
+        self._links: list[Link] = []
+        load_kernels()
         try:
             for url in options.urls:
                 self._links.append(open_link(url, self.adapter, self._selector))
@@ -82,14 +71,14 @@ class Hub:
         self._woken.recv(4096)
 
     def wait(self, seconds: float = WAIT) -> None:
-        """Serve the clients once, as soon as there is something; or until woken, or for so long."""
+        """Serve the endpoints once, as soon as there is something; or until woken, or for so long."""
         ready = self._selector.select(seconds)
         self.adapter.tick(time.monotonic())
         for key, _ in ready:
             key.data()
 
     def replay(self, key: str, time_ns: int, payload: bytes) -> None:
-        """A recorded message of a topic, by its name in the log; serves the clients now and then."""
+        """A recorded message of a topic, by its name in the log; serves the endpoints now and then."""
         topic = self._topics.get(key)
         if topic:
             self.take(topic, time_ns, payload)
@@ -101,14 +90,14 @@ class Hub:
         wall = time.monotonic()
         self.adapter.take(topic, time_ns, payload, wall)
         if topic is ESTIMATE:
-            self.lateness.note(time_ns * 1e-9, wall)
+            self._pacing.note(time_ns * 1e-9, wall)
 
     def report(self) -> Sequence[str]:
         """What there is to tell at the end."""
-        lines = [self.lateness.report()]
+        lines = [self._pacing.report()]
         counts = self.adapter.counts
         if refused := ", ".join(f"{count} {what}" for what, count in sorted(counts.items()) if what != "received"):
-            lines.append(f"clients: {counts['received']} messages received; {refused}")
+            lines.append(f"endpoints: {counts['received']} messages received; {refused}")
         return lines
 
     def close(self) -> None:

@@ -1,64 +1,66 @@
 """The MAVLink link of a run: telemetry to ground stations, their commands to the autopilot.
 
-It takes no part in the lock step: nobody waits for it, and when it dies the flight goes on. What it shows at once it
-subscribes to; all else it reads from the services' journals, which wakes nobody up for a message.
+It takes no part in the lock step: nobody waits for it, and when it dies the flight goes on. In real time it subscribes
+to what it shows at once; all else it reads from the services' batches, which wakes nobody up for a message.
 """
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cosim.bundle import unpack_batch
+from cosim.process import BATCH_KEY, Process
 from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS
-from services.journal import JOURNAL_KEY, entries
-from services.outside import OPERATOR_KEY
-from services.parameters import table
-from services.process import Process
-from services.sections import Exchange
-
-if TYPE_CHECKING:
-    from services.mavlink.hub import Options
+from services.common.operator import OPERATOR_KEY
+from services.mavlink.channel import read_key
+from services.mavlink.hub import Hub
+from services.mavlink.options import Options
 
 AT_ONCE = (ESTIMATE, STATUS, ANSWERS)
 
 
-def run(process: Process, options: "Options", given: Iterable[Any] = ()) -> None:
+def run(process: Process, given: Any) -> None:
     """Serve the links until the flight has ended, or until asked to stop; then say how it went.
-
-    `given` are the commands that the autopilot begins with: it may have taken them before this process is there.
 
     Raises:
         ValueError: a link cannot be opened.
     """
-    # Every service's process imports this file; only this one needs MAVLink.
-    from services.mavlink.hub import Hub
-    from services.mavlink.vehicle import Vehicle
-
-    interval = process.scene[Exchange].interval_ns
-    # A run as fast as it goes is slowed by every message that wakes somebody; the journals come often enough for it.
+    setup = process.setup
+    description = setup.beside.get("mavlink")
+    if description is None:
+        raise ValueError("--mavlink: nobody steers in this scene; expected one with [autopilot]")
+    key = read_key(given.mavlink_key) if given.mavlink_key else None
+    options = Options(given.mavlink, key, given.insecure, process.speed)
+    # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
     at_once = AT_ONCE if process.speed else ()
     topics = {process.key(topic): topic for topic in at_once}
     put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
-    with Hub(Vehicle.of(process.scene), options, table(process.scene).values(), lambda payload: put(payload, 0)) as hub:
-        for command in given:
+    with Hub(description, options, lambda payload: put(payload, 0)) as hub:
+        for command in setup.services["autopilot"].parameters.plan:  # the autopilot begins with it
             hub.adapter.missions.hold(command)
-        arrived = process.bus.subscribe(*topics, f"{process.space}/{JOURNAL_KEY}/*", notify=hub.wake)
+        arrived = process.bus.subscribe(*topics, f"{process.space}/{BATCH_KEY}/*", notify=hub.wake)
         process.join()
         flying = True
         while flying and not process.stopping:
             hub.wait()
             while flying and (news := arrived.get_with_key(timeout=0.0)) is not None:
-                key, time_ns, payload = news
+                name, time_ns, payload = news
                 flying = bool(payload)
-                if topic := topics.get(key):
-                    if flying:
-                        hub.take(topic, time_ns, payload)
-                    continue
-                newest = {}
-                for other, tick, words in entries(payload):
-                    if other is OPERATOR or (other in AT_ONCE and not at_once):  # of these every one counts
-                        hub.take(other, tick * interval, words)
-                    elif other not in AT_ONCE:
-                        newest[other] = tick, words
-                for other, (tick, words) in newest.items():
-                    hub.take(other, tick * interval, words)
+                if flying and name in topics:
+                    hub.take(topics[name], time_ns, payload)
+                elif flying:
+                    _take_batch(hub, payload, at_once, setup.interval_ns)
         for line in hub.report():
             print(line, flush=True)
+
+
+def _take_batch(hub: Hub, payload: bytes, at_once: tuple, interval_ns: int) -> None:
+    """Every command and, where they do not come at once, every status and answer; of all else the newest."""
+    _, pages = unpack_batch(payload)
+    for page in pages:
+        if page.topic is OPERATOR or (page.topic in AT_ONCE and not at_once):
+            chosen = range(len(page.ticks))
+        elif page.topic not in AT_ONCE:
+            chosen = range(len(page.ticks) - 1, len(page.ticks))
+        else:
+            continue
+        for i in chosen:
+            hub.take(page.topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())

@@ -1,71 +1,33 @@
-"""What an adapter tells its partners about: the vehicle's newest words, what it passes for, and what it was told."""
+"""All that the MAVLink link knows of a vehicle before it flies: one frozen value, made from a scene or from a log."""
 
-from types import ModuleType
+from typing import NamedTuple
 
-from messages import Status
-from messages.topics import STATUS
-from services.mavlink import flavours
-from services.mavlink.config import Mavlink
-from services.mavlink.frames import whole
-from services.mavlink.view import HOME, Motion, View
-from services.scene import Scene, recorded_data
-from services.sections import Vehicle as Named
-from services.sections import airframe
-
-COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
-STANDING = Status(landed=True)  # before the vehicle has said anything
+from dynamics.geodesy import Home
+from services.common.parameters import Parameter
 
 
-class Vehicle:
-    """One vehicle on its links."""
+class Battery(NamedTuple):
+    """A battery that is modelled."""
 
-    def __init__(self, name: str, identity: Mavlink, full_voltage: float | None, on_truth: bool):
-        """A vehicle that has said nothing yet.
+    cells: int  # in series
+    capacity: float  # [A s]
+    resistance: float  # [ohm] of all cells
+    charged_voltage: float  # [V] of one full cell without load
+    empty_voltage: float  # [V] of one cell, below which the motors stop
 
-        Args:
-            name: first part of its topics' names.
-            identity: who it says it is.
-            full_voltage: of its motors [V]; None where it is not known.
-            on_truth: nothing is measured, the truth stands for the sensors.
-        """
-        self.name, self.system, self.on_truth = name, identity.system, on_truth
-        self.flavour: ModuleType = flavours.get(identity.flavour)
-        self.full_voltage = full_voltage
-        self.view = View()
-        self.time_ns = 0
-        latitude, longitude, height = HOME
-        self.origin = whole(latitude * 1e7, 32), whole(longitude * 1e7, 32), whole(height * 1e3, 32)
 
-    @classmethod
-    def of(cls, scene: Scene) -> "Vehicle":
-        """The vehicle of a scene that is flown."""
-        engine = airframe(scene).motor
-        voltage = engine.max_voltage if engine else None
-        return cls(scene[Named].name, scene[Mavlink], voltage, not scene.tables("sensors"))
+class VehicleDescription(NamedTuple):
+    """A vehicle as its ground stations are told of it."""
 
-    @classmethod
-    def recorded(cls, text: str) -> "Vehicle":
-        """The vehicle of a scene as a log carries it. Raises ValueError for one that is none."""
-        data = recorded_data(text)
-        identity = Mavlink.model_validate(data.get("mavlink", {}))
-        return cls(data.get("vehicle", {}).get("name", Named().name), identity, None, "sensors" not in data)
-
-    @property
-    def boot_ms(self) -> int:
-        """Time since the start [ms], as fields of 32 bits hold it."""
-        return self.time_ns // 1_000_000 & 0xFFFFFFFF
-
-    @property
-    def boot_us(self) -> int:
-        """Time since the start [us]."""
-        return self.time_ns // 1000
-
-    @property
-    def status(self) -> Status:
-        """What the autopilot is doing."""
-        return self.view.get(STATUS) or STANDING
-
-    @property
-    def motion(self) -> Motion | None:
-        """Where it believes to be."""
-        return self.view.motion()
+    name: str = "drone1"  # first part of its topics' names
+    system: int = 1  # MAVLink system id
+    flavour: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/flavours
+    home: Home = Home()  # origin of the world frame on the Earth
+    standing_height: float = 0.0  # [m] of the body frame's origin above the ground when it stands
+    rotors: int = 4
+    max_voltage: float | None = None  # [V] of its motors, None where they are not modelled
+    battery: Battery | None = None  # None where none is modelled: the motors get what they ask for
+    sensors: tuple[str, ...] = ()  # fitted; none: the vehicle flies on its true state
+    parameters: tuple[Parameter, ...] = ()  # the autopilot's, with the values that it starts with
+    accepts_commands: bool = False  # an operator is listened to
+    tick_ns: int = 4_000_000  # length of a tick of the lock step [ns]

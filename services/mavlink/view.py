@@ -1,23 +1,27 @@
-"""The newest word on everything the vehicle publishes, decoded when somebody asks."""
+"""The newest state of the vehicle: every message that it publishes, decoded when somebody asks."""
 
 from functools import cached_property
 from typing import Any
 
 from dynamics.geodesy import Home, enu_to_geodetic
 from dynamics.vector import Vec3
-from messages import nanoseconds
-from messages.topics import ESTIMATE, TRUTH, Topic
-from services.mavlink.frames import Quaternion, euler, swap_attitude, swap_body, swap_world
+from messages import Status, nanoseconds
+from messages.topics import ESTIMATE, STATUS, TRUTH, Topic
+from services.mavlink import flavours
+from services.mavlink.coordinates import Datum
+from services.mavlink.flight_times import FlightTimes
+from services.mavlink.frames import Quaternion, euler, saturated, swap_attitude, swap_body, swap_world
+from services.mavlink.vehicle import VehicleDescription
 
-HOME = Home()
+ON_GROUND = Status(landed=True)  # before the vehicle has published a status
 
 
-class Motion:
-    """Where the vehicle is and how it moves, as MAVLink says it: NED, FRD, degrees."""
+class NedMotion:
+    """Where the vehicle is and how it moves, in MAVLink's frames: NED, FRD, degrees."""
 
-    def __init__(self, message: Any):
+    def __init__(self, message: Any, home: Home):
         """From a message with pose, velocity and angular velocity: the estimate or the truth."""
-        self.stamp = message.header.stamp
+        self._stamp, self._home = message.header.stamp, home
         p, q, v, w = message.pose.position, message.pose.orientation, message.velocity, message.angular_velocity
         self.position_world: Vec3 = (p.x, p.y, p.z)
         self.position_ned = swap_world(self.position_world)
@@ -27,8 +31,8 @@ class Motion:
 
     @cached_property
     def time_ns(self) -> int:
-        """Simulation time that it holds for."""
-        return nanoseconds(self.stamp)
+        """Simulation time that it holds for [ns]."""
+        return nanoseconds(self._stamp)
 
     @cached_property
     def angles(self) -> Vec3:
@@ -38,41 +42,89 @@ class Motion:
     @cached_property
     def geodetic(self) -> Vec3:
         """Latitude [deg], longitude [deg], altitude [m]."""
-        return enu_to_geodetic(HOME, self.position_world)
+        return enu_to_geodetic(self._home, self.position_world)
 
 
-class View:
-    """Newest message of each topic."""
+class VehicleView:
+    """A vehicle as its links see it: its description, simulation time, and the newest message of each topic."""
 
-    def __init__(self) -> None:
+    def __init__(self, description: VehicleDescription):
+        """A vehicle that has published nothing yet."""
+        self.description = description
+        self.flavour = flavours.get(description.flavour)
+        self.time_ns = 0
+        self.flight = FlightTimes()
+        latitude, longitude, height = description.home
+        # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
+        self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(height * 1e3, 32)
+        self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}
-        self._motions: dict[Topic, Motion] = {}
+        self._motions: dict[Topic, NedMotion] = {}
 
     def put(self, topic: Topic, payload: bytes) -> None:
-        """A newer message of a topic."""
+        """A newer message of a topic, encoded."""
         self._payloads[topic] = payload
         self._decoded.pop(topic, None)
         self._motions.pop(topic, None)
+        if topic is STATUS:
+            self.flight.update(self.status, nanoseconds(self.status.header.stamp))
+        elif topic is ESTIMATE and not self.status.armed and (estimate := self.estimate):
+            self._home_heading = estimate.angles[2]
 
     def get(self, topic: Topic) -> Any:
-        """The newest message, None before the first."""
+        """The newest message of a topic, None before the first."""
         if topic not in self._decoded:
             if topic not in self._payloads:
                 return None
             self._decoded[topic] = topic.message.decode(self._payloads[topic])
         return self._decoded[topic]
 
-    def motion(self, topic: Topic = ESTIMATE) -> Motion | None:
-        """The newest estimate (or TRUTH) in MAVLink's terms."""
+    def _motion(self, topic: Topic) -> NedMotion | None:
         if topic not in self._motions:
             message = self.get(topic)
             if message is None:
                 return None
-            self._motions[topic] = Motion(message)
+            self._motions[topic] = NedMotion(message, self.description.home)
         return self._motions[topic]
 
     @property
-    def truth(self) -> Motion | None:
-        """The newest true state."""
-        return self.motion(TRUTH)
+    def estimate(self) -> NedMotion | None:
+        """Where the autopilot estimates the vehicle to be."""
+        return self._motion(ESTIMATE)
+
+    @property
+    def truth(self) -> NedMotion | None:
+        """Where it is."""
+        return self._motion(TRUTH)
+
+    @property
+    def status(self) -> Status:
+        """What the autopilot is doing."""
+        return self.get(STATUS) or ON_GROUND
+
+    @property
+    def home_world(self) -> Vec3:
+        """Home in the world frame [m]: the body frame's origin where the vehicle stood when it was armed."""
+        x, y, ground = self.status.home
+        return x, y, ground + self.description.standing_height
+
+    @property
+    def home_heading(self) -> float:
+        """Heading [rad] from north, to the right, with which it was armed; before that, its heading now."""
+        return self._home_heading
+
+    @property
+    def datum(self) -> Datum:
+        """What latitudes, longitudes and altitudes of messages count from."""
+        return Datum(self.description.home, self.home_world[2])
+
+    @property
+    def boot_ms(self) -> int:
+        """Time since the start [ms], as fields of 32 bits hold it."""
+        return self.time_ns // 1_000_000 & 0xFFFFFFFF
+
+    @property
+    def boot_us(self) -> int:
+        """Time since the start [us]."""
+        return self.time_ns // 1000

@@ -1,27 +1,33 @@
 """The `[solver]` of a scene: the integrator and its step."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field, field_validator
 
+from cosim.scene import Scene, SceneError, Section, Source
 from dynamics import integrators
-from services.scene import Scene, Section
-from services.sections import Exchange
+from dynamics.errors import KeyedError
+from services.common.sections import Exchange
 
 
 class Solver(Section):
     """How the plant is integrated between two exchanges."""
 
     TABLE: ClassVar[str] = "solver"
-    integrator: str = "rk4_renormalised"
+    integrator: str = "rk4_renormalised"  # a module of dynamics/integrators
     step: float = Field(default=0.001, gt=0.0)  # [s], divides the exchange interval
     accuracy: float | None = Field(default=None, gt=0.0)  # error that step, and integrator unless given, are chosen for
 
     @field_validator("integrator")
     @classmethod
     def _known(cls, name: str) -> str:
-        integrators.get(name)
+        if name not in integrators.names():
+            raise KeyedError.unknown("", "integrator", name, integrators.names())
         return name
+
+    def resolved(self) -> dict[str, Any]:
+        """As of any table; what is still to be chosen is left out."""
+        return self.model_dump(include=self.model_fields_set if self.undecided else None, exclude_none=True)
 
     @property
     def undecided(self) -> bool:
@@ -39,22 +45,20 @@ class Solver(Section):
         interval = scene[Exchange].interval
         n = self.steps(scene[Exchange])
         if n < 1 or abs(n * self.step - interval) > 1e-9 * interval:
-            raise ValueError(
-                f"step: expected a step that divides the exchange interval of {interval:g} s, got {self.step:g} s"
-            )
+            expected = f"a step that divides the exchange interval of {interval:g} s"
+            raise KeyedError("solver.step", f"got {self.step:g} s", expected)
 
 
 def method(scene: Scene) -> tuple[tuple, int, float]:
     """The scene's integrator for compiled code, its steps in an exchange interval, and the length of one [s].
 
     Raises:
-        ValueError: the scene says an accuracy, and nobody has chosen for it.
+        SceneError: the scene says an accuracy, and nobody has chosen for it.
     """
     solver, exchange = scene[Solver], scene[Exchange]
     if solver.undecided:
-        raise ValueError(
-            f"{scene.path}: solver.accuracy: what `lapwing run` chooses for it is to be handed to every service: "
-            "--set solver.integrator=... --set solver.step=..."
-        )
+        chosen = "what `lapwing run` chooses for it is to be handed to every service"
+        message = f"{chosen}: --set solver.integrator=... --set solver.step=..."
+        raise SceneError("solver.accuracy", message, source=Source(scene.path))
     steps = solver.steps(exchange)
     return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

@@ -1,12 +1,122 @@
 """The plant as a service: it owns time, and integrates what the scene's `vehicle.model` names."""
 
-import importlib
+from dataclasses import replace
+from typing import Any
 
-from services.lockstep import Service
-from services.scene import Scene
-from services.sections import Vehicle
+from numba.extending import overload
+
+from cosim.graph import NEVER, Graph, Service
+from cosim.part import Code, Part
+from cosim.schedule import LockStepError
+from cosim.setup import Setup
+from dynamics.cell import Cell, read, write
+from dynamics.effects import _hooks as hooks
+from dynamics.integrators import not_finite
+from dynamics.kernel import kernel
+from dynamics.multibody.five_bodies import FiveBodies
+from dynamics.vehicles import multirotor_euler, multirotor_multibody
+from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorState
+from services.common import ports
+from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
+from services.plant.cores.multirotor import MultirotorPlantState
+from services.plant.setup import PlantEvent, PlantSetup
+from services.plant.wire import wires
+
+NAME = "plant"
 
 
-def create(scene: Scene) -> Service:
-    """The plant of the scene's model: every scene has one."""
-    return importlib.import_module(f"services.plant.models.{scene[Vehicle].model}").create(scene)
+def create(setup: Setup) -> Service:
+    """The plant of a run."""
+    given = setup.services[NAME]
+    plant: PlantSetup = given.parameters
+    state = Cell(plant.start)
+    bodies = [port for port in given.ports if port.name == ports.BODIES]
+    told = tuple(port for port in given.ports if port not in bodies)
+    own = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
+    part = Part(
+        NAME, plant.core, state, given.inputs, given.ports if own else told, failure=_diverged(setup, plant, state)
+    )
+    parts: list[Any] = [part]
+    if plant.events:
+        parts.insert(0, Breakages(plant, part))
+    if bodies and not own:
+        inputs = given.inputs[:1]
+        parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
+    return Service(NAME, parts, wires(setup, plant.wiring))
+
+
+def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:
+    def error(tick: int) -> LockStepError:
+        x, t = read(state), tick * setup.interval
+        if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
+            return LockStepError(
+                f"the multirotor: {plant.wiring.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
+                'Euler angles end; multibody.coordinates = "se3" has no such place'
+            )
+        system = "the multirotor" if isinstance(x, MultirotorPlantState) else plant.model
+        motion = x.vehicle.motion if isinstance(x, MultirotorPlantState) else x
+        where = f"{system}: not finite at t = {t:g} s: {not_finite(motion)}"
+        return LockStepError(f"{where}; take a smaller step than {plant.core.step:g} s")
+
+    return error
+
+
+class Breakages:
+    """Propellers that are locked, let go or torn off in flight: from then on another plant goes on with the state."""
+
+    name = f"{NAME}.breakages"
+    outputs = ()
+
+    def __init__(self, plant: PlantSetup, part: Part):
+        self._events, self._form = list(plant.events), multirotor_euler if plant.euler else multirotor_multibody
+        self._part, self._core = part, plant.core
+        self._bodies = plant.bodies
+        self._broken: list[tuple[Any, list[tuple[Part, Code]]]] = []  # of each event: the vehicle, its parts
+
+    def bind(self, graph: Graph) -> None:
+        """Before the first tick everything is compiled that may come in flight."""
+        self._graph = graph
+        p, s = self._core.vehicle, read(self._part.state)
+        for event in self._events:
+            p = self._form.after(p, event.propeller, event.becomes)
+            if event.becomes == "locked":
+                lock(p, s.vehicle, self._core.off)
+            parts = [
+                replace(graph.part(name), parameters=parameters._replace(vehicle=p))
+                for name, parameters in ((NAME, self._core), (f"{NAME}.bodies", self._bodies))
+            ]
+            self._broken.append((p, [(part, graph.prepare(part)) for part in parts]))
+
+    def act(self, tick: int) -> int:
+        """What happens at a tick happens after that tick's state was told."""
+        while self._events and self._events[0].tick < tick:
+            self._break(tick, self._events.pop(0), *self._broken.pop(0))
+        return self._events[0].tick + 1 if self._events else NEVER
+
+    def _break(self, tick: int, event: PlantEvent, p: Any, parts: list[tuple[Part, Code]]) -> None:
+        if event.becomes == "locked":
+            stamp = tick - self._part.inputs[0].delay
+            command = self._core.off if stamp < 0 else self._graph.latest(ports.ACTUATORS, stamp).motor_voltage
+            s = read(self._part.state)
+            write(self._part.state, s._replace(vehicle=lock(p, s.vehicle, command)))
+        for part, code in parts:
+            self._graph.replace(part, code)
+
+
+@kernel
+def lock(p, s, command):
+    """The state s with the constraints of parameters p met at once, under a command [V]."""
+    memory = s.memory
+    drive = MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, command)
+    return MultirotorState(_struck(drive, s.motion), memory)
+
+
+def _struck(drive, x):
+    """The bodies after impulses in their hinges, in whichever coordinates they are."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_struck)
+def _struck_of(drive, x):
+    found = multirotor_multibody.struck if x.instance_class is FiveBodies else multirotor_euler.struck
+    return lambda drive, x: found(drive, x)

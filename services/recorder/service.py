@@ -1,79 +1,78 @@
-"""The recorder process: every declared topic into one MCAP log, complete to the last tick."""
+"""The recorder process: every recorded topic into one MCAP log, complete to the last tick."""
 
-import time
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from messages import WallTime, header
-from messages.topics import WALL_TIME, Topic
-from services.journal import JOURNAL_KEY, entries
-from services.lockstep import published
-from services.log import LogWriter
-from services.process import Process, Stopped
-from services.provenance import attachments, metadata
-from services.recorder.collate import Collator
-from services.sections import Exchange, Vehicle
-from services.table import lockstep_services
+import numpy as np
 
-WALL_PERIOD = 0.5  # [s] between two messages of wall time
+from cosim.bundle import unpack_batch
+from cosim.log import LogWriter
+from cosim.process import BATCH_KEY, Process, Stopped
+from cosim.provenance import attachments, metadata
+from cosim.recording import Recording
+from cosim.wire import Page
 
 
-def run(process: Process, log: Path) -> None:
+def run(process: Process, given: Any) -> None:
     """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
-    scene = process.scene
-    interval, vehicle = scene[Exchange].interval_ns, scene[Vehicle].name
-    flying = lockstep_services(scene)
-    collator = Collator(scene, published(flying.values()))
-    journals = process.bus.subscribe(f"{process.space}/{JOURNAL_KEY}/*")
-    ended = 0
-    with LogWriter(log, metadata(scene, "processes"), attachments(scene)) as writer:
-        writing = Writing(writer, collator, vehicle, interval)
+    setup, prefix = process.setup, f"{process.space}/{BATCH_KEY}"
+    batches = process.bus.subscribe(f"{prefix}/*")
+    pending = Pending(setup.services)
+    about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
+    with LogWriter(Path(given.log), about, attachments(setup, given.sources or {})) as writer:
+        recording = Recording(writer, setup)
         try:
             process.join()
-            while ended < len(flying):
-                _, page = process.patient(journals.get, collator.waits_for)
-                ended += not page
-                for topic, tick, payload in entries(page):
-                    collator.add(topic, tick, payload)
-                writing.write_complete()
+            while not pending.ended:
+                key, _, payload = process.patient(batches.get_with_key, pending.waits_for)
+                pending.add(key.rsplit("/", 1)[1], payload)
+                pages = pending.complete()
+                if pages:
+                    recording.write(pages, pending.written - 1)
         except Stopped:
             pass
 
 
-class Sink(Protocol):
-    """What takes the messages of a run: a log, or a study that looks at them."""
+class Pending:
+    """Pages that have come, held back until every service has handed over their ticks."""
 
-    def write(self, topic: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
-        """Take one message, as `LogWriter.write` does."""
-        ...
+    def __init__(self, services: Any):
+        """Of a run of these services."""
+        self._stop = dict.fromkeys(services, 0)  # tick before which each has handed over all
+        self._left = set(services)  # those that have not ended
+        self._pages: list[Page] = []
+        self.written = 0  # tick before which all is complete
 
+    @property
+    def ended(self) -> bool:
+        """Whether nobody will hand over more."""
+        return not self._left
 
-class Writing:
-    """Writes complete ticks into a log, and now and then the wall time."""
+    def add(self, name: str, payload: bytes) -> None:
+        """A batch of a service; an empty one is its last."""
+        if not payload:
+            self._left.discard(name)
+            return
+        self._stop[name], pages = unpack_batch(payload)
+        self._pages += pages
 
-    def __init__(self, writer: Sink, collator: Collator, vehicle: str, interval: int):
-        """Ticks of `interval` [ns], topics of `vehicle`."""
-        self._writer, self._collator, self._interval = writer, collator, interval
-        self._names = {topic: topic.key(vehicle) for topic in collator.topics}
-        self._started: float | None = None
-        self._next_wall = 0.0
-        self.newest: dict[Topic, bytes] = {}
-        self.time_ns = 0
+    def complete(self) -> list[Page]:
+        """The pages of the ticks that are complete now."""
+        stop = min(self._stop.values())
+        if stop <= self.written:
+            return []
+        self.written = stop
+        done, left = [], []
+        for page in self._pages:
+            k = int(np.searchsorted(page.ticks, stop))
+            if k > 0:
+                done.append(Page(page.topic, page.ticks[:k], page.payloads[:k]))
+            if k < len(page.ticks):
+                left.append(Page(page.topic, page.ticks[k:], page.payloads[k:]))
+        self._pages = left
+        return done
 
-    def write_complete(self) -> None:
-        """Write the ticks that have become complete."""
-        for tick, messages in self._collator.complete():
-            self.time_ns = tick * self._interval
-            for topic, payload in messages:
-                self._writer.write(self._names[topic], topic.message, payload, self.time_ns)
-                self.newest[topic] = payload
-        now = time.monotonic()
-        if now >= self._next_wall:
-            self._started = self._started or now
-            self._next_wall = now + WALL_PERIOD
-            self._write_wall_time(now - self._started)
-
-    def _write_wall_time(self, elapsed: float) -> None:
-        factor = self.time_ns * 1e-9 / elapsed if elapsed > 0.0 else 0.0
-        message = WallTime(header(self.time_ns, ""), time.time(), factor)
-        self._writer.write(WALL_TIME.key(), WallTime, message.encode(), self.time_ns, deterministic=False)
+    def waits_for(self) -> str:
+        """Who has handed over least."""
+        name = min(self._stop, key=lambda n: self._stop[n])
+        return f"the messages of {name} from tick {self._stop[name]} on"

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from services.bus import ZenohBus
-from services.log import LogReader, LogWriter
+from cosim.bus import ZenohBus
+from cosim.log import LogReader, LogWriter
 from services.replay.schedule import Cut, schedule
 
 AUDIENCE = 1.0  # [s] the first subscriber gets to appear

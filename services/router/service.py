@@ -4,14 +4,13 @@ It is no part of the lock step: the services are joined pairwise, and the router
 """
 
 import time
+from typing import Any
 
-from services.process import POLL, Process
-from services.table import RECORDER
-
-MODE = "router"  # of its Zenoh session: peers do not pass on to clients
+from cosim.process import POLL, Process
+from services.processes import RECORDER
 
 
-def run(process: Process, log: None) -> None:
+def run(process: Process, given: Any) -> None:
     """Keep the door open until the recorder has the whole run, or until asked to stop."""
     process.join()
     process.end_with(RECORDER)

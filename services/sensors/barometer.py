@@ -8,9 +8,10 @@ from annotated_types import Ge, Gt, Lt
 from dynamics.geodesy import air_pressure
 from dynamics.kernel import kernel
 from dynamics.noise import TURN_ON, normal, normal3
-from dynamics.vector import Vec3
+from dynamics.vector import ZERO, Vec3
+from services.common.ports import BarometerReading
 from services.sensors import errors
-from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 
 CHANNELS = ("pressure",)
 
@@ -18,16 +19,16 @@ CHANNELS = ("pressure",)
 class Barometer(NamedTuple):
     """Parameters."""
 
-    noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
-    bias_instability_pa: Annotated[float, Ge(0)] = 0.0  # peak of the Allan deviation of the bias walk, with the weather
+    noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
+    bias_instability_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] peak of the Allan deviation of the bias walk (weather)
     bias_time: Annotated[float, Gt(0)] = 1000.0  # [s] correlation time of the bias walk
-    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # one standard deviation
+    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
-    range_pa: Annotated[float, Gt(0)] = math.inf
-    resolution_pa: Annotated[float, Ge(0)] = 0.0
+    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
+    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
-    faults: tuple[Fault, ...] | None = None
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class BarometerState(NamedTuple):
@@ -39,12 +40,9 @@ class BarometerState(NamedTuple):
     line: Line  # the first of the three
 
 
-class BarometerReading(NamedTuple):
-    """One reading."""
-
-    pressure: float  # [Pa]
-    variance: float  # [Pa^2], of the white noise
-    valid: bool
+def blank() -> BarometerState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return BarometerState(0.0, 0.0, ZERO, BLANK)
 
 
 @kernel

@@ -5,8 +5,12 @@ from typing import Any, ClassVar
 
 from pydantic import ConfigDict
 
-from services.scene import Scene, Section
-from services.sections import Exchange, ticks
+from cosim.scene import Files, Scene, Section
+from dynamics.errors import KeyedError
+from services.common import user_code
+from services.common.sections import Exchange, ticks
+from services.common.user_code import Modules
+from services.sensors.registry import parameters
 
 
 class Sensors(Section):
@@ -22,21 +26,27 @@ class Sensors(Section):
 
     def lookup(self, keys: list[str]) -> Any:
         """A parameter of a sensor; "imu.rate" is that of its preset unless the scene says otherwise."""
-        from services.sensors.registry import parameters
-
         name, key = keys
         return getattr(parameters(name, self.tables[name], 1.0), key)
 
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The modules of sensors of the user's own become part of the table `modules`."""
+        user_code.embed_all(tree, files, cls.TABLE)
+
     def check(self, scene: Scene) -> None:
         """Every sensor exists, its parameters are sound, and its rate divides the exchange rate."""
-        from services.sensors.registry import parameters
-
         for name, table in self.tables.items():
             if not isinstance(table, dict):
-                raise ValueError(f"{name}: expected a table [sensors.{name}], got {table!r}")
+                raise KeyedError(f"sensors.{name}", f"got {table!r}", f"a table [sensors.{name}]")
+        own = [name for name, table in self.tables.items() if "module" in table]
+        if len(own) > 1:
+            message = f"sensors.{own[0]} is one of the user's own already"
+            raise KeyedError(f"sensors.{own[1]}.module", message, "one, which may read several numbers")
+        user_code.load_all(self.TABLE, self.tables, scene[Modules].texts if scene.has(Modules) else {})
+        for name, table in self.tables.items():
             try:
                 rate = parameters(name, table, scene[Exchange].interval).rate
-            except ValueError as error:
-                unknown = str(error).startswith("sensor: ")
-                raise ValueError(f"{name}{': ' if unknown else '.'}{str(error).removeprefix('sensor: ')}") from None
-            ticks(scene, rate, f"{name}.rate")
+            except KeyedError as error:
+                raise error.under("sensors") from None
+            ticks(scene, rate, f"sensors.{name}.rate")

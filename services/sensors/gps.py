@@ -7,9 +7,10 @@ from annotated_types import Ge, Gt, Lt
 from dynamics.geodesy import enu_to_geodetic
 from dynamics.kernel import kernel, leaf
 from dynamics.noise import TURN_ON, normal3
-from dynamics.vector import Vec3, add, multiply
+from dynamics.vector import ZERO, Vec3, add, multiply
+from services.common.ports import GpsReading
 from services.sensors import errors
-from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 
 CHANNELS = ("position", "velocity")
 
@@ -17,15 +18,15 @@ CHANNELS = ("position", "velocity")
 class Gps(NamedTuple):
     """Parameters; horizontal figures are per axis."""
 
-    noise_horizontal_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
-    noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0
-    noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0
+    noise_horizontal_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
+    noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)]
+    noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/s/sqrt(Hz)]
     wander_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of the error that is correlated in time
     wander_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
     wander_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
-    faults: tuple[Fault, ...] | None = None
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class GpsState(NamedTuple):
@@ -36,17 +37,9 @@ class GpsState(NamedTuple):
     velocity_line: Line
 
 
-class GpsReading(NamedTuple):
-    """One reading: where the antenna was `age` seconds ago."""
-
-    latitude_deg: float
-    longitude_deg: float
-    height: float  # [m] over the ellipsoid
-    position_variance: Vec3  # [m^2] east, north, up: white and wandering error together
-    velocity_world: Vec3  # [m/s]
-    velocity_variance: float  # [(m/s)^2] per axis
-    age: float  # [s]
-    valid: bool
+def blank() -> GpsState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return GpsState(ZERO, BLANK, BLANK)
 
 
 @leaf

@@ -8,9 +8,10 @@ from annotated_types import Ge, Gt, Lt
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotate_back
 from dynamics.noise import TURN_ON, normal3
-from dynamics.vector import Mat3, Vec3, add, apply, scale
+from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
+from services.common.ports import ImuReading
 from services.sensors import errors
-from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 
 CHANNELS = ("gyro", "accelerometer")
 _DPS = math.radians(1.0)  # [rad/s] in one degree per second
@@ -20,41 +21,41 @@ _MG = 1e-3 * errors.STANDARD_GRAVITY  # [m/s^2] in one mg
 class Gyro(NamedTuple):
     """Errors of the three gyroscopes; what is drawn once per vehicle is given as one standard deviation."""
 
-    noise_dps_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
-    bias_instability_deg_per_h: Annotated[float, Ge(0)] = 0.0  # peak of the Allan deviation of the bias walk
+    noise_dps_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [deg/s/sqrt(Hz)] one-sided density
+    bias_instability_deg_per_h: Annotated[float, Ge(0)] = 0.0  # [deg/h] peak of the Allan deviation of the bias walk
     bias_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
-    turn_on_dps: Annotated[float, Ge(0)] = 0.0  # bias that differs from one start to the next
-    temperature_dps_per_k: Annotated[float, Ge(0)] = 0.0  # what calibration leaves
+    turn_on_dps: Annotated[float, Ge(0)] = 0.0  # [deg/s] bias that differs from one start to the next
+    temperature_dps_per_k: Annotated[float, Ge(0)] = 0.0  # [deg/s/K] what calibration leaves
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0
-    range_dps: Annotated[float, Gt(0)] = math.inf
-    resolution_dps: Annotated[float, Ge(0)] = 0.0
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
+    range_dps: Annotated[float, Gt(0)] = math.inf  # [deg/s]
+    resolution_dps: Annotated[float, Ge(0)] = 0.0  # [deg/s]
 
 
 class Accelerometer(NamedTuple):
     """Errors of the three accelerometers; mg and ug are thousandths and millionths of 9.80665 m/s^2."""
 
-    noise_mg_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
-    bias_instability_ug: Annotated[float, Ge(0)] = 0.0  # peak of the Allan deviation of the bias walk
+    noise_mg_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [mg/sqrt(Hz)] one-sided density
+    bias_instability_ug: Annotated[float, Ge(0)] = 0.0  # [ug] peak of the Allan deviation of the bias walk
     bias_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
-    turn_on_mg: Annotated[float, Ge(0)] = 0.0
-    temperature_mg_per_k: Annotated[float, Ge(0)] = 0.0
+    turn_on_mg: Annotated[float, Ge(0)] = 0.0  # [mg] bias that differs from one start to the next
+    temperature_mg_per_k: Annotated[float, Ge(0)] = 0.0  # [mg/K] what calibration leaves
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0
-    range_g: Annotated[float, Gt(0)] = math.inf
-    resolution_mg: Annotated[float, Ge(0)] = 0.0
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
+    range_g: Annotated[float, Gt(0)] = math.inf  # [g]
+    resolution_mg: Annotated[float, Ge(0)] = 0.0  # [mg]
 
 
 class Imu(NamedTuple):
     """Parameters of an inertial measurement unit at the body's origin."""
 
-    gyro: Gyro = Gyro()
-    accelerometer: Accelerometer = Accelerometer()
+    gyro: Gyro = Gyro()  # its gyroscopes
+    accelerometer: Accelerometer = Accelerometer()  # its accelerometers
     rate: Annotated[float, Gt(0)] = 250.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     warm_up: float = 0.0  # [K] still to come at the start, over the calibrated temperature
     warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
-    faults: tuple[Fault, ...] | None = None
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class Triad(NamedTuple):
@@ -75,16 +76,6 @@ class ImuState(NamedTuple):
     cold: float  # [K] of the warm-up still to come
 
 
-class ImuReading(NamedTuple):
-    """One reading of an IMU."""
-
-    omega_body: Vec3  # [rad/s]
-    specific_force_body: Vec3  # [m/s^2], R^T (a - g): +g along z at rest
-    omega_variance: float  # [(rad/s)^2] per axis, of the white noise
-    specific_force_variance: float  # [(m/s^2)^2]
-    valid: bool
-
-
 class _Units(NamedTuple):
     """The errors of a triad in SI units."""
 
@@ -97,6 +88,12 @@ class _Units(NamedTuple):
     misalignment: float
     range: float
     resolution: float
+
+
+def blank() -> ImuState:
+    """A state without meaning, to be overwritten at the first tick."""
+    triad = Triad((0.0,) * 9, ZERO, ZERO, ZERO, BLANK)
+    return ImuState(triad, triad, 0.0)
 
 
 @leaf

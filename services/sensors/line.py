@@ -12,6 +12,8 @@ from dynamics.vector import ZERO, Vec3, add, multiply, scale
 DEPTH = 16  # samples that a line remembers
 Line = tuple[Vec3, ...]  # the last DEPTH values, newest first
 
+BLANK: Line = (ZERO,) * DEPTH
+
 KINDS = ("none", "dropout", "freeze", "bias", "spikes", "drift", "scale", "delay")
 NONE, DROPOUT, FREEZE, BIAS, SPIKES, DRIFT, SCALE, DELAY = range(len(KINDS))
 ALL_CHANNELS = -1

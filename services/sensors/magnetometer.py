@@ -8,9 +8,10 @@ from annotated_types import Ge, Gt, Lt
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import rotate_back
 from dynamics.noise import TURN_ON, normal3
-from dynamics.vector import Mat3, Vec3, add, apply, scale
+from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
+from services.common.ports import MagnetometerReading
 from services.sensors import errors
-from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 
 CHANNELS = ("field",)
 _NANO = 1e-9
@@ -19,17 +20,17 @@ _NANO = 1e-9
 class Magnetometer(NamedTuple):
     """Parameters; what is drawn once per vehicle is given as one standard deviation."""
 
-    noise_nt_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
-    bias_instability_nt: Annotated[float, Ge(0)] = 0.0  # peak of the Allan deviation of the bias walk
+    noise_nt_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [nT/sqrt(Hz)] one-sided density
+    bias_instability_nt: Annotated[float, Ge(0)] = 0.0  # [nT] peak of the Allan deviation of the bias walk
     bias_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
-    hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # what calibration leaves
+    hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # [nT] what calibration leaves
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0
-    range_ut: Annotated[float, Gt(0)] = math.inf
-    resolution_nt: Annotated[float, Ge(0)] = 0.0
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
+    range_ut: Annotated[float, Gt(0)] = math.inf  # [uT]
+    resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
-    faults: tuple[Fault, ...] | None = None
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class MagnetometerState(NamedTuple):
@@ -41,12 +42,9 @@ class MagnetometerState(NamedTuple):
     line: Line
 
 
-class MagnetometerReading(NamedTuple):
-    """One reading."""
-
-    field_body: Vec3  # [T]
-    variance: float  # [T^2] per axis, of the white noise
-    valid: bool
+def blank() -> MagnetometerState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return MagnetometerState((0.0,) * 9, ZERO, ZERO, BLANK)
 
 
 @kernel

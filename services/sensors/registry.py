@@ -10,15 +10,37 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 import services.sensors
+from dynamics.errors import KeyedError
+from dynamics.validation import fault
 from services.sensors import schedule
+
+NO_SENSORS = ("config", "registry", "service")  # modules of the folder that import this one
 
 
 @cache
 def sensors() -> dict[str, ModuleType]:
     """Every sensor, by name: a module of this folder that has `PRESETS`."""
     names = sorted(module.name for module in pkgutil.iter_modules(services.sensors.__path__))
-    modules = {n: importlib.import_module(f"services.sensors.{n}") for n in names if n not in ("service", "registry")}
+    modules = {n: importlib.import_module(f"services.sensors.{n}") for n in names if n not in NO_SENSORS}
     return {name: module for name, module in modules.items() if hasattr(module, "PRESETS")}
+
+
+def module_of(sensor: str, table: Mapping[str, Any]) -> ModuleType:
+    """The module of a sensor: one of this folder, or one of the user's own, which its table names.
+
+    Raises:
+        KeyedError: there is none, or it lacks something.
+    """
+    if "module" not in table:
+        if sensor not in sensors():
+            raise KeyedError.unknown(sensor, "sensor", sensor, sensors())
+        return sensors()[sensor]
+    if sensor in sensors():
+        raise KeyedError(f"{sensor}.module", f"{sensor} is the name of a sensor that ships", "another name")
+    found = importlib.import_module(table["module"])
+    if missing := [name for name in ("PRESETS", "READING", "blank", "initial", "sample") if not hasattr(found, name)]:
+        raise KeyedError(f"{sensor}.module", f"{table['module']} has no {', '.join(missing)}")
+    return found
 
 
 def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
@@ -30,26 +52,28 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
         tick: length of a tick [s], for the fault schedule.
 
     Raises:
-        ValueError: "key: what is wrong, what would be right".
+        KeyedError: the key relative to the sensors' tables.
     """
-    module = _choice("sensor", sensor, sensors())
+    module = module_of(sensor, table)
     values = dict(table)
-    preset = _choice("preset", values.pop("preset", next(iter(module.PRESETS))), module.PRESETS)
+    values.pop("module", None)
+    name = values.pop("preset", next(iter(module.PRESETS)))
+    if name not in module.PRESETS:
+        raise KeyedError.unknown(f"{sensor}.preset", "preset", name, module.PRESETS)
+    preset = module.PRESETS[name]
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())
     adapter = TypeAdapter(type(preset), config={"extra": "forbid", "allow_inf_nan": True})
     try:
         p = adapter.validate_python(_merged(preset, values))
+        if not hasattr(p, "faults"):
+            if faults:
+                raise KeyedError("faults", f"{sensor} knows none; leave them out")
+            return p
+        return p._replace(faults=schedule.compile_faults(faults, module.CHANNELS, tick))
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"{key}: {_problem(first, preset)}") from None
-    return p._replace(faults=schedule.compile_faults(faults, module.CHANNELS, tick))
-
-
-def _choice(what: str, name: str, choices: Mapping[str, Any]) -> Any:
-    if name not in choices:
-        raise ValueError(f"{what}: unknown {what} {name!r}; expected one of {', '.join(choices)}")
-    return choices[name]
+        raise fault(error, type(preset)).under(sensor) from None
+    except KeyedError as error:
+        raise error.under(sensor) from None
 
 
 def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,13 +83,3 @@ def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:
         inner = merged.get(key)
         merged[key] = _merged(inner, value) if hasattr(inner, "_asdict") and isinstance(value, Mapping) else value
     return {k: _merged(v, {}) if hasattr(v, "_asdict") else v for k, v in merged.items()}
-
-
-def _problem(error: Any, preset: Any) -> str:
-    if error["type"] == "extra_forbidden":
-        owner = preset
-        for part in error["loc"][:-1]:
-            owner = getattr(owner, part)
-        return f"unknown key; expected one of {', '.join(f for f in owner._fields if f != 'faults')}"
-    message = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
-    return f"expected {message}, got {error['input']!r}"

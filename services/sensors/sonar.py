@@ -9,8 +9,9 @@ from annotated_types import Ge, Gt, Lt
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.noise import TURN_ON, normal
+from services.common.ports import SonarReading
 from services.sensors import errors
-from services.sensors.line import DEPTH, Fault, Line, carry, new_line
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 
 CHANNELS = ("range",)
 
@@ -18,16 +19,16 @@ CHANNELS = ("range",)
 class Sonar(NamedTuple):
     """Parameters of a range finder at the body's origin, along -z of the body."""
 
-    noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # one-sided density
+    noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: speed of sound
     range_min: Annotated[float, Ge(0)] = 0.0  # [m]
     range_max: Annotated[float, Gt(0)] = math.inf  # [m]
     resolution: Annotated[float, Ge(0)] = 0.0  # [m]
-    half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # the nearest ground within the beam gives the echo
-    tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # tilted more, the echo goes elsewhere
+    half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] the nearest ground within the beam gives the echo
+    tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] tilted more, the echo goes elsewhere
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0
-    faults: tuple[Fault, ...] | None = None
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class SonarState(NamedTuple):
@@ -37,12 +38,9 @@ class SonarState(NamedTuple):
     line: Line  # the first of the three
 
 
-class SonarReading(NamedTuple):
-    """One reading, as sensor_msgs/Range has it."""
-
-    range: float  # [m], rounded to float32; +inf: no echo, -inf: nearer than range_min
-    variance: float  # [m^2], of the white noise, rounded to float32
-    valid: bool
+def blank() -> SonarState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return SonarState(0.0, BLANK)
 
 
 @leaf

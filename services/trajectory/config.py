@@ -15,57 +15,35 @@ A channel that a phase does not name holds. A channel may have a list of segment
 `duration`, or else as long as its longest channel; channels that end earlier hold.
 """
 
-from typing import Annotated, ClassVar
+from typing import Any, ClassVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
-
-from services.scene import Scene, Section
-from services.trajectory.segments import choose
-from services.trajectory.segments.segment import Positive, Segment
-
-
-def _segments(value: object) -> tuple[Segment, ...]:
-    items = value if isinstance(value, (list, tuple)) else (value,)
-    return tuple(choose(item) for item in items)
+from cosim.scene import Files, Scene, Section
+from services.common.sections import named
+from services.trajectory.mission import CHANNELS, compile
+from services.trajectory.phases import Phases
+from services.trajectory.table_file import parse
 
 
-Segments = Annotated[tuple[SerializeAsAny[Segment], ...], BeforeValidator(_segments)]
-
-
-class Phase(BaseModel):
-    """A named stretch of the flight."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    name: Annotated[str, Field(min_length=1)]
-    duration: Positive | None = None  # [s]
-    x: Segments = ()  # [m]
-    y: Segments = ()  # [m]
-    z: Segments = ()  # [m]
-    yaw: Segments = ()  # [rad]
-
-
-class Trajectory(Section):
+class Trajectory(Phases, Section):
     """What the vehicle is asked to fly."""
 
     TABLE: ClassVar[str] = "trajectory"
     OPTIONAL: ClassVar[bool] = True
 
-    phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]
-
-    @model_validator(mode="after")
-    def _names_once(self):
-        names = [phase.name for phase in self.phase]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"two phases are named {twice[0]!r}; a name is used once")
-        return self
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The CSV file that a segment of kind "table" names becomes its points."""
+        phases = named(tree, cls.TABLE, "phase")
+        for i, phase in enumerate(phases if isinstance(phases, list) else ()):
+            for channel in CHANNELS if isinstance(phase, dict) else ():
+                given = phase.get(channel, ())
+                several = isinstance(given, list)
+                for k, segment in enumerate(given if several else [given]):
+                    if isinstance(segment, dict) and isinstance(file := segment.get("file"), str):
+                        key = f"trajectory.phase.{i}.{channel}" + (f".{k}" if several else "")
+                        path = files.folder / file
+                        segment["points"] = parse(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:
-        """The segments join, phases are long enough, tables can be read."""
-        from services.trajectory.mission import compile  # here: mission itself needs this module
-
-        try:
-            compile(self, folder=scene.path.parent)
-        except ValueError as error:
-            raise ValueError(f"phase: {error}") from None
+        """The segments join, phases are long enough."""
+        compile(self)

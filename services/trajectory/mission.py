@@ -1,13 +1,12 @@
 """A trajectory of named phases, compiled to pieces that can be evaluated at any time (theory.md, section 4.1)."""
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import ValidationError
 
+from dynamics.errors import KeyedError
 from dynamics.vector import ZERO, Vec3
-from services.trajectory.config import Phase, Trajectory
+from services.trajectory.phases import Phase, Phases
 from services.trajectory.piece import Channel, Parameters, Piece
 
 CHANNELS = ("x", "y", "z", "yaw")
@@ -24,23 +23,21 @@ class Compiled(NamedTuple):
     final: int  # index of the first phase after which none ends in the air
 
 
-def compile(
-    spec: Trajectory | dict, origin_world: Vec3 = ZERO, origin_yaw: float = 0.0, folder: Path = Path()
-) -> Compiled:
-    """Compile a trajectory about an origin (position in world [m], yaw [rad]); CSV files are looked up from `folder`.
+def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0.0) -> Compiled:
+    """Compile a trajectory about an origin (position in world [m], yaw [rad]).
 
-    Raises ValueError (one line: where, what) for a malformed description, a phase shorter than its segments, or a
-    segment that does not join the one before.
+    Raises:
+        KeyedError: a phase is shorter than its segments, or a segment does not join the one before.
     """
-    trajectory = validate(spec)
     joined: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
     value = dict.fromkeys(CHANNELS, 0.0)
     starts, now, final = [], 0.0, 0
     for index, phase in enumerate(trajectory.phase):
         starts.append(now)
-        moved = {channel: _pieces(phase, channel, value, folder) for channel in CHANNELS}
+        key = f"trajectory.phase.{index}"
+        moved = {channel: _pieces(phase, key, channel, value) for channel in CHANNELS}
         length = {channel: sum(piece.duration for piece in pieces) for channel, pieces in moved.items()}
-        end = now + _phase_duration(phase, max(length.values()))
+        end = now + _phase_duration(phase, key, max(length.values()))
         for channel, pieces in moved.items():
             time = now
             for piece in pieces:
@@ -58,35 +55,24 @@ def compile(
     return Compiled(parameters, tuple(phase.name for phase in trajectory.phase), now, final)
 
 
-def validate(spec: Trajectory | dict) -> Trajectory:
-    """The validated trajectory; raises ValueError with one line."""
-    try:
-        return Trajectory.model_validate(spec)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in ("trajectory", *first["loc"]))
-        raise ValueError(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
-
-
-def _pieces(phase: Phase, channel: str, value: dict[str, float], folder: Path) -> list[Piece]:
+def _pieces(phase: Phase, key: str, channel: str, value: dict[str, float]) -> list[Piece]:
     """The pieces of a channel in a phase; moves `value` on to where they end."""
     pieces = []
     for segment in getattr(phase, channel):
         try:
-            pieces += segment.pieces(value[channel], folder)
-            value[channel] = segment.end(value[channel], folder)
-        except ValueError as error:
-            raise ValueError(f"phase {phase.name!r}, {channel}: {error}") from None
+            pieces += segment.pieces(value[channel])
+        except KeyedError as error:
+            raise error.under(f"{key}.{channel}") from None
+        value[channel] = segment.end(value[channel])
     return pieces
 
 
-def _phase_duration(phase: Phase, longest: float) -> float:
+def _phase_duration(phase: Phase, key: str, longest: float) -> float:
     if phase.duration is None:
         return longest
     if longest > phase.duration + SLACK:
-        raise ValueError(
-            f"phase {phase.name!r}: its segments last {longest:g} s, longer than its duration {phase.duration:g} s"
-        )
+        message = f"got {phase.duration:g} s in phase {phase.name!r}"
+        raise KeyedError(f"{key}.duration", message, f"not less than its segments last, {longest:g} s")
     return phase.duration
 
 

@@ -5,18 +5,17 @@ what is looked for: the autopilot gets the true state, and winds their mean.
 """
 
 import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
+from cosim.scene import Scene
 from messages.topics import TRUTH
-from services.scene import Scene, load, sections
-from services.sections import Exchange, Rates, Run
-from services.single import run_single
-from services.table import lockstep_services
+from services.common.sections import Exchange, Rates, Run
+from services.table import load
 from studies.accuracy.plant import longest_step
-from studies.flight import Messages
+from studies.flight import Flight
+from studies.fly import fly
 
 LONGEST = 20.0  # [s] of a flight that is flown so often
 MOST_TICKS = 5000  # of it, at the scene's own rate
@@ -42,27 +41,21 @@ class Part(NamedTuple):
     largest_position: float  # [m]
 
 
-class Track(NamedTuple):
-    """A flight as its truth tells it, at every tick."""
+def errors(scene: Scene) -> list[Part]:
+    """The three errors of a scene whose integrator and step are given, each at a few settings.
 
-    interval: float  # [s]
-    position: np.ndarray  # [m], shape (n, 3)
-    attitude: np.ndarray  # quaternions x, y, z, w, shape (n, 4)
-
-
-def errors(scene: Scene, overrides: Iterable[str] = ()) -> list[Part]:
-    """The three errors of a scene, each at a few settings.
-
-    Args:
-        scene: what is flown, decided.
-        overrides: those that it was loaded with.
+    Raises:
+        ValueError: a flight comes to no end.
     """
-    base = [*overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
+    base = [*scene.overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
     rate, interval = scene[Exchange].rate, scene[Exchange].interval
 
-    def flown(factor: int, coupling: str, solver: list[str]) -> Track:
+    def flown(factor: int, coupling: str, solver: list[str]) -> Flight:
         settings = [*base, *_exchange(scene, rate * factor), f"exchange.coupling={coupling}", *solver]
-        return fly(load(scene.path, settings))
+        flight: Flight = fly(load(scene.path, settings), (TRUTH,))
+        if flight.failure:
+            raise ValueError(f"{scene.path}: {flight.failure}")
+        return flight
 
     def fine(factor: int) -> list[str]:
         return ["solver.integrator=rkmk4", f"solver.step={interval / max(FINEST_STEPS, factor)!r}"]
@@ -71,8 +64,8 @@ def errors(scene: Scene, overrides: Iterable[str] = ()) -> list[Part]:
     parts = []
     exact = flown(1, coupling, fine(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
-        track = flown(1, coupling, [f"solver.step={step!r}"])
-        parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", track, exact))
+        flight = flown(1, coupling, [f"solver.step={step!r}"])
+        parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact))
     sequential = {factor: flown(factor, "sequential", fine(factor)) for factor in (*FINER, FINEST_RATE)}
     for factor in FINER:
         label = f"{rate * factor} Hz"
@@ -96,7 +89,7 @@ def _duration(scene: Scene) -> float:
 
 def _clean(scene: Scene) -> list[str]:
     """Overrides that take the noise out."""
-    found = ["autopilot.estimator=truth"] if scene.has(sections()["autopilot"]) else []
+    found = ["autopilot.estimator=truth"] if scene.has("autopilot") else []
     if "wind_random" in scene.tables("effects"):
         found.append("effects.wind_random.sigma=0.0")
     return found
@@ -108,29 +101,20 @@ def _exchange(scene: Scene, rate: int) -> list[str]:
     return [f"exchange.rate={rate}", *bodies]
 
 
-def fly(scene: Scene) -> Track:
-    """Fly a scene in memory, as fast as it goes."""
-    messages = Messages(scene, (TRUTH,))
-    run_single(scene, lockstep_services(scene), messages, None, lambda *_: False)
-    poses = [m.pose for m in messages.of[TRUTH]]
-    position, attitude = np.array([p.position for p in poses]), np.array([p.orientation for p in poses])
-    return Track(scene[Exchange].interval, position, attitude)
+def _part(source: str, setting: float, label: str, flight: Flight, exact: Flight) -> Part:
+    return Part(source, setting, label, *difference(flight, exact))
 
 
-def _part(source: str, setting: float, label: str, track: Track, exact: Track) -> Part:
-    return Part(source, setting, label, *difference(track, exact))
-
-
-def difference(one: Track, other: Track) -> tuple[float, float, float]:
+def difference(one: Flight, other: Flight) -> tuple[float, float, float]:
     """Distance [m] and angle [rad] between two flights that nine ticks in ten stay below, and the largest distance.
 
     Compared at the ticks of the one with fewer.
     """
-    coarse, fine = (one, other) if one.interval >= other.interval else (other, one)
-    every = round(coarse.interval / fine.interval)
-    n = min(len(coarse.position), -(-len(fine.position) // every))
-    p, q = coarse.position[:n], coarse.attitude[:n]
-    r, s = fine.position[::every][:n], fine.attitude[::every][:n]
+    coarse, fine = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
+    every = round(coarse.setup.interval / fine.setup.interval)
+    n = min(len(coarse.truth), -(-len(fine.truth) // every))
+    p, q = coarse.truth.position[:n], coarse.truth.orientation[:n]
+    r, s = fine.truth.position[::every][:n], fine.truth.orientation[::every][:n]
     # twice the arc sine of half the chord: exact for small angles, where the arc cosine is not
     chord = np.minimum(np.linalg.norm(q - s, axis=1), np.linalg.norm(q + s, axis=1))
     angle = 4.0 * np.arcsin(np.minimum(0.5 * chord, math.sqrt(0.5)))

@@ -6,10 +6,12 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from dynamics.kernel import CACHE, cache_folder
+from cosim.scene import Scene, SceneError, Source
+from dynamics import integrators
+from dynamics.errors import KeyedError
+from dynamics.kernel import cache_folder, source_digest
+from services.common.sections import Effects, Exchange, Run, Vehicle
 from services.plant.config import Solver
-from services.scene import Scene
-from services.sections import Effects, Exchange, Run, Vehicle
 from studies.accuracy import scenes
 from studies.accuracy.measure import Point, cheapest, measure
 
@@ -22,7 +24,7 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
         say: told of a measurement before it begins.
 
     Raises:
-        ValueError: no integrator meets the accuracy on this plant.
+        SceneError: no integrator meets the accuracy on this plant.
     """
     solver = scene[Solver]
     if not solver.undecided:
@@ -33,9 +35,9 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
         points = [p for p in points if p.way == solver.integrator]
     try:
         chosen = cheapest(points, solver.accuracy)
-    except ValueError as error:
-        reason = str(error).partition(": ")[2]
-        raise ValueError(f"{scene.path}: solver.accuracy: {solver.accuracy:g}: {reason}") from None
+    except KeyedError as error:
+        message = f"{solver.accuracy:g}: {error.message}"
+        raise SceneError("solver.accuracy", message, source=Source(scene.path)) from None
     # the step that `Solver.check` takes for a divisor of the interval
     return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
 
@@ -43,10 +45,12 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
 def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
     """The points of the scene's plant: from the user's cache, so that every later run flies the same."""
     path = _file(scene)
-    if path.exists():
+    if path and path.exists():
         return [Point(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
     say("measuring the integrators on this plant for solver.accuracy (first time only; minutes if they are compiled)")
     points = measure(scenes.problem(scene))
+    if path is None:
+        return points
     path.parent.mkdir(parents=True, exist_ok=True)
     complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
     complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
@@ -54,9 +58,17 @@ def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
     return points
 
 
-def _file(scene: Scene) -> Path:
-    """Named by the state of the kernels and by all that the plant is made of, but for how it is to be solved."""
-    digest = hashlib.blake2b(Path(cache_folder("dynamics")).name.encode(), digest_size=8)
+def _file(scene: Scene) -> Path | None:
+    """Named by the sources and by all that the plant is made of, but for its solution; None without a cache."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    modules = [
+        f"services.plant.models.{scene[Vehicle].model}",
+        *(f"dynamics.integrators.{name}" for name in integrators.names()),
+        *(f"dynamics.effects.{name}" for name in scene[Effects].tables),
+    ]
+    digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run = scene[Run]
     for part in (
         run.seed,
@@ -67,4 +79,4 @@ def _file(scene: Scene) -> Path:
         scenes.physics(scene),
     ):
         digest.update(repr(part).encode())
-    return CACHE / "accuracy" / f"{scene.name}-{digest.hexdigest()}.json"
+    return folder / "accuracy" / f"{scene.name}-{digest.hexdigest()}.json"

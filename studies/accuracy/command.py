@@ -38,7 +38,7 @@ def run(target: str, overrides: list[str], goal: float | None, json: Path | None
     try:
         points = measure(problem)
         chosen = None if goal is None else cheapest(points, goal)
-        parts = apart.errors(scene, overrides) if scene else []
+        parts = apart.errors(scene) if scene else []
     finally:
         notice.cancel()
     table.show(console, problem, points, chosen)

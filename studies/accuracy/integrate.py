@@ -8,7 +8,7 @@ import numpy as np
 
 from dynamics import integrators
 from dynamics.integrators import adapt, rate, record
-from dynamics.kernel import kernel
+from dynamics.kernel import kernel, uncompiled
 from dynamics.tree import flatten, unflatten
 from studies.accuracy.coordinates import coordinates, defect
 from studies.accuracy.problem import Outcome, Way
@@ -29,19 +29,19 @@ def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, row
         return rate(p, t, state)
 
     for t, row in zip(times, rows, strict=True):
-        method.step.py_func(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
+        uncompiled(method.step)(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
     return calls / len(times)
 
 
 # kernels of this file, so that their cache names no class but those of systems that every user of the study can import
 @kernel
-def sampled(method, p, x, h, every, out):
+def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
     """`record` from time 0."""
     return record(method, p, 0.0, x, h, every, out)
 
 
 @kernel
-def adapted(p, x, times, tolerance, out):
+def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
     """`adapt`."""
     return adapt(p, x, times, tolerance, out)
 

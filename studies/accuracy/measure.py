@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynamics.errors import KeyedError
 from studies.accuracy.coordinates import error
 from studies.accuracy.problem import Outcome, Problem, Way
 
@@ -90,13 +91,13 @@ def cheapest(points: list[Point], target: float) -> Point:
     """The fastest point whose error is at most `target`.
 
     Raises:
-        ValueError: none is.
+        KeyedError: none is.
     """
     met = [p for p in points if p.error <= target]
     if not met:
         best = min(points, key=lambda p: p.error, default=None)
         reached = f"; the smallest reached is {best.error:.2g}, by {best.way}" if best else ""
-        raise ValueError(f"--target {target:g}: no method meets this error{reached}")
+        raise KeyedError(f"--target {target:g}", f"no method meets this error{reached}")
     return min(met, key=lambda p: p.time)
 
 

@@ -1,23 +1,23 @@
 """The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
 
-import importlib
 import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from cosim.scene import Scene
 from dynamics import integrators
-from dynamics.effects._rotors import each
+from dynamics.generate import each
 from dynamics.integrators import rkmk54
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import exp
-from dynamics.noise import stream_key
+from dynamics.noise import Key, stream_key
 from dynamics.tree import flatten
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
-from services.scene import Scene
-from services.sections import Exchange, Run, Vehicle
+from services.common.sections import Exchange, Run, Vehicle
+from services.plant import models
 from studies.accuracy.coordinates import coordinates, defect
 from studies.accuracy.integrate import SAMPLES, applicable
 from studies.accuracy.problem import Outcome, Problem, Way
@@ -29,12 +29,23 @@ TICK = 1000  # of the first exchange, so that random effects have begun
 
 
 @leaf
-def _wave(t, volts, phase):
+def _wave(t: float, volts: float, phase: float) -> float:
     return volts * (1.0 + 0.02 * math.sin(3.0 * t + phase))
 
 
 @kernel
-def flight(method, p, key, state, volts, phase, h, n, every, out):
+def flight(
+    method: Any,
+    p: MultirotorParameters,
+    key: Key,
+    state: MultirotorState,
+    volts: tuple[float, ...],
+    phase: tuple[float, ...],
+    h: float,
+    n: int,
+    every: int,
+    out: np.ndarray,
+) -> None:
     """Fly exchanges of n steps of h [s] under waving voltages; a row of `out` for each `every` of them."""
     tick = TICK
     for row in range(out.shape[0]):
@@ -56,7 +67,7 @@ def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
 
 def model(scene: Scene) -> Any:
     """The module of the scene's plant model."""
-    return importlib.import_module(f"services.plant.models.{scene[Vehicle].model}")
+    return models.get(scene[Vehicle].model)
 
 
 def longest_step(scene: Scene) -> float:

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from cosim.scene import Scene
 from dynamics.integrators import get
 from dynamics.tree import flatten
 from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
-from services.scene import Scene
-from services.sections import Exchange, Run, Vehicle
+from services.common.sections import Exchange, Run, Vehicle
 from studies.accuracy import plant
 from studies.accuracy.coordinates import coordinates
 from studies.accuracy.integrate import SAMPLES, fixed_ways, sampled

@@ -1,10 +1,11 @@
 """From the name on the command line to a problem."""
 
-import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
-from services.scene import Scene, load
+from cosim.scene import Scene
+from dynamics import discovery
+from services.table import load
 from studies.accuracy.problem import Problem
 from studies.accuracy.systems import problems
 
@@ -15,12 +16,7 @@ def find(target: str) -> Problem:
     Raises:
         ValueError: there is none; the text lists the choices.
     """
-    known = problems()
-    if target in known:
-        return known[target]
-    near = difflib.get_close_matches(target, known, n=1)
-    hint = f"did you mean {near[0]}? " if near else ""
-    raise ValueError(f"unknown target {target}: {hint}expected one of {', '.join(known)}, or a scene's .toml file")
+    return discovery.choose(problems(), target, "problem")
 
 
 def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from services.scene import Scene
-from services.sections import Exchange, Published
+from cosim.scene import Scene
+from services.common.sections import Published
+from services.table import reseed
 from studies.campaign.figures import Figures, figures
-from studies.campaign.flight import fly, seeded
+from studies.campaign.setup import TOPICS, campaign_setup
+from studies.fly import fly
 from studies.tracking import AXES
 
 
@@ -48,10 +50,10 @@ def campaign(scene: Scene, seeds: Iterable[int], progress: Callable[[], None]) -
     Raises:
         ValueError: nobody flies along a trajectory in this scene.
     """
-    interval = scene[Exchange].interval
+    setup = campaign_setup(scene)
 
     def one(seed: int) -> Figures:
-        found = figures(seed, fly(seeded(scene, seed)), interval)
+        found = figures(seed, fly(reseed(setup, seed), TOPICS))
         progress()
         return found
 

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from cosim.scene import Scene
 from dynamics.cell import Cell
 from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.kernel import kernel
-from dynamics.noise import stream_key
+from dynamics.noise import Key, stream_key
 from dynamics.vehicles import multirotor
+from services.common.sections import active, airframe, start_height
 from services.plant.config import method
-from services.scene import Scene
-from services.sections import active, airframe, start_height
 from studies.effects.variants import Tables, variant
 
 STEPS = 2000  # in one timed call
@@ -23,7 +23,7 @@ STANDARD_GRAVITY = 9.81  # [m/s^2]
 
 
 @kernel
-def exchanges(method, p, s, key, command, h, n, ticks):
+def exchanges(method: Any, p: Any, s: Any, key: Key, command: tuple[float, ...], h: float, n: int, ticks: int) -> None:
     """Advance the state in the cell `s` by `ticks` exchanges of n steps of h [s]."""
     for tick in range(ticks):
         s.value = multirotor.advance(method, p.value, key, tick, s.value, command, h, n)

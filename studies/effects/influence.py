@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from studies.flight import Trace
+from studies.flight import Flight
 
 
 class Influence(NamedTuple):
@@ -16,12 +16,12 @@ class Influence(NamedTuple):
     failure: str = ""
 
 
-def influence(flown: Trace, other: Trace) -> Influence:
+def influence(flown: Flight, other: Flight) -> Influence:
     """The difference of `other` from `flown`; a flight that ends earlier is taken to stay where it ended."""
-    if other.failure or not len(other.position_world):
-        return Influence(np.inf, np.inf, np.inf, other.failure or "no flight")
-    count = max(len(flown.position_world), len(other.position_world))
-    a, b = (_held(trace.position_world, count) for trace in (flown, other))
+    if other.failure:
+        return Influence(np.inf, np.inf, np.inf, other.failure)
+    count = max(len(flown.truth), len(other.truth))
+    a, b = (_held(flight.truth.position, count) for flight in (flown, other))
     apart = np.linalg.norm(a - b, axis=1)
     change = (other.energy - flown.energy) / flown.energy if flown.energy else 0.0
     return Influence(float(apart.max()), float(apart[-1]), float(change))

@@ -4,13 +4,14 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from cosim.scene import Scene
 from dynamics import effects
 from services.autopilot.config import Autopilot
-from services.scene import Scene
-from services.sections import Effects, Vehicle
+from services.common.sections import Effects, Vehicle
 from studies.effects.cost import costs
 from studies.effects.influence import Influence, influence
 from studies.effects.variants import Hangar, Tables, hangar, refusal
+from studies.flight import Flight
 
 
 class Row(NamedTuple):
@@ -68,9 +69,9 @@ def study(scene: Scene, within: float, say: Callable[[str], None]) -> Study:
         flown = next(flights)
         if flown.failure:
             raise ValueError(f"{scene.path}: {flown.failure}")
-        for i, (name, trace) in enumerate(zip(flying, flights, strict=True), 1):
+        for i, (name, flight) in enumerate(zip(flying, flights, strict=True), 1):
             say(f"{i} of {len(flying)}: {'without' if name in tables else 'with'} {name}")
-            found[name] = influence(flown, trace)
+            found[name] = influence(flown, flight)
         out = sorted((n for n in fewer if n in found), key=lambda n: found[n].trajectory)
         kept, apart = _smallest(crew, tables, flown, [n for n in out if found[n].trajectory <= within], within, say)
     say("timing the plant's steps")
@@ -90,7 +91,7 @@ def _without(tables: Tables, *names: str) -> dict[str, Any]:
 
 
 def _smallest(
-    crew: Hangar, tables: Tables, flown: Any, out: list[str], within: float, say: Callable[[str], None]
+    crew: Hangar, tables: Tables, flown: Flight, out: list[str], within: float, say: Callable[[str], None]
 ) -> tuple[dict[str, Any], float]:
     """The effects left, and how far off that is, when all of `out` go that can go together.
 

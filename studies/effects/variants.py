@@ -7,10 +7,12 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
+from cosim.scene import Scene
 from dynamics import effects
-from services.scene import Scene
-from services.sections import Effects, airframe
-from studies.flight import Trace, fly
+from messages.topics import TRUTH
+from services.common.sections import Effects, airframe
+from studies.flight import Flight
+from studies.fly import fly
 
 Tables = Mapping[str, Any]  # the table of each effect that a variant has
 
@@ -25,12 +27,13 @@ def refusal(scene: Scene, tables: Tables) -> str:
     try:
         effects.from_scene(tables, airframe(scene))
     except ValueError as error:
-        return str(error).removeprefix("effects.")
+        return str(error)
     return ""
 
 
-def _fly(scene: Scene) -> Trace:
-    return fly(scene)
+def truth_of(scene: Scene) -> Flight:
+    """The scene flown to its end, with the true state alone."""
+    return fly(scene, (TRUTH,))
 
 
 class Hangar:
@@ -39,9 +42,9 @@ class Hangar:
     def __init__(self, scene: Scene, pool: ProcessPoolExecutor):
         self._scene, self._pool = scene, pool
 
-    def fly(self, variants: Iterable[Tables]) -> Iterator[Trace]:
+    def fly(self, variants: Iterable[Tables]) -> Iterator[Flight]:
         """The flight of each variant, in order, as they come."""
-        return self._pool.map(_fly, [variant(self._scene, tables) for tables in variants])
+        return self._pool.map(truth_of, [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager

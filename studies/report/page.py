@@ -3,12 +3,13 @@
 import base64
 import io
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 from matplotlib.figure import Figure
 
-from studies.flown import AXES, Flown
+from studies.flight import AXES, Flight
 from studies.report import plots
 from studies.report.style import DPI, NotRecordedError, styled
 
@@ -36,27 +37,24 @@ class Accuracy(NamedTuple):
     published: float | None
 
 
-def write(log: Path) -> Path:
-    """Write the report of a flight beside its MCAP log, with the ending .html, and return its path.
+def write(flight: Flight, target: Path) -> Path:
+    """Write the report of a flight; its path.
 
     Raises:
-        ValueError: no such file, no MCAP log, no flight in it, or the report cannot be written.
+        ValueError: the report cannot be written.
     """
-    log = Path(log)
-    flown = Flown(log)
-    scene = flown.scene
+    scene = flight.origin.scene
     published = scene.get("published", {})
     page = render(
         "flight.html",
-        log=log.name,
+        log=Path(flight.origin.source).name,
         title=scene.get("run", {}).get("title", ""),
-        scene=flown.metadata.get("scene", ""),
-        facts=facts(flown),
-        accuracy=accuracy(flown, published.get("rmse", {})),
+        scene=flight.metadata.get("scene", ""),
+        facts=facts(flight),
+        accuracy=accuracy(flight, published.get("rmse", {})),
         source=published.get("source", "published") if published.get("rmse") else "",
-        sections=sections(flown),
+        sections=sections(flight),
     )
-    target = log.with_suffix(".html")
     try:
         target.write_text(page, encoding="utf-8")
     except OSError as fault:
@@ -69,45 +67,45 @@ def render(template: str, **values: Any) -> str:
     return _TEMPLATES.get_template(template).render(**values)
 
 
-def facts(flown: Flown) -> dict[str, str]:
+def facts(flight: Flight) -> dict[str, str]:
     """What identifies the flight and how it ended, by name."""
-    said = flown.metadata
-    t = flown.times("truth")
+    said = flight.metadata
+    t = flight.truth.times
     found = {
-        "vehicle": flown.vehicle,
+        "vehicle": flight.vehicle,
         "duration": f"{t[-1] - t[0]:.2f} s",
-        "landed": "yes" if flown.landed else "no",
+        "landed": "yes" if flight.landed else "no",
         "seed": said.get("seed", ""),
         "mode": said.get("mode", ""),
         "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
         "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
         "version": said.get("version", ""),
         "commit": said.get("commit", ""),
-        "digest": flown.digest or "none: the log has no end",
+        "digest": flight.digest or "none: the log has no end",
     }
     return {name: value for name, value in found.items() if value}
 
 
-def accuracy(flown: Flown, published: dict[str, float]) -> list[Accuracy]:
+def accuracy(flight: Flight, published: dict[str, float]) -> list[Accuracy]:
     """Root-mean-square error of each axis beside the published one; empty without a reference."""
     units = dict(zip(AXES, ("m", "m", "m", "rad", "rad", "rad"), strict=True))
-    return [Accuracy(axis, units[axis], rmse, published.get(axis)) for axis, rmse in flown.rmse().items()]
+    return [Accuracy(axis, units[axis], rmse, published.get(axis)) for axis, rmse in flight.rmse.items()]
 
 
-def sections(flown: Flown) -> list[Section]:
+def sections(flight: Flight) -> list[Section]:
     """Every plot of the vehicle's model that the log has the topics for, and a line for each of the others."""
-    model = flown.metadata.get("model", "reduced")
-    return [_section(module, flown) for module in plots.modules() if model in getattr(module, "MODELS", (model,))]
+    model = flight.origin.scene.get("vehicle", {}).get("model", "reduced")
+    return [_section(module, flight) for module in plots.modules() if model in getattr(module, "MODELS", (model,))]
 
 
-def _section(module, flown: Flown) -> Section:
+def _section(module: ModuleType, flight: Flight) -> Section:
     name = module.__name__.rpartition(".")[2]
-    lacking = [topic for topic in module.NEEDS if not flown.has(topic)]
+    lacking = [topic for topic in module.NEEDS if not flight.has(topic)]
     if lacking:
         return Section(name, module.TITLE, missing=f"the log has no topic {', '.join(lacking)}")
     try:
         with styled():
-            figure, caption = module.draw(flown)
+            figure, caption = module.draw(flight)
             return Section(name, module.TITLE, png(figure), caption)
     except NotRecordedError as reason:
         return Section(name, module.TITLE, missing=str(reason))

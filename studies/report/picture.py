@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.plots import displacements, path
 from studies.report.style import DPI, WIDTH, styled
 
 
-def draw(flown: Flown, target: Path) -> None:
+def draw(flight: Flight, target: Path) -> None:
     """Write the picture as PNG."""
     with styled():
         figure = Figure(figsize=(1.15 * WIDTH, 4.6), layout="constrained")
@@ -22,11 +22,11 @@ def draw(flown: Flown, target: Path) -> None:
         axes = np.array([[figure.add_subplot(grid[row, 0])] for row in range(3)])
         for axis in axes[:-1, 0]:
             axis.tick_params(labelbottom=False)
-        displacements.on_axes(axes, flown)
+        displacements.on_axes(axes, flight)
         axes[-1, 0].set_xlabel("time [s]")
-        path.space(figure.add_subplot(grid[:, 1], projection="3d"), flown)
+        path.space(figure.add_subplot(grid[:, 1], projection="3d"), flight)
         figure.savefig(target, dpi=DPI, metadata={"Software": None})
 
 
 if __name__ == "__main__":
-    draw(Flown(Path(sys.argv[1])), Path(sys.argv[2]))
+    draw(Flight.read(Path(sys.argv[1])), Path(sys.argv[2]))

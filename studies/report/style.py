@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 
 STEERED = ("reduced", "multibody")  # the models of vehicles that an autopilot flies
 
@@ -87,20 +87,20 @@ def line(axes: Axes, t: np.ndarray, y: np.ndarray, **looks: Any) -> None:
     axes.plot(t, y, **looks)
 
 
-def phases(flown: Flown) -> list[tuple[str, float, float]]:
+def phases(flight: Flight) -> list[tuple[str, float, float]]:
     """Name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
-    if not flown.has("setpoint"):
+    if not flight.has("setpoint"):
         return []
-    names, t = flown.column("setpoint", lambda m: m.phase), flown.times("setpoint")
+    names, t = flight.setpoint.phase, flight.setpoint.times
     starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1)]
     ends = [*t[starts[1:]], t[-1]]
     return [(str(names[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True) if names[k]]
 
 
-def shade_phases(axes: np.ndarray, flown: Flown) -> None:
+def shade_phases(axes: np.ndarray, flight: Flight) -> None:
     """Shade every other phase of the mission in all plots, and name the phases over those of the first row."""
-    found = phases(flown)
-    span = max(flown.times("truth")[-1] - flown.times("truth")[0], 1e-9)
+    found = phases(flight)
+    span = max(flight.truth.times[-1] - flight.truth.times[0], 1e-9)
     room = 115 / axes.shape[1] / span  # letters a second of time
     for index, (name, start, end) in enumerate(found):
         if index % 2:
@@ -112,5 +112,5 @@ def shade_phases(axes: np.ndarray, flown: Flown) -> None:
                 (start + end) / 2, 1.02, name, transform=across, ha="center", va="bottom", fontsize=8, color="#555555"
             )
     for axis in axes.flat:
-        axis.set_xlim(flown.times("truth")[0], flown.times("truth")[0] + span)
+        axis.set_xlim(flight.truth.times[0], flight.truth.times[0] + span)
         axis.grid(visible=False, axis="x")

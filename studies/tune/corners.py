@@ -1,20 +1,20 @@
 """The non-linear closed loop with mass, inertia and thrust wrong by a fifth, which the controller is not told."""
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cosim.scene import Scene
+from cosim.setup import Setup
 from dynamics import effects
-from dynamics.cell import Cell
 from dynamics.vehicles import multirotor
-from services.autopilot.config import Autopilot
-from services.autopilot.gains import Airframe, GainSet, build
-from services.plant.models import reduced
-from services.scene import Scene
-from services.sections import Effects, Exchange, airframe, start_height
+from services.autopilot.gains import GainSet
+from services.common.parameters import of_gains
+from services.common.sections import Effects, airframe, start_pose
 from studies.campaign.figures import Figures, figures
-from studies.campaign.flight import fly_compiled
+from studies.campaign.setup import TOPICS
+from studies.fly import fly
 
 WRONG = 0.2  # of the nominal value
 
@@ -30,19 +30,23 @@ class Corner(NamedTuple):
         return ", ".join(f"{name} {100.0 * (value - 1.0):+.0f} %" for name, value in self._asdict().items())
 
 
-NOMINAL = Corner(1.0, 1.0, 1.0)
 CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repeat=3)]
 
 
-def flown(scene: Scene, gains: GainSet, known: Airframe, corner: Corner = NOMINAL) -> Figures:
-    """Figures of the scene's flight with a gain set; `known` is what the controller is told of the vehicle."""
-    controller = build(gains, known, scene[Autopilot].attitude == "so3")
-    flight, _ = fly_compiled(scene, _plant(scene, corner), controller)
-    return figures(0, flight, scene[Exchange].interval)
+def flown(setup: Setup) -> Figures:
+    """Figures of a flight of which all that a campaign looks at is told at every tick."""
+    return figures(setup.seed, fly(setup, TOPICS))
 
 
-def _plant(scene: Scene, corner: Corner) -> reduced.Core:
-    """The scene's plant with a vehicle that differs from the nominal one."""
+def with_gains(setup: Setup, gains: GainSet) -> Setup:
+    """The run with another gain set, also where the scene's parameters had changed single gains of its own."""
+    own, changed = setup.services["autopilot"].parameters, {p.name: p for p in of_gains(gains)}
+    parameters = tuple(changed.get(p.name, p) for p in own.parameters)
+    return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
+
+
+def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
+    """The run with a vehicle that differs from the one which the autopilot knows."""
     frame = airframe(scene)
     mass = frame.mass.model_copy(
         update={
@@ -53,12 +57,18 @@ def _plant(scene: Scene, corner: Corner) -> reduced.Core:
     frame = frame.model_copy(update={"mass": mass})
     acting = tuple(_stronger(e, corner.thrust) for e in effects.from_scene(scene[Effects].tables, frame))
     p = multirotor.parameters(frame, acting)
-    start = multirotor.initial_state(p, (0.0, 0.0, start_height(scene)))
-    return reduced.create(scene).core._replace(parameters=Cell(p), state=Cell(start))
+    plant = setup.services["plant"].parameters
+    start = plant.start._replace(vehicle=multirotor.initial_state(p, *start_pose(scene)))
+    return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
 
 
-def _stronger(effect: tuple, factor: float) -> tuple:
+def _with(setup: Setup, name: str, parameters: Any) -> Setup:
+    changed = setup.services[name]._replace(parameters=parameters)
+    return setup._replace(services={**setup.services, name: changed})
+
+
+def _stronger(effect: Any, factor: float) -> Any:
     """An effect whose rotors give `factor` times the thrust; others as they are."""
     if "thrust_constant" not in getattr(effect, "_fields", ()):
         return effect
-    return effect._replace(thrust_constant=factor * effect.thrust_constant)  # type: ignore[attr-defined]
+    return effect._replace(thrust_constant=factor * effect.thrust_constant)

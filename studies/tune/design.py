@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from services.autopilot.gains import Airframe, GainSet, build
+from services.autopilot.gains import GainSet
+from services.autopilot.law import Airframe, build
 from services.autopilot.margins import margins, open_loops, stable
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.linearise import Hover
@@ -91,7 +92,7 @@ def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, sa
     plant, now = believed(airframe, model), wanted
     first: dict[str, str] = {}
     for _ in range(ATTEMPTS):
-        wrong = shortfalls(open_loops(build(gain_set(model, now), airframe), plant, tick, DELAY))
+        wrong = shortfalls(open_loops(build(gain_set(model, now).plain(), airframe), plant, tick, DELAY))
         if not wrong:
             for loop, was in wanted._asdict().items():
                 if (value := getattr(now, loop)) < was:

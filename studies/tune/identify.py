@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import bilinear, lfilter
 
 from services.autopilot.control import Parameters
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.tune.linearise import Hover
 
 CUT = 60.0  # [rad/s] of the filter, above the loops' bandwidths
@@ -36,30 +36,31 @@ class _Signals(NamedTuple):
     used: np.ndarray  # (n,) bool: in the air
 
 
-def identify(flown: Flown, p: Parameters, guess: Hover) -> Identified:
+def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
     """Fit acceleration = gain * lag(quota) + constant to a log.
 
     Args:
-        flown: the log; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
+        flight: the flight; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
         p: a controller of the vehicle, for the signs and the hovering thrust.
         guess: the linear model, for what the log cannot tell.
 
     Raises:
         ValueError: the log has no such topics, too little of it is in the air, or a loop was not moved or does not fit.
     """
-    lacking = [name for name in ("actuators", "setpoint") if not flown.has(name)]
+    log = flight.origin.source
+    lacking = [name for name in ("actuators", "setpoint") if not flight.has(name)]
     if lacking:
-        raise ValueError(f"{flown.path}: no topic {', '.join(lacking)}; expected the log of a flight")
-    tick = float(np.median(np.diff(flown.times("actuators"))))
-    signals = _signals(flown, p, tick)
+        raise ValueError(f"{log}: no topic {', '.join(lacking)}; expected the log of a flight")
+    tick = float(np.median(np.diff(flight.times("actuators"))))
+    signals = _signals(flight, p, tick)
     if signals.used.sum() * tick < 2.0:
-        raise ValueError(f"{flown.path}: {signals.used.sum() * tick:.1f} s above {CLEAR:g} m; expected 2 s or more")
+        raise ValueError(f"{log}: {signals.used.sum() * tick:.1f} s above {CLEAR:g} m; expected 2 s or more")
     hovering = float(signals.quota[signals.used, 0].mean())
     for k, name in enumerate(LOOPS):
         moved = float(signals.quota[signals.used, k].std())
         if moved < QUIET * hovering:
             raise ValueError(
-                f"{flown.path}: {name} was not moved ({moved:.2g} N); fly scenes/excitation.toml and give its log"
+                f"{log}: {name} was not moved ({moved:.2g} N); fly scenes/excitation.toml and give its log"
             )
     found = minimize_scalar(
         lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
@@ -75,26 +76,26 @@ def identify(flown: Flown, p: Parameters, guess: Hover) -> Identified:
         fit[name] = float(100.0 * (1.0 - np.sqrt(left)))
         if fit[name] < LEAST_FIT:
             raise ValueError(
-                f"{flown.path}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
+                f"{log}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
                 "fly scenes/excitation.toml in less wind and give its log"
             )
     return Identified(guess._replace(lag=lag, **gains), fit)
 
 
-def _signals(flown: Flown, p: Parameters, tick: float) -> _Signals:
+def _signals(flight: Flight, p: Parameters, tick: float) -> _Signals:
     """Quotas and filtered responses tick by tick."""
-    thrust = flown.column("actuators", lambda m: m.thrust)
-    sensed = flown.has("imu") and len(flown.times("imu")) >= len(thrust)
+    thrust = flight.actuators.thrust
+    sensed = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)
     if sensed:
-        rates = flown.column("imu", lambda m: m.angular_velocity)
-        lift = flown.column("imu", lambda m: m.linear_acceleration.z)
+        rates = flight.topic("imu").angular_velocity
+        lift = flight.topic("imu").linear_acceleration[:, 2]
     else:
-        rates = flown.column("truth", lambda m: m.angular_velocity)
-        lift = flown.column("truth", lambda m: m.acceleration.z)
-    height = flown.column("setpoint", lambda m: m.position.z)
-    armed = flown.column("actuators", lambda m: m.armed)
+        rates = flight.truth.angular_velocity
+        lift = flight.truth.acceleration[:, 2]
+    height = flight.setpoint.position[:, 2]
+    armed = flight.actuators.armed
     n = min(len(thrust), len(rates), len(height))
-    delay = 1 if flown.metadata.get("coupling", "sequential") == "sequential" else 2
+    delay = 1 if flight.metadata.get("coupling", "sequential") == "sequential" else 2
     signs = np.column_stack([np.ones(4), np.array(p.signs)])
     quota = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ signs / 4.0])
     smooth, differ = _filters(tick)

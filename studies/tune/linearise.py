@@ -1,15 +1,16 @@
 """The plant about hover, by central differences of the compiled model."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import fsolve
 
+from cosim.scene import Scene
 from dynamics import effects
-from dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion, from_roll_pitch_yaw
 from dynamics.vehicles.multirotor import initial_state, observe, parameters
-from services.scene import Scene
-from services.sections import Effects, airframe
+from services.common.sections import Effects, airframe
 
 HEIGHT = 50.0  # [m] clear of the ground and of its effect
 INTERVAL = 0.004  # [s] only scales the tick number, which is 0
@@ -43,7 +44,7 @@ def hover(scene: Scene) -> Hover:
     signs = np.sign(np.array([[y, -x, 0.0] for x, y, _ in frame.rotors.position]))
     signs[:, 2] = frame.rotors.yaw_sign
 
-    def seen(speeds: np.ndarray, voltage: float | np.ndarray, attitude=NO_ROTATION):
+    def seen(speeds: np.ndarray, voltage: float | np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
         state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)
         motion = state.motion._replace(rotor_speed=tuple(float(v) for v in speeds))
         volts = tuple(float(v) for v in np.broadcast_to(voltage, len(signs)))
@@ -62,7 +63,7 @@ def hover(scene: Scene) -> Hover:
     rotors = np.full(len(signs), speed)
     d = STEP * speed
 
-    def slope(direction: np.ndarray, value):
+    def slope(direction: np.ndarray, value: Callable[[Any], float]) -> float:
         return (value(seen(rotors + d * direction, voltage)) - value(seen(rotors - d * direction, voltage))) / (2.0 * d)
 
     one = np.ones(len(signs))
@@ -70,7 +71,11 @@ def hover(scene: Scene) -> Hover:
     ahead = [
         seen(rotors, voltage, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
     ]
-    roll, pitch, turn = (slope(signs[:, k], lambda o, k=k: o.angular_acceleration_body[k]) / thrust for k in range(3))
+
+    def turning(k: int) -> float:
+        return slope(signs[:, k], lambda o: o.angular_acceleration_body[k]) / thrust
+
+    roll, pitch, turn = map(turning, range(3))
     lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
     # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
     more, less = (seen(rotors, voltage + sign * STEP * voltage * signs[:, 2]) for sign in (1.0, -1.0))

@@ -6,15 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from services.autopilot.gains import Airframe, GainSet, build
+from cosim.scene import Scene
+from services.autopilot.gains import GainSet
+from services.autopilot.law import Airframe, build
 from services.autopilot.margins import open_loops
-from services.scene import Scene
-from services.sections import Run
+from services.table import reseed
 from studies.campaign.figures import Figures
-from studies.campaign.flight import seeded
+from studies.campaign.setup import campaign_setup
 from studies.tracking import AXES
 from studies.tune.bandwidths import Bandwidths
-from studies.tune.corners import flown
+from studies.tune.corners import flown, with_gains
 from studies.tune.design import DELAY, believed, gain_set, shortfalls
 from studies.tune.linearise import Hover
 
@@ -49,12 +50,13 @@ def polish(
     Its aim is the mean over the axes of the RMSE, each over that of `start`. What crashes or lacks a margin counts
     as worse than anything that flies. Deterministic: the same scene gives the same gains.
     """
-    plant, seen = believed(airframe, model), {}
-    scenes = [seeded(scene, scene[Run].seed + k) for k in range(SEEDS)]
+    plant, setup = believed(airframe, model), campaign_setup(scene)
+    seen: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
 
     def fly(gains: GainSet) -> list[Figures]:
         progress()
-        return [flown(one, gains, airframe) for one in scenes]
+        run = with_gains(setup, gains)
+        return [flown(reseed(run, setup.seed + k)) for k in range(SEEDS)]
 
     before = fly(gain_set(model, start))
     judged = [axis for axis in AXES if rmse(before, axis) > AT_ALL]
@@ -64,7 +66,7 @@ def polish(
     def cost(logarithms: np.ndarray) -> float:
         bandwidths = start._replace(**{n: float(b) for n, b in zip(free, np.exp(logarithms), strict=True)})
         gains = gain_set(model, bandwidths)
-        lacking = shortfalls(open_loops(build(gains, airframe), plant, tick, DELAY))
+        lacking = shortfalls(open_loops(build(gains.plain(), airframe), plant, tick, DELAY))
         if lacking:
             return 10.0 + len(lacking)
         found = fly(gains)

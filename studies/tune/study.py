@@ -4,15 +4,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from cosim.scene import Scene
 from services.autopilot.config import Autopilot
 from services.autopilot.control import Parameters
-from services.autopilot.gains import Airframe, GainSet, build
+from services.autopilot.gains import GainSet
+from services.autopilot.law import Airframe, build
 from services.autopilot.margins import Margins, margins, open_loops
-from services.autopilot.service import known_airframe
-from services.scene import Scene
-from services.sections import Exchange, Vehicle, follows_trajectory
+from services.autopilot.resolve import known_airframe
+from services.common.sections import Exchange, Vehicle, follows_trajectory
 from studies.campaign.figures import Figures
-from studies.flown import Flown
+from studies.campaign.setup import campaign_setup
+from studies.flight import Flight
 from studies.tune import corners, polish
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.design import DELAY, believed, design, gain_set, shortfalls
@@ -75,9 +77,9 @@ def tune(
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
     airframe, tick, config = known_airframe(scene), scene[Exchange].interval, scene[Autopilot]
-    own = build(config.gain_set(scene), airframe)
+    own = build(scene[GainSet].plain(), airframe)
     compiled = hover(scene)
-    identified = identify(Flown(log), own, compiled) if log else None
+    identified = identify(Flight.read(log), own, compiled) if log else None
     model = identified.model if identified else compiled
     plant = believed(airframe, model)
     before = _judged(config.gains, own, plant, tick)
@@ -88,10 +90,11 @@ def tune(
     if follows_trajectory(scene) and scene[Vehicle].model == "reduced" and not config.operator:
         polished = polish.polish(scene, model, airframe, tick, reached, progress)
         gains = polished.gains
-        at_corners = {corner: corners.flown(scene, gains, airframe, corner) for corner in corners.CORNERS}
+        setup = corners.with_gains(campaign_setup(scene), gains)
+        at_corners = {c: corners.flown(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
     else:
         say("not polished: there is no [trajectory] that the vehicle flies along by itself")
-    after = _judged("new", build(gains, airframe), plant, tick)
+    after = _judged("new", build(gains.plain(), airframe), plant, tick)
     return Tuned(scene.name, tick, compiled, identified, plant, before, after, gains, polished, at_corners)
 
 

@@ -6,7 +6,7 @@ import control
 import numpy as np
 
 from services.autopilot.control import Parameters
-from services.autopilot.gains import Airframe
+from services.autopilot.law import Airframe
 from services.autopilot.margins import loops
 
 PADE = 3  # order of the approximation of the delay: 3e-5 off up to 200 rad/s

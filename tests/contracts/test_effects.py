@@ -60,7 +60,7 @@ def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
 
 @pytest.mark.parametrize("name", NEEDED)
 def test_names_the_key_that_is_missing(name):
-    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: field required"):
+    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: missing; expected"):
         effects.from_scene({name: {}}, DRONE)
 
 
@@ -82,24 +82,27 @@ def test_names_the_key_that_is_out_of_range(name, key, count, value):
     if value > 0.0 and key in ("release_time", "start", "duration", "time"):
         pytest.skip("a time may be as late as one likes")
     table = {**NEEDED.get(name, {}), key: [value] * count if count else value}
-    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{key}\b.*(expected|must)"):
+    with pytest.raises(ValueError, match=rf"^effects\.{name}\.{key}\b.*expected"):
         effects.from_scene({name: table}, DRONE)
 
 
 def test_says_the_whole_range_whatever_is_wrong_with_a_number():
     for charge, wrong in (
-        (1.5, "expected less than or equal to 1, got 1.5"),
-        (-1.0, "expected greater than 0, got -1.0"),
+        (1.5, "got 1.5"),
+        (-1.0, "got -1.0"),
     ):
         with pytest.raises(ValueError) as error:
             effects.from_scene({"battery": {"charge": charge}}, DRONE)
-        assert str(error.value) == f"effects.battery.charge: {wrong} (range: above 0, at most 1)"
-    with pytest.raises(ValueError, match=r"start: field required .*\(range: at least 0\)"):
+        assert str(error.value) == f"effects.battery.charge: expected a number above 0 and at most 1, {wrong}"
+    with pytest.raises(ValueError, match=r"start: missing; expected a number at least 0"):
         effects.from_scene({"wind_gust": {"peak": [1.0, 0.0, 0.0]}}, DRONE)
 
 
 def test_unknown_effect_lists_the_choices():
-    with pytest.raises(ValueError, match=r"unknown effect 'gravitation': choose from air_density, battery"):
+    with pytest.raises(
+        ValueError,
+        match=r"unknown effect 'gravitation'; did you mean gravity_altitude\? expected one of air_density, bat",
+    ):
         effects.from_scene({"gravitation": {}}, DRONE)
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from services.scene import load
-from services.sections import Published, Run
-from studies.flown import Flown
+from cosim.log import LogReader
+from services.common.sections import Published, Run
+from services.table import load
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
@@ -18,7 +18,7 @@ SCENES = sorted((ROOT / "scenes").glob("*.toml"))
 def fly(scene, folder):
     """The figures of a run in one process."""
     figures = folder / "figures.json"
-    command = [sys.executable, "-m", "services.cli", "run", str(scene), "--mode", "single"]
+    command = [sys.executable, "-m", "lapwing", "run", str(scene), "--mode", "single"]
     command += ["--log", str(folder / "log.mcap"), "--json", str(figures)]
     subprocess.run(command, check=True, timeout=600)
     return json.loads(figures.read_text())
@@ -55,11 +55,10 @@ def test_the_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
     assert flown["sim_time_s"] > 120.0
     for axis, value in published.items():
         assert flown["rmse"][axis] < value, axis
-    log = Flown(tmp_path / "log.mcap")
-    t, height = log.times("truth"), log.column("truth", lambda m: m.pose.position.z)
-    thrust = log.column("truth", lambda m: sum(m.rotor_thrust))
+    with LogReader(tmp_path / "log.mcap") as log:
+        times_ns, truth = log.history("/drone1/truth")
+    t, height, thrust = times_ns * 1e-9, truth["pose.position.z"], truth["rotor_thrust"].sum(axis=1)
     there, home = ((t > begin) & (t < begin + 4.0) for begin in (13.0, 98.0))  # hovering at 10 m, before and after
     assert height[there | home].min() > 9.5
     assert thrust[there].mean() - thrust[home].mean() == pytest.approx(2.0 * 9.81, rel=0.05)
-    end = log.column("truth", lambda m: m.pose.position)[-1]
-    assert abs(end[:2]).max() < 0.1
+    assert abs(truth["pose.position"][-1][:2]).max() < 0.1

@@ -1,6 +1,7 @@
 import hashlib
 import struct
 
+import numpy as np
 import pytest
 
 from messages.digest import Digest
@@ -47,3 +48,26 @@ def test_reading_it_changes_nothing():
         one.hexdigest()
         other.update(*entry)
     assert one.hexdigest() == other.hexdigest()
+
+
+@pytest.mark.parametrize("n", [0, 1, 300])
+def test_a_page_counts_as_its_messages_one_by_one(n):
+    rng = np.random.default_rng(n)
+    times = rng.integers(-5, 1 << 60, n)
+    payloads = rng.integers(0, 256, (n, 37), dtype=np.uint8)
+    one, page = Digest(), Digest()
+    for digest_ in (one, page):
+        digest_.update("/b", 1, b"before")
+    for time_ns, payload in zip(times.tolist(), payloads, strict=True):
+        one.update("/a", time_ns, payload.tobytes())
+        one.update("/b", time_ns, payload.tobytes())
+    page.update_page("/a", times, payloads)
+    page.update_page("/b", times, payloads)
+    for digest_ in (one, page):
+        digest_.update("/b", 2, b"behind")
+    assert one.hexdigest() == page.hexdigest()
+
+
+def test_a_page_needs_a_time_for_each_payload():
+    with pytest.raises(ValueError, match="/a: 2 times for 3 payloads"):
+        Digest().update_page("/a", np.zeros(2, np.int64), np.zeros((3, 8), np.uint8))

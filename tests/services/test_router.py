@@ -4,14 +4,14 @@ import subprocess
 import sys
 import time
 
+from cosim.bus import BusError, ZenohBus
+from cosim.launcher import loopback_endpoints
 from messages import PoseStamped
-from services.bus import BusError, ZenohBus
-from services.launcher import loopback_endpoints
 
 
 def test_a_client_hears_the_run(tmp_path):
     (door,) = loopback_endpoints(["door"]).values()
-    command = [sys.executable, "-m", "services.cli", "run", "scenes/hover.toml", "--speed", "2", "--open", door]
+    command = [sys.executable, "-m", "lapwing", "run", "scenes/hover.toml", "--speed", "2", "--open", door]
     command += ["--set", "run.duration=4", "--space", "test-router", "--log", str(tmp_path / "log.mcap")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
         heard = None

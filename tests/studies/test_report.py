@@ -4,13 +4,15 @@ import base64
 import math
 from html.parser import HTMLParser
 
+import made_up
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from cosim.log import LogWriter
+from cosim.provenance import attachments as attachments_of
 from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
-from services.log import LogWriter
-from studies.flown import AXES, Flown
+from studies.flight import AXES, Flight
 from studies.report import picture, plots, write
 from studies.report.plots import estimator, propulsion
 from studies.report.style import POINTS, line, phases
@@ -19,13 +21,12 @@ RATE, SECONDS = 50, 6.0
 OFFSET = (0.1, -0.2, 0.05, 0.01, -0.02, 0.03)  # reference minus truth, so the errors are these numbers
 THRUST, TORQUE = 2e-4, 8e-6  # over speed squared
 BELIEVED = 0.02  # estimate minus truth of x [m]
-SCENE = b"""
-[run]
-title = "a circle <by> formula"
-[published]
-source = "paper, Table 7"
-rmse = { x = 0.2373, yaw = 0.0220 }
-"""
+SETUP = made_up.setup(
+    int(RATE * SECONDS) + 1,
+    RATE,
+    run={"title": "a circle <by> formula"},
+    published={"source": "paper, Table 7", "rmse": {"x": 0.2373, "yaw": 0.0220}},
+)
 METADATA = {"scene": "circle", "seed": "7", "mode": "single", "solver_integrator": "rk4", "solver_step": "0.001"}
 
 
@@ -58,6 +59,7 @@ def messages(std=0.05, rotors=4, reference=True):
             rotor_torque=tuple(TORQUE * w**2 for w in speed),
             wind=Vector3(3.0, math.sin(t), 0.0),
             air_density=1.2,
+            ground_contact=t >= SECONDS,
         )
         yield "truth", truth
         asked = [value + offset for value, offset in zip(position + angles, OFFSET, strict=True)]
@@ -77,7 +79,7 @@ def messages(std=0.05, rotors=4, reference=True):
 
 
 def record(path, entries, attachments=None):
-    with LogWriter(path, METADATA, {"scene.toml": SCENE} if attachments is None else attachments) as log:
+    with LogWriter(path, METADATA, attachments_of(SETUP, {}) if attachments is None else attachments) as log:
         for topic, message in entries:
             instant = message.header.stamp
             time_ns = instant.sec * 1_000_000_000 + instant.nanosec
@@ -125,11 +127,14 @@ class Page(HTMLParser):
         return self.texts[self.texts.index(text) + 1]
 
 
+def report(log):
+    """The report of a log, written beside it."""
+    return write(Flight.read(log), log.with_suffix(".html"))
+
+
 @pytest.fixture(scope="module")
 def page(log):
-    target = write(log)
-    assert target == log.with_suffix(".html")
-    return Page(target)
+    return Page(report(log))
 
 
 def test_every_plot_is_on_the_page_in_its_order_as_png(page):
@@ -153,14 +158,14 @@ def test_the_page_needs_nothing_from_elsewhere(page):
 def test_errors_are_the_offsets_that_were_flown(log, page):
     for axis, unit, offset in zip(AXES, ("m", "m", "m", "rad", "rad", "rad"), OFFSET, strict=True):
         assert page.after(f"{axis} [{unit}]") == f"{abs(offset):.4f}"
-        assert Flown(log).rmse()[axis] == pytest.approx(abs(offset), rel=1e-9)
-        assert Flown(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
+        assert Flight.read(log).rmse[axis] == pytest.approx(abs(offset), rel=1e-9)
+        assert Flight.read(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
     assert page.after(page.after("x [m]")) == "0.2373"
     assert page.after(page.after("y [m]")) != "0.2700"  # nothing published for y in this scene
 
 
 def test_summary_says_what_the_log_says(log, page):
-    flown = Flown(log)
+    flown = Flight.read(log)
     assert page.after("digest") == flown.digest
     assert page.after("duration") == "6.00 s"
     assert page.after("landed") == "yes"
@@ -170,27 +175,27 @@ def test_summary_says_what_the_log_says(log, page):
 
 
 def test_armed_samples_alone_count(log):
-    assert Flown(log).armed.sum() == RATE * (SECONDS - 1.0) + 1
-    assert all(len(e) == Flown(log).armed.sum() for e in Flown(log).errors.values())
+    assert Flight.read(log).armed.sum() == RATE * (SECONDS - 1.0) + 1
+    assert all(len(e) == Flight.read(log).armed.sum() for e in Flight.read(log).errors.values())
 
 
 def test_phases_follow_one_another(log):
-    assert phases(Flown(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
+    assert phases(Flight.read(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
 
 
 def test_coefficients_are_those_of_the_propeller(log):
-    flown = Flown(log)
-    speed = flown.column("truth", lambda m: m.rotor_speed[0])
-    assert propulsion.coefficient(speed, flown.column("truth", lambda m: m.rotor_thrust[0]), 2) == pytest.approx(THRUST)
-    assert propulsion.coefficient(speed, flown.column("truth", lambda m: m.rotor_torque[0]), 2) == pytest.approx(TORQUE)
+    flown = Flight.read(log)
+    speed = flown.truth.rotor_speed[:, 0]
+    assert propulsion.coefficient(speed, flown.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
+    assert propulsion.coefficient(speed, flown.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
 
 
 def test_estimate_errors_and_refusals(log):
-    error = estimator.errors(Flown(log))
+    error = estimator.errors(Flight.read(log))
     expected = np.zeros(9)
     expected[0] = BELIEVED
     assert error == pytest.approx(np.broadcast_to(expected, error.shape), abs=1e-9)
-    assert estimator.refusals(Flown(log)) == "Measurements refused: gps 2, sonar 1."
+    assert estimator.refusals(Flight.read(log)) == "Measurements refused: gps 2, sonar 1."
 
 
 def test_attitude_error_is_in_the_body_frame(tmp_path):
@@ -201,14 +206,14 @@ def test_attitude_error_is_in_the_body_frame(tmp_path):
     stamp = header(0, "world")
     both = [("truth", VehicleState(stamp, Pose(Point(), true))), ("estimate", Estimate(stamp, Pose(Point(), believed)))]
     later = [(topic, m._replace(header=header(10**9, "world"))) for topic, m in both]
-    error = estimator.errors(Flown(record(tmp_path / "yawed.mcap", both + later)))
+    error = estimator.errors(Flight.read(record(tmp_path / "yawed.mcap", both + later)))
     assert error[:, 6:] == pytest.approx(np.array([[0.1, 0.0, 0.0]] * 2), abs=1e-12)
 
 
 def test_a_truncated_log_gives_a_report_too(log, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
-    page = Page(write(cut))
+    page = Page(report(cut))
     assert page.after("landed") == "no"
     assert page.after("digest") == "none: the log has no end"
     assert 0.0 < float(page.after("duration").removesuffix(" s")) < SECONDS
@@ -217,7 +222,7 @@ def test_a_truncated_log_gives_a_report_too(log, tmp_path):
 
 
 def test_what_is_missing_is_said(tmp_path):
-    page = Page(write(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
+    page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
     assert set(page.images) == {"displacements", "angles", "path", "air"}
     assert "Left out: the log has no topic setpoint, actuators." in text
@@ -227,7 +232,7 @@ def test_what_is_missing_is_said(tmp_path):
 
 
 def test_a_single_sample_is_enough(tmp_path):
-    page = Page(write(record(tmp_path / "short.mcap", list(messages())[:5])))
+    page = Page(report(record(tmp_path / "short.mcap", list(messages())[:5])))
     assert page.after("duration") == "0.00 s"
     assert "displacements" in page.images
 
@@ -242,7 +247,7 @@ def test_a_file_that_is_no_log_is_refused(tmp_path, content, complaint):
     if content:
         path.write_bytes(content)
     with pytest.raises(ValueError, match=complaint) as fault:
-        write(path)
+        report(path)
     assert str(path) in str(fault.value)
     assert "\n" not in str(fault.value)
     assert not path.with_suffix(".html").exists()
@@ -251,13 +256,13 @@ def test_a_file_that_is_no_log_is_refused(tmp_path, content, complaint):
 def test_a_log_without_a_flight_is_refused(tmp_path):
     path = record(tmp_path / "imu.mcap", [("imu", Imu(header(0, "drone1")))])
     with pytest.raises(ValueError, match="no flight in this log"):
-        write(path)
+        report(path)
 
 
 def test_a_damaged_scene_is_named(tmp_path):
-    path = record(tmp_path / "scene.mcap", messages(), {"scene.toml": b"[run"})
-    with pytest.raises(ValueError, match=r"scene\.mcap: its attachment scene\.toml is not valid TOML"):
-        write(path)
+    path = record(tmp_path / "scene.mcap", messages(), {"setup.json": b"[run"})
+    with pytest.raises(ValueError, match=r"scene\.mcap: its attachment setup\.json cannot be read"):
+        report(path)
 
 
 def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
@@ -265,11 +270,11 @@ def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
     copy.write_bytes(log.read_bytes())
     copy.with_suffix(".html").mkdir()
     with pytest.raises(ValueError, match=r"a\.html: cannot write the report: "):
-        write(copy)
+        report(copy)
 
 
 def test_the_picture_of_a_mission_is_a_png(log, tmp_path):
-    picture.draw(Flown(log), tmp_path / "mission.png")
+    picture.draw(Flight.read(log), tmp_path / "mission.png")
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 

@@ -5,12 +5,11 @@ accuracy study (none where it cannot express it). Where its package is not insta
 left out.
 """
 
-import importlib
-import pkgutil
 from types import ModuleType
 
 import numpy as np
 
+from dynamics import discovery
 from studies.accuracy.coordinates import matrices
 from studies.accuracy.problem import Outcome
 
@@ -18,11 +17,11 @@ from studies.accuracy.problem import Outcome
 def installed() -> list[ModuleType]:
     """The peers whose package is there; says which are not."""
     found = []
-    for module in pkgutil.iter_modules(__path__):
+    for name in discovery.names(__name__):
         try:
-            found.append(importlib.import_module(f"{__name__}.{module.name}"))
+            found.append(discovery.get(__name__, name, "peer"))
         except ImportError as missing:
-            print(f"{module.name}: left out, {missing}")
+            print(f"{name}: left out, {missing}")
     return found
 
 

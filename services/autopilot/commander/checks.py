@@ -1,31 +1,36 @@
 """What must be in order before the motors may be armed, in words for people."""
 
 import math
-from typing import TYPE_CHECKING
 
+from services.autopilot.commander.state import State
+from services.autopilot.commander.view import View
+from services.autopilot.estimate import NOT_STARTED
 from services.autopilot.estimator import SOURCES
-from services.autopilot.navigation import NOT_STARTED
 
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
-
-LEVEL = 0.35  # [rad] from the vertical at the most
-SINGLE = 0.5  # [s] for which a source may be refused: single readings always are now and then
-_UNSURE = {64: "the position is uncertain", 128: "the attitude is uncertain"}
+MAXIMUM_TILT = 0.35  # [rad] from the vertical
+MAXIMUM_OUTAGE = 0.5  # [s] of a source: single readings are refused now and then
+_UNCERTAIN = {64: "the position is uncertain", 128: "the attitude is uncertain"}
 
 
-def reasons(pilot: "Pilot") -> list[str]:
+def count_outages(view: View, state: State) -> None:
+    """Take in the health of an estimate: how long each source has been lost or refused."""
+    health, interval = view.estimate.health, view.estimate_interval
+    state.source_outage = [t + interval if health >> bit & 1 else 0.0 for bit, t in enumerate(state.source_outage)]
+
+
+def reasons(view: View, state: State) -> list[str]:
     """Why the vehicle cannot be armed; empty: it can."""
-    if pilot.estimate is None or pilot.health == NOT_STARTED:
+    estimate, guidance = view.estimate, state.guidance
+    if estimate.health == NOT_STARTED:
         return ["the estimator has not started"]
-    bad = (name for name, time in zip(SOURCES, pilot.refusing, strict=True) if time > SINGLE)
+    bad = (name for name, time in zip(SOURCES, state.source_outage, strict=True) if time > MAXIMUM_OUTAGE)
     found = [f"no good readings of the {name}" for name in bad]
-    found += [text for bit, text in _UNSURE.items() if pilot.health & bit]
-    q = pilot.estimate.attitude
-    if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(LEVEL):
+    found += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
+    q = estimate.attitude
+    if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(MAXIMUM_TILT):
         found.append("the vehicle does not stand level")
-    if pilot.charge < pilot.parameters["BAT_CRIT_THR"]:
-        found.append(f"the battery is low: {pilot.charge:.0%}")
-    if not pilot.fence.allows(*pilot.estimate.position_world[:2]):
+    if view.battery_charge < guidance.parameters["BAT_CRIT_THR"]:
+        found.append(f"the battery is low: {view.battery_charge:.0%}")
+    if not guidance.fence.allows(*estimate.position_world[:2]):
         found.append("the vehicle stands outside of the fence")
     return found

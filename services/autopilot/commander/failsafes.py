@@ -1,101 +1,96 @@
 """What the vehicle does by itself when something is lost: hold, return, land or descend, as the parameters say."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from services.parameters import DESCEND, HOLD, LAND, RETURN
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.state import FailsafeTimer, State
+from services.autopilot.commander.transitions import Context, enter
+from services.autopilot.commander.view import View
+from services.common.parameters import DESCEND, HOLD, LAND, RETURN
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
-_RANK = ("hold", "return", "land", "descend")  # a failsafe never undoes a stronger one
-_WARNING = 1.0  # [s] a condition lasts before the pilot is told what is to come
+_SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never undoes a more severe one
+_WARNING_TIME = 1.0  # [s] a condition lasts before the operator is told what is to come
 
 
 class Failsafe(NamedTuple):
     """A condition that has to last for a while, and the parameter that says what then happens."""
 
     reason: str
-    lost: Callable[["Pilot"], bool]
-    patience: Callable[["Pilot"], float]  # [s]
+    holds: Callable[[View, State], bool]
+    delay: Callable[[dict[str, float]], float]  # of the parameters [s]
     action: str  # parameter
 
 
 def _battery(reason: str, threshold: str, action: str) -> Failsafe:
-    return Failsafe(reason, lambda p: p.charge < p.parameters[threshold], lambda p: 0.5, action)
+    return Failsafe(reason, lambda v, s: v.battery_charge < s.guidance.parameters[threshold], lambda p: 0.5, action)
+
+
+def _link_lost(view: View, state: State) -> bool:
+    inputs = state.guidance.inputs
+    return inputs.linked and inputs.link_age > state.guidance.parameters["COM_DL_LOSS_T"]
 
 
 FAILSAFES = (
     Failsafe(
         "the position is lost",
-        lambda p: p.position_lost,
-        lambda p: p.parameters["COM_POS_FS_DELAY"],
+        lambda v, s: v.position_lost,
+        lambda p: p["COM_POS_FS_DELAY"],
         "FS_ESTIMATE_ACT",
     ),
-    Failsafe("a motor has failed", lambda p: p.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
+    Failsafe("a motor has failed", lambda v, s: v.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
     _battery("the battery is nearly empty", "BAT_EMERGEN_THR", "FS_BAT_EMER_ACT"),
     _battery("the battery is critical", "BAT_CRIT_THR", "FS_BAT_CRIT_ACT"),
     _battery("the battery is low", "BAT_LOW_THR", "FS_BAT_LOW_ACT"),
-    Failsafe(
-        "the ground station is lost",
-        lambda p: p.linked and p.link_age > p.parameters["COM_DL_LOSS_T"],
-        lambda p: 0.0,
-        "NAV_DLL_ACT",
-    ),
+    Failsafe("the ground station is lost", _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
     Failsafe(
         "the offboard setpoints are lost",
-        lambda p: p.mode_name == "offboard" and not p.offboard_fresh,
+        lambda v, s: s.mode_name == "offboard" and not s.guidance.offboard_fresh,
         lambda p: 0.0,
         "FS_OFFBOARD_ACT",
     ),
     Failsafe(
         "the vehicle has left the fence",
-        lambda p: not p.fence.allows(*p.estimate.position_world[:2]),
+        lambda v, s: not s.guidance.fence.allows(*v.estimate.position_world[:2]),
         lambda p: 0.1,
         "FS_FENCE_ACT",
     ),
 )
 
 
-class Failsafes:
-    """How long each condition has lasted in this flight, and which have acted."""
-
-    def __init__(self) -> None:
-        self._lasted = [0.0] * len(FAILSAFES)
-        self._acted = [False] * len(FAILSAFES)
-
-    def watch(self, pilot: "Pilot", dt: float) -> None:
-        """Take over where a condition has lasted; each acts once until it is over."""
-        for i, failsafe in enumerate(FAILSAFES):
-            if not failsafe.lost(pilot):
-                self._lasted[i], self._acted[i] = 0.0, False
-                continue
-            before = self._lasted[i]
-            self._lasted[i] += dt
-            if self._acted[i]:
-                continue
-            patience, name = failsafe.patience(pilot), _MODES.get(round(pilot.parameters[failsafe.action]))
-            if self._lasted[i] > patience:
-                self._acted[i] = _act(pilot, failsafe.reason, name)
-            elif before <= _WARNING < self._lasted[i] and name:
-                pilot.say(f"{failsafe.reason}: {name} in {patience - _WARNING:.0f} s")
+def update(context: Context) -> None:
+    """Take over where a condition has lasted; each acts once until it is over."""
+    view, state, parameters = context.view, context.state, context.state.guidance.parameters
+    for failsafe in FAILSAFES:
+        if not failsafe.holds(view, state):
+            state.failsafe_timers.pop(failsafe.reason, None)
+            continue
+        before, acted = state.failsafe_timers.get(failsafe.reason, FailsafeTimer(0.0, False))
+        elapsed = before + view.dt
+        if not acted:
+            delay, mode = failsafe.delay(parameters), _MODES.get(round(parameters[failsafe.action]))
+            if elapsed > delay:
+                acted = _act(context, failsafe.reason, mode)
+            elif before <= _WARNING_TIME < elapsed and mode:
+                context.outbox.say(f"{failsafe.reason}: {mode} in {delay - _WARNING_TIME:.0f} s")
+        state.failsafe_timers[failsafe.reason] = FailsafeTimer(elapsed, acted)
 
 
-def _act(pilot: "Pilot", reason: str, name: str | None) -> bool:
+def _act(context: Context, reason: str, mode: str | None) -> bool:
     """Do what is to be done; whether that was possible in the present mode."""
-    if name is None:
-        pilot.say(reason)
+    state = context.state
+    if mode is None:
+        context.outbox.say(reason)
         return True
-    if name == "descend" and pilot.sticks_fresh:
-        name = "altitude_control"  # there is a pilot who sees it: he has it
-    elif _rank(pilot) >= _RANK.index(name):
+    if mode == "descend" and state.guidance.inputs.sticks_fresh:
+        mode = "altitude_control"  # somebody who sees the vehicle holds the sticks: it is his
+    elif _severity(state) >= _SEVERITY.index(mode):
         return False
-    pilot.failsafe = reason
-    pilot.enter(name)
-    pilot.say(f"{reason}: {name}")
+    state.failsafe = reason
+    enter(context.constants, state, mode)
+    context.outbox.say(f"{reason}: {mode}")
     return True
 
 
-def _rank(pilot: "Pilot") -> int:
-    return _RANK.index(pilot.mode_name) if pilot.mode_name in _RANK[1:] else -1
+def _severity(state: State) -> int:
+    return _SEVERITY.index(state.mode_name) if state.mode_name in _SEVERITY[1:] else -1

@@ -1,23 +1,26 @@
-"""The mission's list of items, and where it stands."""
+"""The mission's list of items, and which of them is flown."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
 NONE_REACHED = 65535
-MISSING, WAITING, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
 
 ACTIONS = ("waypoint", "takeoff", "land", "return", "loiter_time", "delay", "jump", "speed", "yaw")
 _PLACED = ("waypoint",)
+MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]
 
 
-def check(items: Sequence[Any]) -> None:
+def check_items(items: Sequence[Any]) -> None:
     """ValueError (one line) for the first item that cannot be flown."""
     for number, item in enumerate(items):
         if item.action not in ACTIONS:
             raise ValueError(f"item {number}: unknown action {item.action}; expected one of {', '.join(ACTIONS)}")
         if item.action in _PLACED and not all(map(math.isfinite, item.position)):
             raise ValueError(f"item {number}: {item.action} needs a place")
+        if item.action == "takeoff" and MAXIMUM_TAKEOFF_HEIGHT < item.position.z < math.inf:
+            raise ValueError(f"item {number}: expected a take-off to at most {MAXIMUM_TAKEOFF_HEIGHT:g} m")
         if math.isinf(item.yaw) or not (math.isfinite(item.hold) and item.hold >= 0.0):
             raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
         if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
@@ -31,7 +34,7 @@ class Route:
 
     def __init__(self, items: Sequence[Any] = ()):
         """At the beginning of a mission; ValueError if it cannot be flown."""
-        check(items)
+        check_items(items)
         self.items = tuple(items)
         self.current, self.reached = 0, NONE_REACHED
         self._jumped: dict[int, int] = {}

@@ -9,12 +9,11 @@ from services.autopilot.estimator.height import update_barometer, update_sonar
 from services.autopilot.estimator.parameters import PRESETS, Estimator
 from services.autopilot.estimator.predict import predict
 from services.autopilot.estimator.standstill import update_standstill
-from services.autopilot.estimator.state import SOURCES, Estimate, State, estimate, initial
+from services.autopilot.estimator.state import SOURCES, State, estimate, initial
 
 __all__ = [
     "PRESETS",
     "SOURCES",
-    "Estimate",
     "Estimator",
     "State",
     "estimate",

@@ -12,6 +12,7 @@ import numpy as np
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
 from dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
+from services.common.ports import StateEstimate
 
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
@@ -72,23 +73,6 @@ class State(NamedTuple):
     nominal: Nominal
     inertial: Inertial
     memory: Memory
-
-
-class Estimate(NamedTuple):
-    """What the estimator tells. Standard deviations are those of its own error."""
-
-    position_world: Vec3  # [m]
-    attitude: Quaternion
-    velocity_world: Vec3  # [m/s]
-    omega_body: Vec3  # [rad/s], bias taken off
-    acceleration_world: Vec3  # [m/s^2], dv/dt
-    gyro_bias: Vec3  # [rad/s]
-    accelerometer_bias: Vec3  # [m/s^2]
-    position_std: Vec3  # [m] world
-    velocity_std: Vec3  # [m/s] world
-    attitude_std: Vec3  # [rad] rotation vector, body
-    health: int  # 0: good; else bit i: SOURCES[i] is lost or refused; bit 6: position, bit 7: attitude uncertain
-    rejected: int  # bit i: the last reading of SOURCES[i] was refused
 
 
 @leaf
@@ -210,7 +194,7 @@ def _health(p, m, position_std, attitude_std):
 
 @kernel
 def estimate(p, s):
-    """`Estimate` now."""
+    """`StateEstimate` now."""
     n, i, c = s.nominal, s.inertial, s.memory.covariance
     r = rotation_matrix(n.attitude)
     position_std = _deviations(c, POSITION)
@@ -220,7 +204,7 @@ def estimate(p, s):
         _deviation_along(c, (r[2], r[5], r[8])),
     )
     health, rejected = _health(p, s.memory, position_std, attitude_std)
-    return Estimate(
+    return StateEstimate(
         n.position_world,
         n.attitude,
         n.velocity_world,

@@ -1,10 +1,16 @@
 """ArduPilot's copter: modes by number; whole numbers travel as floats of the same value."""
 
+from collections.abc import Sequence
+
 from services.mavlink.dialect import mavlink
+from services.mavlink.flight_mode import FlightMode
+from services.mavlink.px4_facts import Fact
+from services.mavlink.vehicle import VehicleDescription
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 HOME_FIRST = True
 TAKEOFF_ABOVE_SEA = False
+PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
 RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 
 _ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
@@ -20,16 +26,22 @@ _SHOWN = {  # what a mode looks like
     "position_control": _LOITER,
     "altitude_control": _ALT_HOLD,
 }
-_ENTERED = {
-    _AUTO: "mission",
-    _GUIDED: "hold",
-    _LOITER: "position_control",
-    _ALT_HOLD: "altitude_control",
-    _POSHOLD: "position_control",
-    _BRAKE: "hold",
-    _RTL: "return",
-    _LAND: "land",
-}
+MODES = (
+    FlightMode("altitude_control", "ALT_HOLD", _ALT_HOLD, advanced=False),
+    FlightMode("mission", "AUTO", _AUTO, mavlink.MAV_STANDARD_MODE_MISSION),
+    FlightMode("hold", "GUIDED", _GUIDED),
+    FlightMode("position_control", "LOITER", _LOITER, advanced=False),
+    FlightMode("return", "RTL", _RTL, mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
+    FlightMode("land", "LAND", _LAND, mavlink.MAV_STANDARD_MODE_LAND),
+    FlightMode("position_control", "POSHOLD", _POSHOLD, advanced=False),
+    FlightMode("hold", "BRAKE", _BRAKE),
+)
+_KINDS = {mode.number: mode.kind for mode in MODES}
+
+
+def facts(description: VehicleDescription) -> Sequence[Fact]:
+    """None: ArduPilot's ground stations ask for other ones."""
+    return ()
 
 
 def custom_mode(main: float, sub: float) -> int:
@@ -44,7 +56,7 @@ def mode_number(mode: str) -> int:
 
 def mode_kind(number: int) -> str | None:
     """The kind of command that enters a custom mode."""
-    return _ENTERED.get(number)
+    return _KINDS.get(number)
 
 
 def param_float(value: float, integer: bool) -> float:

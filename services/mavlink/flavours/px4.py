@@ -3,26 +3,15 @@
 import struct
 
 from services.mavlink.dialect import mavlink
+from services.mavlink.flight_mode import FlightMode
+from services.mavlink.px4_facts import px4_facts
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_PX4
 HOME_FIRST = False
 TAKEOFF_ABOVE_SEA = True
+PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 RATES: dict[str, float] = {}
-
-_ALTITUDE, _POSITION, _AUTO, _OFFBOARD = 2, 3, 4, 6
-_SHOWN = {  # what a mode looks like
-    "takeoff": (_AUTO, 2),
-    "hold": (_AUTO, 3),
-    "goto": (_AUTO, 3),
-    "mission": (_AUTO, 4),
-    "return": (_AUTO, 5),
-    "land": (_AUTO, 6),
-    "descend": (_AUTO, 6),
-    "offboard": (_OFFBOARD, 0),
-    "position_control": (_POSITION, 0),
-    "altitude_control": (_ALTITUDE, 0),
-}
-_ENTERED = {shown: mode for mode, shown in _SHOWN.items() if mode not in ("goto", "descend")}
+facts = px4_facts
 
 
 def custom_mode(main: float, sub: float) -> int:
@@ -30,14 +19,29 @@ def custom_mode(main: float, sub: float) -> int:
     return int(main) << 16 | int(sub) << 24
 
 
+MODES = (  # standard and advanced as PX4's lib/modes has them
+    FlightMode("altitude_control", "Altitude", custom_mode(2, 0), mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, False),
+    FlightMode("position_control", "Position", custom_mode(3, 0), mavlink.MAV_STANDARD_MODE_POSITION_HOLD, False),
+    FlightMode("mission", "Mission", custom_mode(4, 4), mavlink.MAV_STANDARD_MODE_MISSION),
+    FlightMode("hold", "Hold", custom_mode(4, 3)),
+    FlightMode("return", "Return", custom_mode(4, 5), mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
+    FlightMode("offboard", "Offboard", custom_mode(6, 0)),
+    FlightMode("takeoff", "Takeoff", custom_mode(4, 2), mavlink.MAV_STANDARD_MODE_TAKEOFF),
+    FlightMode("land", "Land", custom_mode(4, 6), mavlink.MAV_STANDARD_MODE_LAND),
+)
+_NUMBERS = {mode.kind: mode.number for mode in MODES}
+_KINDS = {mode.number: mode.kind for mode in MODES}
+_SHOWN_AS = {"goto": "hold", "descend": "land"}  # modes that PX4 has no number for
+
+
 def mode_number(mode: str) -> int:
     """The custom mode that shows a mode of ours; what is none of PX4's shows as hold."""
-    return custom_mode(*_SHOWN.get(mode, _SHOWN["hold"]))
+    return _NUMBERS.get(_SHOWN_AS.get(mode, mode), _NUMBERS["hold"])
 
 
 def mode_kind(number: int) -> str | None:
     """The kind of command that enters a custom mode."""
-    return _ENTERED.get((number >> 16 & 0xFF, number >> 24 & 0xFF))
+    return _KINDS.get(number & 0xFFFF0000)
 
 
 def param_float(value: float, integer: bool) -> float:

@@ -1,25 +1,21 @@
-"""Where partners are met: a kind of link a file, found by the first word of its URL."""
+"""Ways to endpoints: a kind of link a file, found by the first word of its URL."""
 
-import importlib
-import pkgutil
+from functools import cache
 from selectors import BaseSelector
 
+from dynamics import discovery
 from services.mavlink.adapter import Adapter
 from services.mavlink.links.link import Link
 
-for _module in pkgutil.iter_modules(__path__):
-    importlib.import_module(f"{__name__}.{_module.name}")
+__all__ = ["Link", "check", "kinds", "open_link"]
 
 
-def _kinds(base: type[Link]) -> dict[str, type[Link]]:
-    found = {base.SCHEME: base} if base.SCHEME else {}
-    for cls in base.__subclasses__():
-        found |= _kinds(cls)
-    return found
-
-
-KINDS = dict(sorted(_kinds(Link).items()))
-"""Class by the first word of a URL."""
+@cache
+def kinds() -> dict[str, type[Link]]:
+    """Class by the first word of a URL."""
+    classes = [value for module in discovery.modules(__name__).values() for value in vars(module).values()]
+    links = [cls for cls in classes if isinstance(cls, type) and issubclass(cls, Link) and cls.SCHEME]
+    return {cls.SCHEME: cls for cls in sorted(links, key=lambda cls: cls.SCHEME)}
 
 
 def check(url: str) -> type[Link]:
@@ -29,9 +25,9 @@ def check(url: str) -> type[Link]:
         ValueError: none; the text lists the forms.
     """
     scheme, _, rest = url.partition(":")
-    kind = KINDS.get(scheme)
+    kind = kinds().get(scheme)
     if kind is None or not kind.fits(rest):
-        forms = ", ".join(cls.FORM for cls in KINDS.values())
+        forms = ", ".join(cls.FORM for cls in kinds().values())
         raise ValueError(f"--mavlink {url}: expected one of {forms}; for example udpout:127.0.0.1:14550")
     return kind
 

@@ -11,13 +11,13 @@ from services.mavlink.adapter import Adapter
 
 ROUND = 64  # pieces of bytes read from one socket before others get their turn
 PIECE = 2048  # [bytes] a piece is no longer
-LEAST_RATE = 2000.0  # [1/s] pieces that a link always takes; what comes faster is dropped unread
+MAX_RATE = 2000.0  # [1/s] pieces that a link takes; what comes faster is dropped unread
 
 
 class Budget:
     """How many pieces of bytes a link may read: so many a second, and a second's worth at once."""
 
-    def __init__(self, rate: float = LEAST_RATE):
+    def __init__(self, rate: float = MAX_RATE):
         self._rate, self._left, self._then = rate, rate, time.monotonic()
 
     def take(self) -> bool:
@@ -32,7 +32,7 @@ class Budget:
 
 
 class Link:
-    """A socket or a device that partners are behind. Subclasses read it when the selector says so."""
+    """A socket or a device that endpoints are behind. Subclasses read it when the selector says so."""
 
     SCHEME: ClassVar[str] = ""
     FORM: ClassVar[str] = ""
@@ -59,7 +59,7 @@ class Link:
         raise NotImplementedError
 
 
-def endpoint(rest: str) -> tuple[str, int]:
+def socket_address(rest: str) -> tuple[str, int]:
     """Host, as a number, and port; raises OSError for a host that nobody knows."""
     host, _, port = rest.rpartition(":")
     return socket.gethostbyname(host), int(port)

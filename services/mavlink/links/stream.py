@@ -1,4 +1,4 @@
-"""A partner behind a stream of bytes, whose end may be slow to take what is sent."""
+"""An endpoint behind a stream of bytes, whose end may be slow to take what is sent."""
 
 import os
 from collections.abc import Callable
@@ -7,11 +7,11 @@ from selectors import EVENT_READ, BaseSelector
 from services.mavlink.adapter import Adapter
 from services.mavlink.links.link import PIECE, ROUND
 
-HELD = 256 * 1024  # [bytes] kept for a partner that does not take them; more, and it is dropped
+MAX_PENDING = 256 * 1024  # [bytes] kept for an endpoint that does not take them; more, and it is dropped
 
 
 class ByteStream:
-    """A non-blocking file descriptor and the client behind it."""
+    """A non-blocking file descriptor and the endpoint behind it."""
 
     def __init__(
         self,
@@ -25,24 +25,24 @@ class ByteStream:
         """`affords` says whether one more piece may be read; `gone` is called when the stream has ended."""
         self._descriptor, self._adapter, self._selector = descriptor, adapter, selector
         self._affords, self._gone = affords, gone
-        self._held = bytearray()
+        self._pending = bytearray()
         self._broken = False
-        self._client = adapter.connect(local, False, self._put)
+        self._endpoint = adapter.connect(local, False, self._put)
         selector.register(descriptor, EVENT_READ, self.read)
 
     def _put(self, data: bytes) -> None:
         if self._broken:
             return
-        self._held += data
+        self._pending += data
         try:
-            written = os.write(self._descriptor, self._held)
-            del self._held[:written]
+            written = os.write(self._descriptor, self._pending)
+            del self._pending[:written]
         except BlockingIOError:
             pass
         except OSError:
             self._broken = True
-        if len(self._held) > HELD:
-            self._adapter.counts["client that does not listen"] += 1
+        if len(self._pending) > MAX_PENDING:
+            self._adapter.counts["endpoint that does not read"] += 1
             self._broken = True
 
     def read(self) -> None:
@@ -59,9 +59,9 @@ class ByteStream:
                 self._gone()
                 return
             if self._affords():
-                self._adapter.receive(self._client, data)
+                self._adapter.receive(self._endpoint, data)
 
     def end(self) -> None:
-        """Forget the client."""
+        """Forget the endpoint."""
         self._selector.unregister(self._descriptor)
-        self._adapter.disconnect(self._client)
+        self._adapter.disconnect(self._endpoint)

@@ -5,10 +5,10 @@ from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
 from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link, endpoint, is_local
+from services.mavlink.links.link import Link, is_local, socket_address
 from services.mavlink.links.stream import ByteStream
 
-MOST_CLIENTS = 8
+MAX_ENDPOINTS = 8
 
 
 class TcpIn(Link):
@@ -19,7 +19,7 @@ class TcpIn(Link):
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
-        self._server = socket.create_server(endpoint(rest))
+        self._server = socket.create_server(socket_address(rest))
         self._server.setblocking(False)
         self._streams: dict[socket.socket, ByteStream] = {}
         selector.register(self._server, EVENT_READ, self._accept)
@@ -29,8 +29,8 @@ class TcpIn(Link):
             connection, address = self._server.accept()
         except OSError:  # gone again meanwhile
             return
-        if len(self._streams) >= MOST_CLIENTS:
-            self.adapter.counts["no room for another client"] += 1
+        if len(self._streams) >= MAX_ENDPOINTS:
+            self.adapter.counts["no room for another endpoint"] += 1
             connection.close()
             return
         connection.setblocking(False)

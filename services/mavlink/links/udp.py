@@ -6,28 +6,28 @@ from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
 from services.mavlink.adapter import Adapter
-from services.mavlink.client import Client
-from services.mavlink.links.link import PIECE, ROUND, Link, endpoint, is_local
+from services.mavlink.endpoint import Endpoint
+from services.mavlink.links.link import PIECE, ROUND, Link, is_local, socket_address
 
-MOST_CLIENTS = 8
-SILENT = 10.0  # [s] of wall time after which a partner makes room for another
+MAX_ENDPOINTS = 8
+SILENT = 10.0  # [s] of wall time after which an endpoint makes room for another
 
 Address = tuple[str, int]
 
 
 class _Udp(Link):
-    """A socket, and the partners by their addresses."""
+    """A socket, and the endpoints by their addresses."""
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
-        self.clients: dict[Address, Client] = {}
+        self.endpoints: dict[Address, Endpoint] = {}
         self.heard: dict[Address, float] = {}
         selector.register(self.socket, EVENT_READ, self.read)
 
-    def meet(self, address: Address) -> Client:
-        """A partner at a new address."""
+    def meet(self, address: Address) -> Endpoint:
+        """An endpoint at a new address."""
 
         def put(data: bytes) -> None:
             try:
@@ -44,7 +44,7 @@ class _Udp(Link):
                 data, address = self.socket.recvfrom(PIECE)
             except BlockingIOError:
                 return
-            except OSError:  # the answer to something sent where nobody listens
+            except OSError:  # the reply to something sent where nobody listens
                 continue
             if self.affords():
                 self.hear(address, data)
@@ -60,27 +60,27 @@ class _Udp(Link):
 
 
 class UdpOut(_Udp):
-    """To one partner, who need not have spoken."""
+    """To one endpoint, which need not have sent anything."""
 
     SCHEME: ClassVar[str] = "udpout"
     FORM: ClassVar[str] = "udpout:HOST:PORT"
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
-        address = endpoint(rest)
-        self.clients[address] = self.meet(address)
+        address = socket_address(rest)
+        self.endpoints[address] = self.meet(address)
 
     def hear(self, address: Address, data: bytes) -> None:
-        """Only the partner is listened to."""
-        client = self.clients.get(address)
-        if client:
-            self.adapter.receive(client, data)
+        """Only that endpoint is listened to."""
+        endpoint = self.endpoints.get(address)
+        if endpoint:
+            self.adapter.receive(endpoint, data)
         else:
             self.adapter.counts["from a stranger"] += 1
 
 
 class UdpIn(_Udp):
-    """On a port of our own: whoever says something sensible there is a partner."""
+    """On a port of our own: whoever says something sensible there is an endpoint."""
 
     SCHEME: ClassVar[str] = "udpin"
     FORM: ClassVar[str] = "udpin:HOST:PORT"
@@ -88,34 +88,34 @@ class UdpIn(_Udp):
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         try:
-            self.socket.bind(endpoint(rest))
+            self.socket.bind(socket_address(rest))
         except OSError:
             self.close()
             raise
 
     def hear(self, address: Address, data: bytes) -> None:
-        """A partner is known by its address, and met at its first sound message."""
-        client = self.clients.get(address)
+        """An endpoint is known by its address, and met at its first sound message."""
+        endpoint = self.endpoints.get(address)
         now = time.monotonic()
-        if client is None:
+        if endpoint is None:
             if not self._room(now):
-                self.adapter.counts["no room for another client"] += 1
+                self.adapter.counts["no room for another endpoint"] += 1
                 return
-            client = self.meet(address)
-            if not self.adapter.receive(client, data):
-                self.adapter.disconnect(client)
+            endpoint = self.meet(address)
+            if not self.adapter.receive(endpoint, data):
+                self.adapter.disconnect(endpoint)
                 return
-            self.clients[address] = client
+            self.endpoints[address] = endpoint
         else:
-            self.adapter.receive(client, data)
+            self.adapter.receive(endpoint, data)
         self.heard[address] = now
 
     def _room(self, now: float) -> bool:
-        if len(self.clients) < MOST_CLIENTS:
+        if len(self.endpoints) < MAX_ENDPOINTS:
             return True
         oldest = min(self.heard, key=self.heard.__getitem__)
         if now - self.heard[oldest] < SILENT:
             return False
-        self.adapter.disconnect(self.clients.pop(oldest))
+        self.adapter.disconnect(self.endpoints.pop(oldest))
         del self.heard[oldest]
         return True

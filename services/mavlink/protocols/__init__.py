@@ -1,11 +1,15 @@
-"""What partners may ask for: a file for each protocol of MAVLink, each saying which messages it answers."""
+"""What endpoints may ask for: a file for each protocol of MAVLink, each declaring which messages it handles."""
 
-import importlib
-import pkgutil
+from functools import cache
 
-from services.mavlink.protocols.handler import HANDLERS
+from dynamics import discovery
+from services.mavlink.protocols.handler import HANDLERS, Handler
 
-for _module in pkgutil.iter_modules(__path__):
-    importlib.import_module(f"{__name__}.{_module.name}")
+__all__ = ["Handler", "handlers"]
 
-__all__ = ["HANDLERS"]
+
+@cache
+def handlers() -> dict[int, Handler]:
+    """Every handler by the number of its message."""
+    discovery.modules(__name__)
+    return HANDLERS

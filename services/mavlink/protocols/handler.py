@@ -1,22 +1,19 @@
-"""How a protocol says which messages it answers."""
+"""How a protocol declares which messages it handles."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from services.mavlink.dialect import id_of
+from services.mavlink.session import Session
 
-if TYPE_CHECKING:
-    from services.mavlink.adapter import Adapter
-    from services.mavlink.client import Client
-
-Handler = Callable[["Adapter", "Client", Any], None]
+Handler = Callable[[Session, Any], None]
 
 HANDLERS: dict[int, Handler] = {}
-"""Who answers a message, by its number."""
+"""The handlers that have been declared, by the number of their message."""
 
 
 def handles(*names: str) -> Callable[[Handler], Handler]:
-    """Declare the function that answers these messages."""
+    """Declare the function that handles these messages."""
 
     def declare(handler: Handler) -> Handler:
         for number in map(id_of, names):

@@ -1,27 +1,24 @@
 """The parameter protocol's messages."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from services.mavlink.client import Client
 from services.mavlink.protocols.handler import handles
-
-if TYPE_CHECKING:
-    from services.mavlink.adapter import Adapter
+from services.mavlink.session import Session
 
 
 @handles("PARAM_REQUEST_LIST")
-def request_list(adapter: "Adapter", client: Client, m: Any) -> None:
+def request_list(session: Session, m: Any) -> None:
     """All of them."""
-    adapter.parameters.start_list(client)
+    session.parameters.start_list(session.endpoint)
 
 
 @handles("PARAM_REQUEST_READ")
-def request_read(adapter: "Adapter", client: Client, m: Any) -> None:
+def request_read(session: Session, m: Any) -> None:
     """One of them."""
-    adapter.parameters.read(client, m.param_id, m.param_index)
+    session.parameters.read(session.endpoint, m.param_id, m.param_index)
 
 
 @handles("PARAM_SET")
-def set_(adapter: "Adapter", client: Client, m: Any) -> None:
+def set_(session: Session, m: Any) -> None:
     """Another value for one."""
-    adapter.parameters.set(client, m.param_id, m.param_value, adapter.trusts(client))
+    session.parameters.set(session.endpoint, m.param_id, m.param_value, session.trusted)

@@ -1,17 +1,14 @@
 """Setpoints of offboard flight, and sticks: streams of messages that nobody acknowledges."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dynamics.vector import Vec3
-from services.mavlink.client import Client
+from services.mavlink.coordinates import degrees, to_world
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
-from services.mavlink.place import degrees, to_world
 from services.mavlink.protocols.handler import handles
-
-if TYPE_CHECKING:
-    from services.mavlink.adapter import Adapter
+from services.mavlink.session import Session
 
 NOT_GIVEN: Vec3 = (math.nan, math.nan, math.nan)
 _AHEAD = {mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD}  # positions from the vehicle, along its axes
@@ -24,82 +21,82 @@ IGNORE_YAW_RATE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 CENTRE = 500.0  # of the throttle stick, which is the only one from 0 to 1000
 
 
-def given(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
+def masked(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
     """Three numbers, NaN where the mask says to ignore them; from NED or FRD axes still."""
     a, b, c = (math.nan if mask >> first_bit + k & 1 else value for k, value in enumerate((x, y, z)))
     return a, b, c
 
 
-def turned(v: Vec3, heading: float) -> Vec3:
+def rotated(v: Vec3, heading: float) -> Vec3:
     """A vector of forward, right, down as north, east, down."""
     s, c = math.sin(heading), math.cos(heading)
     return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
 
 
 @handles("SET_POSITION_TARGET_LOCAL_NED")
-def local_target(adapter: "Adapter", client: Client, m: Any) -> None:
+def local_target(session: Session, m: Any) -> None:
     """Position, velocity, acceleration from home, or from the vehicle along the world's or its own axes."""
-    motion = adapter.vehicle.motion
-    if m.coordinate_frame not in _LOCAL or m.type_mask & FORCE or motion is None:
-        adapter.counts["senseless setpoint"] += 1
+    estimate = session.vehicle.estimate
+    if m.coordinate_frame not in _LOCAL or m.type_mask & FORCE or estimate is None:
+        session.count("senseless setpoint")
         return
-    position = given(m.type_mask, 0, m.x, m.y, m.z)
-    velocity = given(m.type_mask, 3, m.vx, m.vy, m.vz)
-    acceleration = given(m.type_mask, 6, m.afx, m.afy, m.afz)
-    heading = motion.angles[2]
+    position = masked(m.type_mask, 0, m.x, m.y, m.z)
+    velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
+    acceleration = masked(m.type_mask, 6, m.afx, m.afy, m.afz)
+    heading = estimate.angles[2]
     if m.coordinate_frame in _BODY:
-        velocity, acceleration = turned(velocity, heading), turned(acceleration, heading)
+        velocity, acceleration = rotated(velocity, heading), rotated(acceleration, heading)
     if m.coordinate_frame in _AHEAD:
-        position = turned(position, heading)
+        position = rotated(position, heading)
     if m.coordinate_frame in _FROM_HERE:
-        n, e, d = motion.position_ned
+        n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
-    _put(adapter, client, m, swap_world(position), velocity, acceleration)
+    _put(session, m, swap_world(position), velocity, acceleration)
 
 
 @handles("SET_POSITION_TARGET_GLOBAL_INT")
-def global_target(adapter: "Adapter", client: Client, m: Any) -> None:
+def global_target(session: Session, m: Any) -> None:
     """The same with the position on the Earth."""
-    latitude, longitude, altitude = given(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
+    latitude, longitude, altitude = masked(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
     try:
-        position_world = to_world(m.coordinate_frame, latitude, longitude, altitude)
+        position_world = to_world(session.vehicle.datum, m.coordinate_frame, latitude, longitude, altitude)
     except ValueError:
-        adapter.counts["senseless setpoint"] += 1
+        session.count("senseless setpoint")
         return
-    velocity = given(m.type_mask, 3, m.vx, m.vy, m.vz)
-    acceleration = given(m.type_mask, 6, m.afx, m.afy, m.afz)
-    _put(adapter, client, m, position_world, velocity, acceleration)
+    velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
+    acceleration = masked(m.type_mask, 6, m.afx, m.afy, m.afz)
+    _put(session, m, position_world, velocity, acceleration)
 
 
 def _unless(ignored: int, value: float) -> float:
     return math.nan if ignored else value
 
 
-def _put(adapter: "Adapter", client: Client, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
+def _put(session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
     yaw, rate = swap_yaw(_unless(m.type_mask & IGNORE_YAW, m.yaw)), -_unless(m.type_mask & IGNORE_YAW_RATE, m.yaw_rate)
     values = (*position_world, *swap_world(velocity), *swap_world(acceleration), yaw, rate)
-    _send(adapter, client, "offboard_position", values)
+    _send(session, "offboard_position", values)
 
 
 @handles("SET_ATTITUDE_TARGET")
-def attitude_target(adapter: "Adapter", client: Client, m: Any) -> None:
-    """Attitude or body rates, and thrust as a share of the greatest."""
+def attitude_target(session: Session, m: Any) -> None:
+    """Attitude or body rates, and collective thrust as a fraction of its maximum."""
     ignored = m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
     norm = math.sqrt(sum(e * e for e in m.q))
     if not ignored and not 0.5 < norm < 2.0:  # NaN fails too
-        adapter.counts["senseless setpoint"] += 1
+        session.count("senseless setpoint")
         return
     unit = (math.nan,) * 4 if ignored else swap_attitude(tuple(e / norm for e in m.q))  # type: ignore[arg-type]
-    rates = given(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
+    rates = masked(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
     thrust = _unless(m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE, m.thrust)
-    _send(adapter, client, "offboard_attitude", (*unit, *swap_body(rates), thrust))
+    _send(session, "offboard_attitude", (*unit, *swap_body(rates), thrust))
 
 
 @handles("MANUAL_CONTROL")
-def manual_control(adapter: "Adapter", client: Client, m: Any) -> None:
+def manual_control(session: Session, m: Any) -> None:
     """Sticks of a joystick, -1000 to 1000: forward, right, throttle from 0, turn to the right."""
     values = (_stick(m.x), -_stick(m.y), _stick(2.0 * (m.z - CENTRE)), -_stick(m.r))
-    _send(adapter, client, "manual", values)
+    _send(session, "manual", values)
 
 
 def _stick(value: float) -> float:
@@ -107,8 +104,8 @@ def _stick(value: float) -> float:
     return value * 1e-3 if abs(value) <= 1000.0 else 0.0
 
 
-def _send(adapter: "Adapter", client: Client, kind: str, values: tuple[float, ...]) -> None:
+def _send(session: Session, kind: str, values: tuple[float, ...]) -> None:
     if any(map(math.isinf, values)):
-        adapter.counts["senseless setpoint"] += 1
-    elif adapter.trusts(client):
-        adapter.requests.ask(kind, client.name, None, values)
+        session.count("senseless setpoint")
+    elif session.trusted:
+        session.command(kind, values)

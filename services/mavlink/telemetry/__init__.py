@@ -1,11 +1,34 @@
-"""What the vehicle tells without being asked: one table of messages, gathered from the files of this folder."""
+"""What the vehicle sends without being asked: one table of messages, gathered from the files of this folder."""
 
-import importlib
-import pkgutil
+from functools import cache
+from typing import Any
 
-from services.mavlink.telemetry.stream import STREAMS, Stream
+from dynamics import discovery
+from services.mavlink.telemetry.stream import ON_REQUEST, STREAMS, Stream
+from services.mavlink.view import VehicleView
 
-for _module in pkgutil.iter_modules(__path__):
-    importlib.import_module(f"{__name__}.{_module.name}")
+__all__ = ["Stream", "requested", "streams"]
 
-__all__ = ["STREAMS", "Stream"]
+
+@cache
+def streams() -> dict[int, Stream]:
+    """Every stream by the number of its message; what the dialect lacks is not there."""
+    discovery.modules(__name__)
+    return STREAMS
+
+
+def requested(vehicle: VehicleView, number: int, parameter: float = 0.0) -> list[Any] | None:
+    """The messages that answer a request for one of this number, as they would be now.
+
+    Args:
+        vehicle: its newest state.
+        number: of the message.
+        parameter: the request's second, which some messages depend on.
+
+    Returns:
+        None for a message that is not of the telemetry; empty while it has no content.
+    """
+    if number in streams():
+        message = streams()[number].build(vehicle)
+        return [] if message is None else [message]
+    return ON_REQUEST[number](vehicle, parameter) if number in ON_REQUEST else None

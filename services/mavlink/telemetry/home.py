@@ -6,10 +6,9 @@ from typing import Any
 from dynamics.geodesy import enu_to_geodetic
 from messages.topics import ESTIMATE
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_world, whole
+from services.mavlink.frames import saturated, swap_world
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
-from services.mavlink.view import HOME
+from services.mavlink.view import VehicleView
 
 # What the estimator gives: attitude, velocities, position relative and absolute, height; nothing over terrain.
 _GIVEN = (
@@ -25,31 +24,31 @@ _GIVEN = (
 
 
 @stream("HOME_POSITION", 0.5)
-def home_position(v: Vehicle) -> Any:
-    """Where it was armed, and returns to; before it is armed, where it stood at the start."""
-    home = tuple(v.status.home)
-    latitude, longitude, height = enu_to_geodetic(HOME, home)
+def home_position(v: VehicleView) -> Any:
+    """Where it stood when it was armed, and returns to; before that, where it stood at the start."""
+    home = v.home_world
+    latitude, longitude, height = enu_to_geodetic(v.description.home, home)
     return mavlink.MAVLink_home_position_message(
-        whole(latitude * 1e7, 32),
-        whole(longitude * 1e7, 32),
-        whole(height * 1e3, 32),
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
+        saturated(height * 1e3, 32),
         *swap_world(home),
-        [1.0, 0.0, 0.0, 0.0],
+        [math.cos(0.5 * v.home_heading), 0.0, 0.0, math.sin(0.5 * v.home_heading)],
         *(0.0, 0.0, 0.0),
         time_usec=v.boot_us,
     )
 
 
 @stream("GPS_GLOBAL_ORIGIN")
-def global_origin(v: Vehicle) -> Any:
+def global_origin(v: VehicleView) -> Any:
     """The origin of local positions."""
     return mavlink.MAVLink_gps_global_origin_message(*v.origin, time_usec=v.boot_us)
 
 
 @stream("ESTIMATOR_STATUS", 0.5, 1.0)
-def estimator_status(v: Vehicle) -> Any:
+def estimator_status(v: VehicleView) -> Any:
     """How far the estimate is to be trusted."""
-    e = v.view.get(ESTIMATE)
+    e = v.get(ESTIMATE)
     if e is None:
         return None
     spread = math.hypot(e.position_std.x, e.position_std.y)

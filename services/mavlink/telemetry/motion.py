@@ -4,71 +4,72 @@ import math
 from typing import Any
 
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import compass, whole
-from services.mavlink.telemetry.power import motor_shares
+from services.mavlink.frames import compass, saturated
+from services.mavlink.telemetry.power import motor_fractions
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
 
 @stream("ATTITUDE", 50.0)
-def attitude(v: Vehicle) -> Any:
+def attitude(v: VehicleView) -> Any:
     """Euler angles and body rates."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_attitude_message(v.boot_ms, *m.angles, *m.omega_frd)
 
 
 @stream("ATTITUDE_QUATERNION", 50.0)
-def attitude_quaternion(v: Vehicle) -> Any:
+def attitude_quaternion(v: VehicleView) -> Any:
     """The attitude without its singularity."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_attitude_quaternion_message(v.boot_ms, *m.attitude, *m.omega_frd)
 
 
 @stream("LOCAL_POSITION_NED", 50.0)
-def local_position(v: Vehicle) -> Any:
+def local_position(v: VehicleView) -> Any:
     """From home, north east down."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_local_position_ned_message(v.boot_ms, *m.position_ned, *m.velocity_ned)
 
 
 @stream("GLOBAL_POSITION_INT", 50.0)
-def global_position(v: Vehicle) -> Any:
+def global_position(v: VehicleView) -> Any:
     """On the Earth."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
     latitude, longitude, altitude = m.geodetic
     return mavlink.MAVLink_global_position_int_message(
         v.boot_ms,
-        whole(latitude * 1e7, 32),
-        whole(longitude * 1e7, 32),
-        whole(altitude * 1e3, 32),
-        whole(m.position_world[2] * 1e3, 32),
-        *[whole(u * 1e2, 16) for u in m.velocity_ned],
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
+        saturated(altitude * 1e3, 32),
+        saturated((m.position_world[2] - v.home_world[2]) * 1e3, 32),
+        *[saturated(u * 1e2, 16) for u in m.velocity_ned],
         compass(m.angles[2]),
     )
 
 
 @stream("VFR_HUD", 4.0)
-def hud(v: Vehicle) -> Any:
+def hud(v: VehicleView) -> Any:
     """What a pilot's display shows."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
     north, east, down = m.velocity_ned
     ground_speed = math.hypot(north, east)
-    shares = motor_shares(v)
-    throttle = round(100.0 * sum(shares) / max(1, len(shares)))
+    fractions = motor_fractions(v)
+    throttle = round(100.0 * sum(fractions) / max(1, len(fractions)))
     return mavlink.MAVLink_vfr_hud_message(
         ground_speed, ground_speed, compass(m.angles[2]) // 100, throttle, m.geodetic[2], -down
     )
 
 
 @stream("ALTITUDE", 1.0)
-def altitude(v: Vehicle) -> Any:
+def altitude(v: VehicleView) -> Any:
     """Every altitude there is."""
-    if (m := v.motion) is None:
+    if (m := v.estimate) is None:
         return None
-    above_sea, above_home = m.geodetic[2], m.position_world[2]
-    return mavlink.MAVLink_altitude_message(v.boot_us, above_sea, above_sea, above_home, above_home, math.nan, math.nan)
+    above_sea, local = m.geodetic[2], m.position_world[2]
+    above_home = local - v.home_world[2]
+    return mavlink.MAVLink_altitude_message(v.boot_us, above_sea, above_sea, local, above_home, math.nan, math.nan)

@@ -5,12 +5,12 @@ from typing import Any
 
 from messages.topics import ACTUATORS, BATTERY
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import whole
+from services.mavlink.frames import saturated
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
-PULSE_LEAST, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
-OUTPUTS = 8
+PULSE_MIN, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
+OUTPUTS, ACTUATORS_MAX = 8, 32  # that SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS have room for
 CELLS, MORE_CELLS = 10, 4  # that BATTERY_STATUS has room for in its two lists
 EMPTY = 0xFFFF  # a cell that is not there, in the first list; in the second it is 0
 _STATES = (
@@ -21,35 +21,46 @@ _STATES = (
 )
 
 
-def motor_shares(v: Vehicle) -> list[float]:
-    """Voltage of each motor as a share of the greatest, 0 to 1."""
-    actuators = v.view.get(ACTUATORS)
-    if actuators is None or v.full_voltage is None:
+def motor_fractions(v: VehicleView) -> list[float]:
+    """Voltage of each motor as a fraction of its maximum, 0 to 1."""
+    actuators = v.get(ACTUATORS)
+    if actuators is None or v.description.max_voltage is None:
         return []
-    return [min(1.0, max(0.0, u / v.full_voltage)) for u in actuators.motor_voltage]
+    return [min(1.0, max(0.0, u / v.description.max_voltage)) for u in actuators.motor_voltage]
 
 
 @stream("SERVO_OUTPUT_RAW", 5.0, 10.0)
-def servo_output(v: Vehicle) -> Any:
+def servo_output(v: VehicleView) -> Any:
     """Motor commands as pulse widths."""
-    pulses = [round(PULSE_LEAST + PULSE_SPAN * share) for share in motor_shares(v)[:OUTPUTS]]
+    pulses = [round(PULSE_MIN + PULSE_SPAN * fraction) for fraction in motor_fractions(v)[:OUTPUTS]]
     if not pulses:
         return None
     return mavlink.MAVLink_servo_output_raw_message(v.boot_us & 0xFFFFFFFF, 0, *pulses, *[0] * (OUTPUTS - len(pulses)))
 
 
+@stream("ACTUATOR_OUTPUT_STATUS", 0.0, 10.0)
+def actuator_outputs(v: VehicleView) -> Any:
+    """Motor commands as pulse widths, up to 32 of them."""
+    pulses = [PULSE_MIN + PULSE_SPAN * fraction for fraction in motor_fractions(v)[:ACTUATORS_MAX]]
+    if not pulses:
+        return None
+    active = (1 << len(pulses)) - 1
+    padded = pulses + [0.0] * (ACTUATORS_MAX - len(pulses))
+    return mavlink.MAVLink_actuator_output_status_message(v.boot_us, active, padded)
+
+
 def remaining(battery: Any) -> int:
     """Charge that is left [%], -1 for not known."""
-    return whole(100.0 * battery.percentage, 8, unknown=-1)
+    return saturated(100.0 * battery.percentage, 8, unknown=-1)
 
 
 @stream("BATTERY_STATUS", 0.5, 0.5)
-def battery_status(v: Vehicle) -> Any:
+def battery_status(v: VehicleView) -> Any:
     """The battery, cell by cell."""
-    b = v.view.get(BATTERY)
+    b = v.get(BATTERY)
     if b is None:
         return None
-    cells = [whole(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [whole(1e3 * b.voltage, 16, True)]
+    cells = [saturated(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [saturated(1e3 * b.voltage, 16, True)]
     first, more = cells[:CELLS], cells[CELLS:][:MORE_CELLS]
     known = math.isfinite(b.percentage)
     used = 1e3 * (b.design_capacity - b.charge)  # [mA h]
@@ -57,10 +68,10 @@ def battery_status(v: Vehicle) -> Any:
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
         mavlink.MAV_BATTERY_TYPE_LIPO,
-        whole(1e2 * b.temperature, 16),
+        saturated(1e2 * b.temperature, 16),
         first + [EMPTY] * (CELLS - len(first)),
-        whole(-1e2 * b.current, 16, unknown=-1),
-        whole(used, 32, unknown=-1),
+        saturated(-1e2 * b.current, 16, unknown=-1),
+        saturated(used, 32, unknown=-1),
         -1,
         remaining(b),
         charge_state=_STATES[v.status.battery_warning] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
@@ -68,9 +79,9 @@ def battery_status(v: Vehicle) -> Any:
     )
 
 
-def power(v: Vehicle) -> tuple[int, int, int]:
+def power(v: VehicleView) -> tuple[int, int, int]:
     """Voltage [mV], current [0.01 A] and remaining charge [%] for SYS_STATUS."""
-    b = v.view.get(BATTERY)
+    b = v.get(BATTERY)
     if b is None or not math.isfinite(b.voltage):
         return 0xFFFF, -1, -1
-    return whole(1e3 * b.voltage, 16, unsigned=True), whole(-1e2 * b.current, 16, unknown=-1), remaining(b)
+    return saturated(1e3 * b.voltage, 16, unsigned=True), saturated(-1e2 * b.current, 16, unknown=-1), remaining(b)

@@ -6,84 +6,100 @@ from typing import Any
 from messages import NavSatStatus
 from messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG, SONAR
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import compass, swap_body, whole
+from services.mavlink.frames import compass, saturated, swap_body
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
-GAUSS, HECTOPASCAL, CENTIMETRE = 1e-4, 100.0, 0.01
+GAUSS, HECTOPASCAL, CENTIMETRE, MILLI_G = 1e-4, 100.0, 0.01, 9.80665e-3
 TEMPERATURE = 15.0  # [deg C], which no sensor measures
 SATELLITES = 16  # that a fix is said to come from
 UNKNOWN_16, UNKNOWN_32 = 0xFFFF, 0xFFFFFFFF
 
 
-def good_imu(v: Vehicle) -> bool:
+def good_imu(v: VehicleView) -> bool:
     """Whether the newest reading is one."""
-    m = v.view.get(IMU)
+    m = v.get(IMU)
     return m is not None and m.angular_velocity_covariance[0] >= 0.0
 
 
-def good_mag(v: Vehicle) -> bool:
+def good_mag(v: VehicleView) -> bool:
     """Whether the newest reading is one."""
-    m = v.view.get(MAG)
+    m = v.get(MAG)
     return m is not None and math.isfinite(m.magnetic_field.x)
 
 
-def good_baro(v: Vehicle) -> bool:
+def good_baro(v: VehicleView) -> bool:
     """Whether the newest reading is one."""
-    m = v.view.get(BARO)
+    m = v.get(BARO)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
-def good_gps(v: Vehicle) -> bool:
+def good_gps(v: VehicleView) -> bool:
     """Whether there is a fix."""
-    m = v.view.get(GPS)
+    m = v.get(GPS)
     return m is not None and m.status.status >= NavSatStatus.STATUS_FIX
 
 
 @stream("HIGHRES_IMU", 50.0)
-def highres_imu(v: Vehicle) -> Any:
+def highres_imu(v: VehicleView) -> Any:
     """Every inertial, magnetic and pressure reading; what is not there is 0 and not flagged."""
     if not good_imu(v):
         return None
-    m = v.view.get(IMU)
+    m = v.get(IMU)
     force, omega = swap_body(tuple(m.linear_acceleration)), swap_body(tuple(m.angular_velocity))
     field, pressure, updated = (0.0, 0.0, 0.0), 0.0, 0x3F
     if good_mag(v):
-        x, y, z = swap_body(tuple(v.view.get(MAG).magnetic_field))
+        x, y, z = swap_body(tuple(v.get(MAG).magnetic_field))
         field, updated = (x / GAUSS, y / GAUSS, z / GAUSS), updated | 0x1C0
     if good_baro(v):
-        pressure, updated = v.view.get(BARO).fluid_pressure / HECTOPASCAL, updated | 0x200
+        pressure, updated = v.get(BARO).fluid_pressure / HECTOPASCAL, updated | 0x200
     return mavlink.MAVLink_highres_imu_message(
         v.boot_us, *force, *omega, *field, pressure, 0.0, 0.0, TEMPERATURE, updated
     )
 
 
+@stream("SCALED_IMU")
+def scaled_imu(v: VehicleView) -> Any:
+    """The inertial and magnetic readings in whole numbers."""
+    if not good_imu(v):
+        return None
+    m = v.get(IMU)
+    force, omega = swap_body(tuple(m.linear_acceleration)), swap_body(tuple(m.angular_velocity))
+    field = swap_body(tuple(v.get(MAG).magnetic_field)) if good_mag(v) else (0.0, 0.0, 0.0)
+    return mavlink.MAVLink_scaled_imu_message(
+        v.boot_ms,
+        *[saturated(a / MILLI_G, 16) for a in force],
+        *[saturated(1e3 * rate, 16) for rate in omega],
+        *[saturated(1e3 * b / GAUSS, 16) for b in field],
+    )
+
+
 @stream("SCALED_PRESSURE", 1.0, 5.0)
-def scaled_pressure(v: Vehicle) -> Any:
+def scaled_pressure(v: VehicleView) -> Any:
     """Air pressure."""
     if not good_baro(v):
         return None
-    pressure = v.view.get(BARO).fluid_pressure / HECTOPASCAL
+    pressure = v.get(BARO).fluid_pressure / HECTOPASCAL
     return mavlink.MAVLink_scaled_pressure_message(v.boot_ms, pressure, 0.0, round(1e2 * TEMPERATURE))
 
 
 @stream("DISTANCE_SENSOR", 5.0, 10.0)
-def distance(v: Vehicle) -> Any:
+def distance_sensor(v: VehicleView) -> Any:
     """Distance downwards; nothing in reach reads just beyond it."""
-    m = v.view.get(SONAR)
+    m = v.get(SONAR)
     if m is None or math.isnan(m.range):
         return None
-    least, most = round(m.min_range / CENTIMETRE), round(m.max_range / CENTIMETRE)
-    seen = most + 1 if m.range == math.inf else 0 if m.range == -math.inf else round(m.range / CENTIMETRE)
+    minimum, maximum = round(m.min_range / CENTIMETRE), round(m.max_range / CENTIMETRE)
+    distance = maximum + 1 if m.range == math.inf else 0 if m.range == -math.inf else round(m.range / CENTIMETRE)
     return mavlink.MAVLink_distance_sensor_message(
         v.boot_ms,
-        least,
-        most,
-        seen,
+        minimum,
+        maximum,
+        distance,
         mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND,
         0,
         mavlink.MAV_SENSOR_ROTATION_PITCH_270,
-        whole(m.variance / CENTIMETRE**2, 8, unsigned=True),
+        saturated(m.variance / CENTIMETRE**2, 8, unsigned=True),
         m.field_of_view,
         m.field_of_view,
         [0.0] * 4,
@@ -91,11 +107,11 @@ def distance(v: Vehicle) -> Any:
 
 
 @stream("GPS_RAW_INT", 5.0)
-def gps_raw(v: Vehicle) -> Any:
-    """The receiver's fix; where there is no receiver, the believed position as a fix."""
-    if v.on_truth:
-        return _believed(v)
-    fix, moving = v.view.get(GPS), v.view.get(GPS_VELOCITY)
+def gps_raw(v: VehicleView) -> Any:
+    """The receiver's fix; where there is no receiver, the estimated position as a fix."""
+    if not v.description.sensors:
+        return _estimated(v)
+    fix, moving = v.get(GPS), v.get(GPS_VELOCITY)
     if fix is None or moving is None:
         return None
     if not good_gps(v):
@@ -107,33 +123,33 @@ def gps_raw(v: Vehicle) -> Any:
     return _fix(v, (fix.latitude, fix.longitude, fix.altitude), (north, east), spread, moving.twist.covariance[0])
 
 
-def _believed(v: Vehicle) -> Any:
-    if (m := v.motion) is None:
+def _estimated(v: VehicleView) -> Any:
+    if (m := v.estimate) is None:
         return None
     return _fix(v, m.geodetic, m.velocity_ned[:2], (0.0, 0.0), 0.0)
 
 
-def _fix(v: Vehicle, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float) -> Any:
+def _fix(v: VehicleView, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
-    height = whole(altitude * 1e3, 32)
+    height = saturated(altitude * 1e3, 32)
     return mavlink.MAVLink_gps_raw_int_message(
         v.boot_us,
         mavlink.GPS_FIX_TYPE_RTK_FIXED,
-        whole(latitude * 1e7, 32),
-        whole(longitude * 1e7, 32),
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
         height,
         *(100, 100),  # dilution of precision, in hundredths
-        whole(100.0 * math.hypot(north, east), 16, unsigned=True),
+        saturated(100.0 * math.hypot(north, east), 16, unsigned=True),
         compass(math.atan2(east, north)),
         SATELLITES,
         height,
-        *[whole(1e3 * s, 32, unsigned=True) for s in spread],
-        whole(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),
+        *[saturated(1e3 * s, 32, unsigned=True) for s in spread],
+        saturated(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),
     )
 
 
 @stream("VIBRATION", 0.5, 0.5)
-def vibration(v: Vehicle) -> Any:
+def vibration(v: VehicleView) -> Any:
     """The model has no vibration; displays want to be told."""
     return mavlink.MAVLink_vibration_message(v.boot_us, 0.0, 0.0, 0.0, 0, 0, 0)

@@ -8,7 +8,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.telemetry.power import power
 from services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
 NONE = 0xFFFF  # no item of a mission
 CRITICAL = 2  # Status.battery_warning
@@ -28,21 +28,10 @@ _SENSORS = {
     mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: good_baro,
     mavlink.MAV_SYS_STATUS_SENSOR_GPS: good_gps,
 }
-_CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
-)
-VERSION = (1 << 24) | (16 << 16) | (0 << 8) | 255  # of the PX4 that is passed for: 1.16.0, a release
 
 
 @stream("HEARTBEAT", 1.0)
-def heartbeat(v: Vehicle) -> Any:
+def heartbeat(v: VehicleView) -> Any:
     """I am here, in this mode."""
     s = v.status
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -60,14 +49,14 @@ def heartbeat(v: Vehicle) -> Any:
     )
 
 
-def healthy(v: Vehicle) -> bool:
+def healthy(v: VehicleView) -> bool:
     """Whether the estimate is to be trusted."""
-    e = v.view.get(ESTIMATE)
+    e = v.get(ESTIMATE)
     return e is not None and e.health == 0
 
 
 @stream("SYS_STATUS", 1.0, 5.0)
-def sys_status(v: Vehicle) -> Any:
+def sys_status(v: VehicleView) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
@@ -75,14 +64,14 @@ def sys_status(v: Vehicle) -> Any:
     sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
     sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
     for bits, good in _SENSORS.items():
-        sound |= bits if (healthy(v) if v.on_truth else good(v)) else 0
+        sound |= bits if (good(v) if v.description.sensors else healthy(v)) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
     sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)
 
 
 @stream("EXTENDED_SYS_STATE", 1.0, 5.0)
-def extended_state(v: Vehicle) -> Any:
+def extended_state(v: VehicleView) -> Any:
     """On the ground, in the air, or between."""
     s = v.status
     if s.landed:
@@ -95,7 +84,7 @@ def extended_state(v: Vehicle) -> Any:
 
 
 @stream("MISSION_CURRENT", 1.0)
-def mission_current(v: Vehicle) -> Any:
+def mission_current(v: VehicleView) -> Any:
     """How far the mission is."""
     s = v.status
     item = 0 if s.mission_current == NONE else s.mission_current
@@ -104,28 +93,19 @@ def mission_current(v: Vehicle) -> Any:
 
 
 @stream("SYSTEM_TIME", 1.0)
-def system_time(v: Vehicle) -> Any:
+def system_time(v: VehicleView) -> Any:
     """Time of day, and since the start."""
     return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, v.boot_ms)
 
 
-@stream("AUTOPILOT_VERSION")
-def autopilot_version(v: Vehicle) -> Any:
-    """What it can do."""
-    nobody = [0] * 8
-    return mavlink.MAVLink_autopilot_version_message(
-        _CAPABILITIES, VERSION, VERSION, VERSION, 0, nobody, nobody, nobody, 0, 0, v.system
-    )
-
-
 @stream("TIMESYNC", 10.0)
-def timesync(v: Vehicle) -> Any:
+def timesync(v: VehicleView) -> Any:
     """What is your clock?"""
     return mavlink.MAVLink_timesync_message(0, v.time_ns)
 
 
 @stream("EKF_STATUS_REPORT")
-def ekf_status(v: Vehicle) -> Any:
+def ekf_status(v: VehicleView) -> Any:
     """ArduPilot's word for a sound estimate."""
     # attitude, velocities, absolute and relative positions: bits 0 to 5 and 8, 9 of EKF_STATUS_FLAGS
     return mavlink.MAVLink_ekf_status_report_message(0x33F if healthy(v) else 0, *(0.0,) * 5)

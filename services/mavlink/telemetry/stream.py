@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from services.mavlink.dialect import id_of
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
-Builder = Callable[[Vehicle], Any]  # the message, or None while there is nothing to say
+Builder = Callable[[VehicleView], Any]  # the message, or None while there is nothing to say
 
 
 class Stream(NamedTuple):
@@ -20,6 +20,24 @@ class Stream(NamedTuple):
 
 STREAMS: dict[int, Stream] = {}
 """Every stream by the number of its message: what the dialect lacks is not here."""
+
+
+Requested = Callable[[VehicleView, float], list[Any]]  # the messages for parameter 2 of the request
+
+ON_REQUEST: dict[int, Requested] = {}
+"""Messages that are sent on request only and depend on a parameter of it, by number."""
+
+
+def on_request(name: str) -> Callable[[Requested], Requested]:
+    """Declare the builder of messages that a request's second parameter chooses."""
+
+    def declare(build: Requested) -> Requested:
+        number = id_of(name)
+        if number is not None:
+            ON_REQUEST[number] = build
+        return build
+
+    return declare
 
 
 def stream(name: str, ground: float = 0.0, onboard: float | None = None) -> Callable[[Builder], Builder]:

@@ -1,48 +1,48 @@
-"""What is really so, for clients that test estimators and log analyses."""
+"""The true state, for clients that test estimators and log analyses."""
 
 import math
 from typing import Any
 
 from messages.topics import TRUTH
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_world, whole
+from services.mavlink.frames import saturated, swap_world
 from services.mavlink.telemetry.stream import stream
-from services.mavlink.vehicle import Vehicle
+from services.mavlink.view import VehicleView
 
 MILLI_G = 9.80665e-3  # [m/s^2]
 
 
 @stream("HIL_STATE_QUATERNION", 15.0)
-def true_state(v: Vehicle) -> Any:
+def true_state(v: VehicleView) -> Any:
     """The true state; the acceleration is dv/dt along the body's axes."""
-    m, truth = v.view.motion(TRUTH), v.view.get(TRUTH)
+    m, truth = v.truth, v.get(TRUTH)
     if m is None:
         return None
     latitude, longitude, altitude = m.geodetic
-    air_speed = whole(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
+    air_speed = saturated(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
     acceleration = _to_body(m.attitude, swap_world(tuple(truth.acceleration)))
     return mavlink.MAVLink_hil_state_quaternion_message(
         v.boot_us,
         list(m.attitude),
         *m.omega_frd,
-        whole(latitude * 1e7, 32),
-        whole(longitude * 1e7, 32),
-        whole(altitude * 1e3, 32),
-        *[whole(u * 1e2, 16) for u in m.velocity_ned],
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
+        saturated(altitude * 1e3, 32),
+        *[saturated(u * 1e2, 16) for u in m.velocity_ned],
         air_speed,
         air_speed,
-        *[whole(a / MILLI_G, 16) for a in acceleration],
+        *[saturated(a / MILLI_G, 16) for a in acceleration],
     )
 
 
 @stream("WIND_COV", 0.5, 1.0)
-def wind(v: Vehicle) -> Any:
-    """The wind that blows."""
-    truth = v.view.get(TRUTH)
-    if truth is None:
+def wind(v: VehicleView) -> Any:
+    """The wind that blows where the vehicle is: the velocity of the air, and the altitude above the sea."""
+    m, truth = v.truth, v.get(TRUTH)
+    if m is None:
         return None
     return mavlink.MAVLink_wind_cov_message(
-        v.boot_us, *swap_world(tuple(truth.wind)), 0.0, 0.0, truth.pose.position.z, 0.0, 0.0
+        v.boot_us, *swap_world(tuple(truth.wind)), 0.0, 0.0, m.geodetic[2], 0.0, 0.0
     )
 
 

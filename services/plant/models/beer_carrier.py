@@ -1,23 +1,20 @@
 """The crate that unloads its pack over the door, as the drone stands on the ground."""
 
 import math
-from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
 
-from dynamics.effects._types import Motion
-from dynamics.lie.quaternion import exp
-from dynamics.vector import Vec3, add, scale
-from dynamics.vehicles import beer_carrier, beer_places
+from cosim.scene import Scene, Section
+from cosim.setup import ServiceSetup
+from dynamics.errors import KeyedError
+from dynamics.vehicles import beer_carrier
 from dynamics.vehicles.beer_carrier import BeerCarrierParameters, BeerCarrierState, Surface
-from messages import Vector3, VehicleState, header
-from messages.topics import BODIES, CLOCK, POSE, TF, TRUTH, Topic
-from services.plant import outputs
-from services.plant.ending import Ending
-from services.plant.marched import Marched, check_marched
-from services.scene import Scene, Section
-from services.sections import Exchange, Triple, Vehicle, can_have, needs, period
+from services.common.ports import TrueState
+from services.common.sections import Exchange, Triple, can_have, needs
+from services.plant.cores import unloading_bodies
+from services.plant.cores.unloading_bodies import UnloadingView
+from services.plant.models._common import autonomous, check_system
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
@@ -33,13 +30,13 @@ class BeerCarrier(Section):
     pack_mass: float = Field(gt=0.0)  # [kg]
     pack_size: Triple  # [m] length, width, height
     gap: float = Field(default=0.01, ge=0.0)  # [m] between the pack and the shut door
-    tilt_deg: float = Field(ge=0.0, lt=90.0)  # of the crate's floor, down towards the door
+    tilt_deg: float = Field(ge=0.0, lt=90.0)  # [deg] of the crate's floor, down towards the door
     floor_height: float = Field(gt=0.0)  # [m] of the hinge over the ground
     depth: float = Field(gt=0.0)  # [m] from the hinge to the rear wall
     width: float = Field(gt=0.0)  # [m] between the side walls
     roller_radius: float = Field(gt=0.0)  # [m]
     roller_spacing: float = Field(gt=0.0)  # [m]
-    roller_rpm: float  # at the end of the ramp
+    roller_rpm: float  # [rpm] at the end of the ramp
     ramp_start: float = Field(ge=0.0)  # [s] when the rollers start and the door is unlocked
     ramp_duration: float = Field(gt=0.0)  # [s]
     door_length: float = Field(gt=0.0)  # [m]
@@ -51,36 +48,38 @@ class BeerCarrier(Section):
     edge_radius: float = Field(default=0.003, gt=0.0)  # [m]
     pickup: float = Field(gt=0.0)  # [s] when somebody takes the pack away
     gravity: float = Field(default=9.81, ge=0.0)  # [m/s^2]
-    roller_friction: Pair = Field(strict=False)
-    door_friction: Pair = Field(strict=False)
-    ground_friction: Pair = Field(strict=False)
+    roller_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on rollers
+    door_friction: Pair = Field(strict=False)  # the same, of pack on door
+    ground_friction: Pair = Field(strict=False)  # the same, of pack on ground
 
     def check(self, scene: Scene) -> None:
         """Sizes are sizes, the pack fits into the crate, friction is lower in motion."""
         if not all(side > 0.0 for side in self.pack_size):
-            raise ValueError(f"pack_size: expected three lengths above 0 m, got {list(self.pack_size)}")
+            raise KeyedError("beer_carrier.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
         length, width, _ = self.pack_size
         if width > self.width or length + self.gap > self.depth:
             room = f"{self.depth:g} m deep and {self.width:g} m wide"
-            raise ValueError(f"pack_size: a pack that fits into the crate, {room}, got {length:g} m by {width:g} m")
+            expected = f"a pack that fits into the crate, {room}"
+            raise KeyedError("beer_carrier.pack_size", f"got {length:g} m by {width:g} m", expected)
         for key in ("roller_friction", "door_friction", "ground_friction"):
             static, dynamic = getattr(self, key)
             if not 0.0 < dynamic <= static:
-                raise ValueError(
-                    f"{key}: expected [static, dynamic] with 0 < dynamic <= static, got {[static, dynamic]}"
-                )
+                expected = "[static, dynamic] with 0 < dynamic <= static"
+                raise KeyedError(f"beer_carrier.{key}", f"got {[static, dynamic]}", expected)
 
 
 def check(scene: Scene) -> None:
     """The crate is described, and nothing asks of it what it cannot do."""
     needs(scene, "beer_carrier")
     can_have(scene)
-    check_marched(scene, *system(scene))
+    check_system(scene, *system(scene))
 
 
-def create(scene: Scene) -> "Unloading":
+def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the crate."""
-    return Unloading(scene)
+    p, start = system(scene)
+    view = UnloadingView(p, scene[Exchange].interval)
+    return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES)
 
 
 def _surface(friction: Pair) -> Surface:
@@ -100,70 +99,3 @@ def system(scene: Scene) -> tuple[BeerCarrierParameters, BeerCarrierState]:
         c.gravity, _surface(c.roller_friction), _surface(c.door_friction), _surface(c.ground_friction),
     )  # fmt: skip
     return p, beer_carrier.initial_state(p, c.gap)
-
-
-class Unloading:
-    """The pack, of which the vehicle's own topics tell, the door, the rollers and the ground."""
-
-    inputs = ()
-    outputs = (TRUTH, POSE, TF, CLOCK, BODIES)
-
-    def __init__(self, scene: Scene):
-        self.finished = False
-        self._end = Ending(scene)
-        exchange = scene[Exchange]
-        self._name, self._interval, self._interval_ns = scene[Vehicle].name, exchange.interval, exchange.interval_ns
-        self._pose_every, self._bodies_every = period(scene, POSE), period(scene, BODIES)
-        self._p, start = system(scene)
-        self._marched = Marched(scene, self._p, start)
-        self._names = ("pack", "door", *[f"roller{i + 1}" for i in range(beer_places.ROLLERS)], "ground")
-
-    def prepare(self) -> None:
-        """Compile or load the kernels."""
-        beer_carrier.forces_on_pack(self._p, 0.0, self._marched.to(0))
-
-    def step(self, tick: int) -> Iterator[tuple[Topic, Any]]:
-        """Advance to `tick`."""
-        state = self._marched.to(tick)
-        self.finished = self._end.reached(tick)
-        time_ns = tick * self._interval_ns
-        pack = Motion(state.position_world, state.attitude, state.velocity_world, state.omega_body, ())
-        yield (
-            TRUTH,
-            VehicleState(
-                header(time_ns, outputs.WORLD),
-                outputs.pose_of(pack),
-                Vector3(*state.velocity_world),
-                Vector3(*state.omega_body),
-            ),
-        )
-        if tick % self._bodies_every == 0:
-            yield BODIES, self._bodies(time_ns, tick * self._interval, state, pack)
-        if tick % self._pose_every == 0:
-            yield from outputs.whereabouts(time_ns, self._name, pack)
-
-    def _bodies(self, time_ns: int, t: float, state: BeerCarrierState, pack: Motion) -> Any:
-        """Every body with the contact force on it; the door lies along z of its frame."""
-        p, tilt = self._p, self._p.tilt
-        rollers, door, ground, walls = beer_carrier.forces_on_pack(p, t, state)
-        forward, upward = (math.cos(tilt), 0.0, -math.sin(tilt)), (math.sin(tilt), 0.0, math.cos(tilt))
-        hinge = (0.0, 0.0, p.floor_height)
-        turning = (0.0, beer_places.roller_speed(p, t), 0.0)
-        motions, forces = [pack], [_sum(*rollers, door, ground, walls)]
-        motions.append(Motion(hinge, exp((0.0, tilt + state.door[0], 0.0)), NOTHING, (0.0, state.door[1], 0.0), ()))
-        forces.append(scale(-1.0, door))
-        for i in range(beer_places.ROLLERS):
-            behind = scale(-(i + 0.5) * p.roller_spacing, forward)
-            place = add(hinge, add(behind, scale(p.roller_radius, upward)))
-            motions.append(Motion(place, exp((0.0, tilt, 0.0)), NOTHING, turning, ()))
-            forces.append(scale(-1.0, _sum(*rollers[2 * i : 2 * i + 2])))
-        motions.append(Motion(NOTHING, exp(NOTHING), NOTHING, NOTHING, ()))
-        forces.append(scale(-1.0, ground))
-        return outputs.bodies(time_ns, self._names, motions, forces)
-
-
-def _sum(*forces: Vec3) -> Vec3:
-    total = NOTHING
-    for force in forces:
-        total = add(total, force)
-    return total

@@ -1,23 +1,17 @@
 """The OS4 quadrotor with rotors at given speeds, or turned by motors at given voltages: nobody steers it."""
 
 import math
-from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dynamics.effects._types import Motion
-from dynamics.integrators import rate
-from dynamics.kernel import kernel
+from cosim.scene import Scene, Section
+from cosim.setup import ServiceSetup
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
-from messages import Vector3, VehicleState, header
-from messages.topics import CLOCK, POSE, TF, TRUTH, Topic
-from services.plant import outputs
-from services.plant.ending import Ending
-from services.plant.marched import Marched, check_marched
-from services.scene import Scene, Section
-from services.sections import Exchange, Triple, Vehicle, can_have, needs, period
+from services.common.ports import TrueState
+from services.common.sections import Triple, can_have, needs
+from services.plant.models._common import autonomous, check_system
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
@@ -46,20 +40,21 @@ class Os4(Section):
     rotor_inertia: float = Field(ge=0.0)  # [kg m^2]
     gravity: float = 9.81  # [m/s^2]
     translational_drag: Triple = NOTHING  # [N s/m] along the world axes
-    rotor_speed_rpm: Four = Field(strict=False)  # kept, or with motors the start
-    motors: Motors | None = None
+    rotor_speed_rpm: Four = Field(strict=False)  # [rpm] kept, or with motors the start
+    motors: Motors | None = None  # without them the rotors keep their speed
 
 
 def check(scene: Scene) -> None:
     """The quadrotor is described, and nothing asks of it what it cannot do."""
     needs(scene, "os4")
     can_have(scene)
-    check_marched(scene, *system(scene))
+    check_system(scene, *system(scene))
 
 
-def create(scene: Scene) -> "OpenLoop":
+def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the quadrotor."""
-    return OpenLoop(scene)
+    four = (0.0,) * 4
+    return autonomous(scene, *system(scene), TrueState(rotor_speed=four, rotor_thrust=four, rotor_torque=four))
 
 
 def system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
@@ -73,51 +68,3 @@ def system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
     first, second, third, fourth = q.rotor_speed_rpm
     speed = (first * RPM, second * RPM, third * RPM, fourth * RPM)
     return p, Os4State(NOTHING, NO_ROTATION, NOTHING, NOTHING, speed)
-
-
-@kernel
-def acceleration(p, t, x):
-    """Acceleration of the centre of mass in the world [m/s^2]."""
-    return rate(p.value, t, x).velocity_world
-
-
-class OpenLoop:
-    """Flies from rest at the origin as its rotors have it."""
-
-    inputs = ()
-    outputs = (TRUTH, POSE, TF, CLOCK)
-
-    def __init__(self, scene: Scene):
-        self.finished = False
-        self._end = Ending(scene)
-        exchange = scene[Exchange]
-        self._name, self._interval, self._interval_ns = scene[Vehicle].name, exchange.interval, exchange.interval_ns
-        self._pose_every = period(scene, POSE)
-        self._lift_constant, self._drag_constant = scene[Os4].lift_constant, scene[Os4].drag_constant
-        self._marched = Marched(scene, *system(scene))
-
-    def prepare(self) -> None:
-        """Compile or load the kernels."""
-        acceleration(self._marched.parameters, 0.0, self._marched.to(0))
-
-    def step(self, tick: int) -> Iterator[tuple[Topic, Any]]:
-        """Advance to `tick`."""
-        state = self._marched.to(tick)
-        self.finished = self._end.reached(tick)
-        time_ns = tick * self._interval_ns
-        motion = Motion(*state)
-        yield (
-            TRUTH,
-            VehicleState(
-                header(time_ns, outputs.WORLD),
-                outputs.pose_of(motion),
-                Vector3(*state.velocity_world),
-                Vector3(*state.omega_body),
-                Vector3(*acceleration(self._marched.parameters, tick * self._interval, state)),
-                rotor_speed=state.rotor_speed,
-                rotor_thrust=tuple(self._lift_constant * w * w for w in state.rotor_speed),
-                rotor_torque=tuple(self._drag_constant * w * w for w in state.rotor_speed),
-            ),
-        )
-        if tick % self._pose_every == 0:
-            yield from outputs.whereabouts(time_ns, self._name, motion)

@@ -6,6 +6,10 @@ To add a kind, add a file with one subclass of `Segment` and a test of it; a sce
 import importlib
 import pkgutil
 
+from pydantic import ValidationError
+
+from dynamics.errors import KeyedError
+from dynamics.validation import fault
 from services.trajectory.segments.segment import Segment
 
 
@@ -22,13 +26,15 @@ KINDS = _discover()
 def choose(table: object) -> Segment:
     """The validated segment that a table of a scene describes.
 
-    Raises ValueError for anything but a table with a known `kind`; names the choices.
+    Raises KeyedError for anything but a table with a known `kind` and sound keys; names the choices.
     """
     if isinstance(table, Segment):
         return table
-    choices = ", ".join(KINDS)
     if not isinstance(table, dict) or "kind" not in table:
-        raise ValueError(f"a segment is a table with a kind ({choices}), not {table!r}")
+        raise KeyedError("", f"got {table!r}", f"a table with a kind of segment ({', '.join(KINDS)})")
     if table["kind"] not in KINDS:
-        raise ValueError(f"unknown kind of segment {table['kind']!r}; choose one of {choices}")
-    return KINDS[table["kind"]].model_validate(table)
+        raise KeyedError.unknown("kind", "kind of segment", table["kind"], KINDS)
+    try:
+        return KINDS[table["kind"]].model_validate(table)
+    except ValidationError as error:
+        raise fault(error, KINDS[table["kind"]]) from None

@@ -1,7 +1,6 @@
 """A sine whose frequency sweeps linearly: to identify a loop's response from a recorded flight."""
 
 import math
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -17,12 +16,12 @@ class Chirp(Segment):
     last_frequency: Positive  # [Hz]
     duration: Positive  # [s]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One swept piece."""
         sweep = math.pi * (self.last_frequency - self.first_frequency) / self.duration
         return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.first_frequency, sweep)]
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """The value of the chirp where it is cut."""
         cycles = 0.5 * (self.first_frequency + self.last_frequency) * self.duration
         return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

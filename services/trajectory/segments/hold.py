@@ -1,6 +1,5 @@
 """Stay at the value reached."""
 
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -13,6 +12,6 @@ class Hold(Segment):
     kind: Literal["hold"] = "hold"
     duration: Positive  # [s]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One constant piece."""
         return [Piece(self.duration, (start,))]

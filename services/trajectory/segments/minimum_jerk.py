@@ -1,6 +1,5 @@
 """The quintic of least squared jerk between two points of rest."""
 
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -14,11 +13,11 @@ class MinimumJerk(Segment):
     to: Finite  # [u]
     duration: Positive  # [s]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One quintic piece."""
         change, T = self.to - start, self.duration
         return [Piece(T, (start, 0.0, 0.0, 10.0 * change / T**3, -15.0 * change / T**4, 6.0 * change / T**5))]
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """`to`."""
         return self.to

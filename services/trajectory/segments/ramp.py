@@ -1,6 +1,5 @@
 """A straight line to a value."""
 
-from pathlib import Path
 from typing import Literal
 
 from pydantic import model_validator
@@ -14,20 +13,20 @@ class Ramp(Segment):
 
     kind: Literal["ramp"] = "ramp"
     to: Finite  # [u]
-    rate: Positive | None = None  # magnitude [u/s]
+    rate: Positive | None = None  # [u/s] magnitude
     duration: Positive | None = None  # [s]
 
     @model_validator(mode="after")
-    def _one_of_two(self):
+    def _one_of_two(self) -> "Ramp":
         if (self.rate is None) == (self.duration is None):
             raise ValueError("a ramp needs either rate or duration, not both and not neither")
         return self
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One linear piece; none where a ramp at a rate has nowhere to go."""
         duration = self.duration or abs(self.to - start) / (self.rate or 1.0)
         return [Piece(duration, (start, (self.to - start) / duration))] if duration > 0.0 else []
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """`to`."""
         return self.to

@@ -1,6 +1,5 @@
 """What every kind of segment gives."""
 
-from pathlib import Path
 from typing import Annotated
 
 from annotated_types import Gt
@@ -22,10 +21,10 @@ class Segment(BaseModel):
         """The name that scenes use: the default of the field `kind`."""
         return cls.model_fields["kind"].default
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
-        """The pieces from value `start` [u]; files are looked up from `folder`."""
+    def pieces(self, start: float) -> list[Piece]:
+        """The pieces from value `start` [u]. Raises KeyedError where they do not join it."""
         raise NotImplementedError
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """The value [u] where the next segment starts: by itself, where this one started."""
         return start

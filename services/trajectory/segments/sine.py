@@ -1,7 +1,6 @@
 """A sine about the value reached."""
 
 import math
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -16,11 +15,11 @@ class Sine(Segment):
     frequency: Positive  # [Hz]
     duration: Positive  # [s]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One sinusoidal piece."""
         return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.frequency)]
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """The value of the sine where it is cut."""
         cycles = self.frequency * self.duration
         # Whole cycles end where they began: 2 pi n is not representable and would leave a step of rounding.

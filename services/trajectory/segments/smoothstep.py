@@ -1,6 +1,5 @@
 """A cubic that starts and ends at rest."""
 
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -14,11 +13,11 @@ class Smoothstep(Segment):
     to: Finite  # [u]
     duration: Positive  # [s]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """One cubic piece."""
         change, T = self.to - start, self.duration
         return [Piece(T, (start, 0.0, 3.0 * change / T**2, -2.0 * change / T**3))]
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """`to`."""
         return self.to

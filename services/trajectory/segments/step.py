@@ -1,6 +1,5 @@
 """A jump: the only segment that may break the continuity of a channel."""
 
-from pathlib import Path
 from typing import Literal
 
 from services.trajectory.piece import Piece
@@ -13,10 +12,10 @@ class Step(Segment):
     kind: Literal["step"] = "step"
     to: Finite  # [u]
 
-    def pieces(self, start: float, folder: Path) -> list[Piece]:
+    def pieces(self, start: float) -> list[Piece]:
         """None: what follows starts at the new value."""
         return []
 
-    def end(self, start: float, folder: Path) -> float:
+    def end(self, start: float) -> float:
         """`to`."""
         return self.to

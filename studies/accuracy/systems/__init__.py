@@ -3,10 +3,9 @@
 A file has `problems()`, which gives its problems by the name that `lapwing accuracy` takes.
 """
 
-import importlib
-import pkgutil
 from functools import cache
 
+from dynamics import discovery
 from studies.accuracy.problem import Problem
 
 
@@ -14,6 +13,6 @@ from studies.accuracy.problem import Problem
 def problems() -> dict[str, Problem]:
     """Every problem by its name."""
     found: dict[str, Problem] = {}
-    for module in pkgutil.iter_modules(__path__):
-        found |= importlib.import_module(f"{__name__}.{module.name}").problems()
+    for module in discovery.modules(__name__).values():
+        found |= module.problems()
     return found

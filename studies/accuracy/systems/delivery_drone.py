@@ -37,36 +37,36 @@ METHOD = integrators.get("rk4_renormalised")
 STILL = (0.0, 0.0, 0.0)
 
 
-def gap(p, x):
+def gap(p: Any, x: Any) -> float:
     """How far the state is off its constraints [m, -]."""
     raise NotImplementedError("compiled code only")
 
 
 @kernel
-def _of_one(p, x):
+def _of_one(p: Any, x: Any) -> float:
     q = x.attitude
     return abs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1.0)
 
 
 @kernel
-def _of_five(p, x):
+def _of_five(p: Any, x: Any) -> float:
     drive = multirotor.MultirotorDrive(p, p.body, (), p.layout.x_body)
     return hold.violation(multirotor_multibody.unloaded(drive, multirotor_multibody.seen(p.layout, x)), x)[0]
 
 
 @kernel
-def _of_euler(p, x):
+def _of_euler(p: Any, x: Any) -> float:
     return _of_five(p, multirotor_euler.five(x))
 
 
 @overload(gap)
-def _gap(p, x):
+def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
     found = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
     return lambda p, x: found(p, x)
 
 
 @kernel
-def flight(method, p, state, volts, h, n, out):
+def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, n: int, out: np.ndarray) -> float:
     """Fly intervals of n steps of h [s]; a row of `out` for each, and how far the end is off its constraints."""
     for row in range(out.shape[0]):
         if row > 0:

@@ -32,11 +32,11 @@ class HeavyTopParameters(NamedTuple):
 
 
 @leaf
-def rate(p, t, x):
+def rate(p: HeavyTopParameters, t: float, x: RigidBody) -> RigidBody:
     """I omega' = I omega x omega + r x R^T weight."""
     o = x.omega_body
     torque = cross(p.arm_body, rotate_back(x.attitude, p.weight_world))
-    return RigidBody(o, divide(add(cross(multiply(p.inertia, o), o), torque), p.inertia))
+    return RigidBody(o, divide(add(cross(multiply(p.inertia, o), o), torque), p.inertia))  # type: ignore[arg-type]
 
 
 RATES[HeavyTopParameters] = rate

@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import AXIS_COLOURS, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 80
@@ -11,11 +11,11 @@ NEEDS = ("truth",)
 MODELS = STEERED
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Wind in the world frame and density; of the two only what the log has."""
-    t = flown.times("truth")
-    wind = flown.column("truth", lambda m: m.wind)
-    density = flown.column("truth", lambda m: m.air_density)
+    t = flight.truth.times
+    wind = flight.truth.wind
+    density = flight.truth.air_density
     if not (wind.any() or density.any()):
         raise NotRecordedError("neither wind nor air density")
     figure, axes = rows(int(wind.any()) + int(density.any()))
@@ -29,6 +29,6 @@ def draw(flown: Flown) -> tuple[Figure, str]:
         axes[-1, 0].set_ylabel("air density [kg/m³]")
         axes[-1, 0].ticklabel_format(useOffset=False)
         axes[-1, 0].locator_params(axis="y", nbins=4)
-    shade_phases(axes, flown)
+    shade_phases(axes, flight)
     said = "" if wind.any() else " The log has no velocity of the wind."
     return figure, f"Velocity of the air in the world frame (ENU) and its density where the vehicle is.{said}"

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import BOUND, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
+from studies.topic_view import TopicView
 
 ORDER = 70
 TITLE = "Estimator: error and 3-sigma bounds"
@@ -16,13 +17,13 @@ MODELS = STEERED
 _COLUMNS = (("position", "m", "xyz"), ("velocity", "m/s", "xyz"), ("attitude", "rad", "xyz"))
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row for each axis."""
-    error, sigma = errors(flown), flown.column("estimate", deviations)
+    error, sigma = errors(flight), deviations(flight.estimate)
     if not sigma.any():
         raise NotRecordedError("the estimate states no uncertainty (it is the truth)")
     figure, axes = rows(3, columns=3, height=1.8)
-    t = flown.stamps("estimate")
+    t = flight.estimate.stamps
     for column, (quantity, unit, names) in enumerate(_COLUMNS):
         axes[0, column].set_title(f"{quantity} error [{unit}]")
         for row, name in enumerate(names):
@@ -35,37 +36,34 @@ def draw(flown: Flown) -> tuple[Figure, str]:
             axis.set_ylim(-scale, scale)
             peak = f"largest {np.abs(error[:, index]).max():.2g}"
             axis.text(0.02, 0.97, peak, transform=axis.transAxes, ha="left", va="top", fontsize=8, color="#555555")
-    shade_phases(axes, flown)
+    shade_phases(axes, flight)
     inside = np.mean(np.abs(error) <= 3 * sigma)
     return figure, (
         "Estimate minus truth at the estimate's own time, within three standard deviations as the estimator says "
         f"(shaded); {100 * inside:.1f} % of the errors lie inside. "
-        "The scale leaves out the largest 3 %. Attitude as rotation vector in the body frame. " + refusals(flown)
+        "The scale leaves out the largest 3 %. Attitude as rotation vector in the body frame. " + refusals(flight)
     )
 
 
-def deviations(message) -> tuple[float, ...]:
-    """The nine standard deviations of an Estimate: position, velocity, attitude."""
-    return (*message.position_std, *message.velocity_std, *message.attitude_std)
+def deviations(estimate: TopicView) -> np.ndarray:
+    """The standard deviations of position [m], velocity [m/s], attitude [rad], shape (n, 9)."""
+    return np.hstack([estimate.position_std, estimate.velocity_std, estimate.attitude_std])
 
 
-def errors(flown: Flown) -> np.ndarray:
+def errors(flight: Flight) -> np.ndarray:
     """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
-    stamps = flown.stamps("truth")
-    later = np.searchsorted(stamps, flown.stamps("estimate")).clip(1, len(stamps) - 1)
-    nearer = stamps[later] - flown.stamps("estimate") > flown.stamps("estimate") - stamps[later - 1]
+    stamps, wanted = flight.truth.stamps, flight.estimate.stamps
+    later = np.searchsorted(stamps, wanted).clip(1, len(stamps) - 1)
+    nearer = stamps[later] - wanted > wanted - stamps[later - 1]
     at = later - nearer
-    true, believed = (flown.column(topic, lambda m: (*m.pose.position, *m.velocity)) for topic in ("truth", "estimate"))
-    R_true, R_estimate = (
-        Rotation.from_quat(flown.column(topic, lambda m: m.pose.orientation)) for topic in ("truth", "estimate")
-    )
+    both = flight.truth, flight.estimate
+    true, believed = (np.hstack([view.position, view.velocity]) for view in both)
+    R_true, R_estimate = (Rotation.from_quat(view.orientation) for view in both)
     return np.column_stack([believed - true[at], (R_true[at].inv() * R_estimate).as_rotvec()])
 
 
-def refusals(flown: Flown) -> str:
+def refusals(flight: Flight) -> str:
     """How often the measurements of each source were refused, as a sentence."""
-    count = Counter(
-        source for sources in flown.column("estimate", lambda m: " ".join(m.rejected)) for source in sources.split()
-    )
+    count = Counter(source for sources in flight.estimate.rejected for source in sources)
     said = ", ".join(f"{source} {times}" for source, times in count.most_common())
     return f"Measurements refused: {said or 'none'}."

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import AXIS_COLOURS, BOUND, DASHED, FLOWN, WIDTH
 
 ORDER = 35
@@ -15,11 +15,11 @@ COLOURS = (*AXIS_COLOURS, BOUND)
 INSTANTS = 11  # pictures of the links
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Three plots over time on the left, the view from the side on the right."""
-    t = flown.times("bodies")
-    places = flown.column("bodies", lambda m: [p.position for p in m.pose])
-    wanted = _wanted(flown, t)
+    t = flight.times("bodies")
+    places = flight.topic("bodies").position
+    wanted = _wanted(flight, t)
     error = np.linalg.norm(places[:, 0] - wanted, axis=1)
     figure = Figure(figsize=(WIDTH, 6.4), layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.2, 1.0))
@@ -28,11 +28,11 @@ def draw(flown: Flown) -> tuple[Figure, str]:
     axes[0].set_ylabel("load error [m]")
     links = places[:, :1] - places[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
-    thrust = flown.column("lift", lambda m: m.thrust)
+    thrust = flight.topic("lift").thrust
     for i in range(links.shape[1]):
         colour = COLOURS[i % len(COLOURS)]
         axes[1].plot(t, angle[:, i], color=colour, label=f"link {i + 1}")
-        axes[2].plot(flown.times("lift"), thrust[:, i], color=colour, label=f"quadrotor {i + 1}")
+        axes[2].plot(flight.times("lift"), thrust[:, i], color=colour, label=f"quadrotor {i + 1}")
     axes[1].set_ylabel("link from vertical [°]")
     axes[2].set(ylabel="thrust [N]", xlabel="time [s]")
     for axis in axes:
@@ -61,7 +61,7 @@ def side(axes: Axes, places: np.ndarray, wanted: np.ndarray) -> None:
     axes.legend(loc="best")
 
 
-def _wanted(flown: Flown, t: np.ndarray) -> np.ndarray:
+def _wanted(flight: Flight, t: np.ndarray) -> np.ndarray:
     """The load's wanted path [m] at times t, shape (n, 3)."""
-    path = np.array(flown.scene["formation"]["path"])
+    path = np.array(flight.origin.scene["formation"]["path"])
     return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
 
 ORDER = 50
@@ -13,13 +13,13 @@ MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """One row for each quantity, one column for each motor."""
-    t = flown.times("truth")
+    t = flight.truth.times
     quantities = (
-        ("propeller speed [rpm]", flown.column("truth", lambda m: m.rotor_speed) * RPM),
-        ("voltage [V]", flown.column("truth", lambda m: m.motor_voltage)),
-        ("electrical power [W]", flown.column("truth", lambda m: m.motor_power)),
+        ("propeller speed [rpm]", flight.truth.rotor_speed * RPM),
+        ("voltage [V]", flight.truth.motor_voltage),
+        ("electrical power [W]", flight.truth.motor_power),
     )
     count = quantities[0][1].shape[-1]
     if count == 0:
@@ -31,7 +31,7 @@ def draw(flown: Flown) -> tuple[Figure, str]:
             line(axis, t, of_motor, color=FLOWN, linewidth=0.9)
     for motor, axis in enumerate(axes[0]):
         axis.set_title(f"motor {motor + 1}")
-    shade_phases(axes, flown)
+    shade_phases(axes, flight)
     energy = float(np.sum(np.diff(t) * quantities[2][1].sum(axis=1)[:-1])) / 3600.0
     return (
         figure,

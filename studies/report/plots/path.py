@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import DASHED, FLOWN, POINTS, WIDTH
 
 ORDER = 40
@@ -15,17 +15,17 @@ TITLE = "Path"
 NEEDS = ("truth",)
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """The path in 3D on the left, its plan view on the right."""
     figure = Figure(figsize=(WIDTH, 4.9), layout="constrained")
-    space(figure.add_subplot(1, 2, 1, projection="3d"), flown)
-    plan(figure.add_subplot(1, 2, 2), flown)
+    space(figure.add_subplot(1, 2, 1, projection="3d"), flight)
+    plan(figure.add_subplot(1, 2, 2), flight)
     return figure, "The flown path beside the reference, in space (left) and from above, north up (right)."
 
 
-def space(axes: Axes3D, flown: Flown) -> None:
+def space(axes: Axes3D, flight: Flight) -> None:
     """Draw into a 3D plot; the three axes have one scale."""
-    reference, position = _paths(flown)
+    reference, position = _paths(flight)
     axes.plot(*position.T, color=FLOWN, linewidth=2.0, label="flown")
     if len(reference):
         axes.plot(*reference.T, label="reference", **DASHED)
@@ -43,9 +43,9 @@ def space(axes: Axes3D, flown: Flown) -> None:
     axes.legend(loc="upper left")
 
 
-def plan(axes: Axes, flown: Flown) -> None:
+def plan(axes: Axes, flight: Flight) -> None:
     """Draw what is seen from above."""
-    reference, position = _paths(flown)
+    reference, position = _paths(flight)
     axes.plot(*position[:, :2].T, color=FLOWN, linewidth=2.0, label="flown")
     if len(reference):
         axes.plot(*reference[:, :2].T, label="reference", **DASHED)
@@ -58,8 +58,8 @@ def plan(axes: Axes, flown: Flown) -> None:
     axes.legend(loc="best")
 
 
-def _paths(flown: Flown) -> tuple[np.ndarray, np.ndarray]:
+def _paths(flight: Flight) -> tuple[np.ndarray, np.ndarray]:
     """Reference and flown positions [m], world frame, shapes (m, 3) and (n, 3), thinned for drawing."""
-    position = flown.column("truth", lambda m: m.pose.position)
+    position = flight.truth.position
     every = max(1, len(position) // POINTS)
-    return flown.reference[::every, :3], position[::every]
+    return flight.reference[::every, :3], position[::every]

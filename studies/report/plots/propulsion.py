@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.plots.motors import RPM
 from studies.report.style import DASHED, FLOWN, STEERED, WIDTH, NotRecordedError
 
@@ -14,12 +14,12 @@ MODELS = STEERED
 _SAMPLES = 20000  # drawn at most
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Samples of the first propeller, and the curves k n^2 and k n^3 through them by least squares."""
-    speed = _first(flown, "rotor_speed")
+    speed = _first(flight, "rotor_speed")
     if not (speed.size and np.ptp(speed) > 0.0):
         raise NotRecordedError("the first propeller never changes its speed")
-    thrust, torque, power = (_first(flown, name) for name in ("rotor_thrust", "rotor_torque", "motor_power"))
+    thrust, torque, power = (_first(flight, name) for name in ("rotor_thrust", "rotor_torque", "motor_power"))
     every = max(1, len(speed) // _SAMPLES)
     curve = np.linspace(0.0, speed.max(), 200)
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
@@ -48,6 +48,6 @@ def coefficient(speed: np.ndarray, value: np.ndarray, power: int) -> float:
     return float(law @ value / (law @ law))
 
 
-def _first(flown: Flown, field: str) -> np.ndarray:
+def _first(flight: Flight, field: str) -> np.ndarray:
     """The first rotor's values of a field of VehicleState, shape (n,); empty without rotors."""
-    return flown.column("truth", lambda m: getattr(m, field)[:1]).reshape(-1)
+    return flight.truth[field][:, :1].reshape(-1)

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import AXIS_COLOURS, DPI, FLOWN, POINTS, WIDTH
 
 ORDER = 15
@@ -13,9 +13,9 @@ MODELS = ("gyrostat",)
 PORTRAIT = 20_000  # points of the phase portrait at the most
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Three rates over time on the left, each pair of them on the right."""
-    t, omega = flown.times("truth"), flown.column("truth", lambda m: m.angular_velocity)
+    t, omega = flight.truth.times, flight.truth.angular_velocity
     unit, scale = ("h", 3600.0) if t[-1] > 3 * 3600.0 else ("s", 1.0)
     figure = Figure(figsize=(WIDTH, 6.2), dpi=DPI, layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.7, 1.0))

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import AXIS_COLOURS, BOUND, FLOWN, REFERENCE, WIDTH
 
 ORDER = 5
@@ -15,13 +15,13 @@ MODELS = ("beer_carrier",)
 INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """The three displacements, door and forces over time, and six instants from the side."""
-    crate = flown.scene["beer_carrier"]
-    t = flown.times("bodies")
-    place = flown.column("bodies", lambda m: [p.position for p in m.pose])
-    turn = np.array([_pitch(q) for q in np.moveaxis(_turns(flown)[:, :2], 1, 0)]).T
-    force = np.linalg.norm(flown.column("bodies", lambda m: m.force), axis=2)
+    crate = flight.origin.scene["beer_carrier"]
+    bodies = flight.topic("bodies")
+    t, place = bodies.times, bodies.position
+    turn = np.array([_pitch(q) for q in np.moveaxis(bodies.orientation[:, :2], 1, 0)]).T
+    force = np.linalg.norm(bodies.force, axis=2)
     door = turn[:, 1] - crate["tilt_deg"]
     until = t <= crate["pickup"]
     figure = Figure(figsize=(WIDTH, 8.6), layout="constrained")
@@ -83,10 +83,6 @@ def _matrix(degrees: float) -> np.ndarray:
     """Turns (x, z) about y."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([(c, s), (-s, c)])
-
-
-def _turns(flown: Flown) -> np.ndarray:
-    return flown.column("bodies", lambda m: [p.orientation for p in m.pose])
 
 
 def _pitch(xyzw: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from studies.flown import Flown
+from studies.flight import Flight
 from studies.report.style import AXIS_COLOURS, BOUND, FLOWN, line, rows
 
 ORDER = 25
@@ -12,15 +12,15 @@ MODELS = ("os4",)
 RPM = 9.549296585513721  # of 1 rad/s
 
 
-def draw(flown: Flown) -> tuple[Figure, str]:
+def draw(flight: Flight) -> tuple[Figure, str]:
     """Mass times vertical acceleration, and the speed of each rotor."""
-    t = flown.times("truth")
-    mass = flown.scene["os4"]["mass"]
-    force = mass * flown.column("truth", lambda m: m.acceleration.z)
+    t = flight.truth.times
+    mass = flight.origin.scene["os4"]["mass"]
+    force = mass * flight.truth.acceleration[:, 2]
     figure, axes = rows(2)
     line(axes[0, 0], t, force, color=FLOWN)
     axes[0, 0].set_ylabel("vertical force [N]")
-    speeds = flown.column("truth", lambda m: m.rotor_speed) * RPM
+    speeds = flight.truth.rotor_speed * RPM
     looks = zip(speeds.T, (*AXIS_COLOURS, BOUND), ((0, ()), (0, (6, 2)), (0, (2, 2)), (0, (6, 2, 1, 2))), strict=True)
     for i, (speed, colour, dashes) in enumerate(looks, 1):
         line(axes[1, 0], t, speed, color=colour, linestyle=dashes, label=f"rotor {i}")

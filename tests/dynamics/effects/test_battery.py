@@ -47,5 +47,5 @@ def test_cuts_off_for_good(drone, situation, rotors):
 
 
 def test_charge_out_of_range(drone):
-    with pytest.raises(ValueError, match=r"effects.battery.charge: expected less than or equal to 1, got 1.5"):
+    with pytest.raises(ValueError, match=r"effects.battery.charge: expected a number above 0 and at most 1, got 1.5"):
         make(drone, charge=1.5)

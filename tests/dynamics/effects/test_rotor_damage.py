@@ -17,5 +17,7 @@ def test_one_rotor_from_its_time(drone, situation, rotors):
 
 
 def test_a_rotor_that_is_not_there(drone):
-    with pytest.raises(ValueError, match=r"effects.rotor_damage.rotor: the vehicle has rotors 1 to 4, got 5"):
+    with pytest.raises(
+        ValueError, match=r"effects.rotor_damage.rotor: expected one of the vehicle's rotors, 1 to 4, got 5"
+    ):
         effects.from_scene({"rotor_damage": {"rotor": 5}}, drone)

@@ -1,10 +1,11 @@
 """Accelerations, multipliers and rank against a dense pseudo-inverse, the embedding technique and both coordinates."""
 
+import multibody_embedding as embedding
 import numpy as np
 import pytest
 
 from dynamics.lie.quaternion import Quaternion
-from dynamics.multibody import augmented, embedding, pivoted_qr
+from dynamics.multibody import augmented, pivoted_qr
 from dynamics.multibody.augmented import accelerations
 from dynamics.multibody.delivery_drone import delivery_drone
 from dynamics.multibody.five_bodies import BodyState, arrays, machine

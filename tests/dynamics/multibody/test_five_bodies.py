@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from multibody_reactions import reactions
 from test_augmented import PAPER
 
 from dynamics.lie.quaternion import Quaternion
@@ -13,7 +14,6 @@ from dynamics.multibody.five_bodies import reactions as from_chassis
 from dynamics.multibody.hold import together
 from dynamics.multibody.mechanisms import drone_system
 from dynamics.multibody.placement import displaced
-from dynamics.multibody.reactions import reactions
 
 GRAVITY = (0.0, 0.0, -9.81)
 

@@ -10,11 +10,12 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract,
 from dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
 from services.autopilot.attitude import wrap
 from services.autopilot.control import START, step
-from services.autopilot.gains import Airframe
 from services.autopilot.interface import Estimate, Four, Setpoint
+from services.autopilot.law import Airframe
 from services.autopilot.motor import RPM, Motor
 from services.autopilot.stage import LANDED
 from services.trajectory.mission import compile
+from services.trajectory.phases import Phases
 from services.trajectory.piece import evaluate
 
 ARM = 0.4974 / math.sqrt(2.0)
@@ -155,7 +156,7 @@ TRUTH = (0.0, 0.0, 0.0, 0.0)
 
 def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):
     """Log of a flight of the delivery mission (see `fly`)."""
-    trajectory = compile(spec, (0.0, 0.0, AIRFRAME.resting_height))
+    trajectory = compile(Phases.model_validate(spec), (0.0, 0.0, AIRFRAME.resting_height))
     ticks = round(trajectory.duration / TICK)
     white = np.random.default_rng(seed).standard_normal((ticks, 15))
     return fly(parameters, trajectory.parameters, plant, white, noise)

@@ -1,17 +1,10 @@
 """Short flights on the true state with scripted commands, without wind."""
 
-import os
-from pathlib import Path
-
-from rich.console import Console
-
 from messages import Answer, MissionItem, OperatorCommand, Vector3
-from services.flight import fly_single
-from services.progress import Display
-from services.scene import load
-from studies.flown import Flown
+from services.table import load
+from tests.cosim import memory_log
 
-SCENE = Path("scenes/hover.toml")
+SCENE = "hover"
 OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]
 RATE = 250  # [Hz] of this scene
 NAN = float("nan")
@@ -42,13 +35,10 @@ def scripted(script):
     return operator
 
 
-def fly(tmp_path, seconds, script, *overrides, operated=True):
+def fly(seconds, script, *overrides, operated=True):
     """The recorded flight."""
-    log = tmp_path / "flight.mcap"
     sets = [*(OPERATED if operated else []), f"run.duration={seconds}", *overrides]
-    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
-        fly_single(load(SCENE, sets), log, None, display, scripted(script))
-    return Flown(log)
+    return memory_log.fly(load(SCENE, sets), scripted(script))
 
 
 def at(flown, topic, t, value):
@@ -83,7 +73,7 @@ def results(flown):
 
 
 def _all(flown, value):
-    return [value(m) for m in flown._messages("answers")]
+    return [value(m) for m in flown.messages("answers")]
 
 
 ACCEPTED, REJECTED, DENIED = Answer.ACCEPTED, Answer.TEMPORARILY_REJECTED, Answer.DENIED

@@ -6,8 +6,9 @@ from closed_loop import AIRFRAME, NOMINAL, TICK, mission, rmse
 
 from dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
 from services.autopilot.control import START, step
-from services.autopilot.gains import build, load
+from services.autopilot.gains import load
 from services.autopilot.interface import Estimate, Setpoint
+from services.autopilot.law import build
 from services.autopilot.stage import LANDED
 
 TABLE_7 = np.array([0.2373, 0.2700, 0.0981, 0.0334, 0.0277, 0.0220])  # x, y, z [m], roll, pitch, yaw [rad]

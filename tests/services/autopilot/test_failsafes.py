@@ -1,18 +1,14 @@
 """What the vehicle does by itself when something is lost, in flight."""
 
-import os
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 import pytest
 from flights import REJECTED, UP, at, command, fly, height, mode, place, results, said
-from rich.console import Console
 
-from services.flight import fly_single
-from services.progress import Display
-from services.scene import load
-from studies.flown import Flown
+from services.table import load
+from tests.cosim import memory_log
 
 
 def airframe(tmp_path, capacity):
@@ -30,7 +26,7 @@ def warnings(flown):
 def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
     script = UP | {6: [command("goto", 10.0, 0.0, 3.0)]}
     small = [airframe(tmp_path, 12000.0), "effects.battery.charge=0.2", "autopilot.parameters.RTL_RETURN_ALT=3.0"]
-    flown = fly(tmp_path, 80, script, *small)
+    flown = fly(80, script, *small)
     told = said(flown)
     order = [told.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
     assert order == sorted(order)
@@ -45,27 +41,27 @@ def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
 def test_a_nearly_empty_battery_lands_where_it_is(tmp_path):
     script = UP | {6: [command("goto", 30.0, 0.0, 3.0)]}
     low = [airframe(tmp_path, 4000.0), "effects.battery.charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
-    flown = fly(tmp_path, 40, script, *low)
+    flown = fly(40, script, *low)
     assert "the battery is nearly empty: land" in said(flown)
     assert place(flown, 40.0)[0] > 5.0
     assert height(flown, 40.0) == pytest.approx(0.35, abs=0.05)
 
 
-def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unknown(tmp_path):
+def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unknown():
     script = {0.04: [command("arm", id=1)]}
-    flown = fly(tmp_path, 0.5, script, "effects.battery.charge=0.06")
+    flown = fly(0.5, script, "effects.battery.charge=0.06")
     assert results(flown)[1] == REJECTED
     assert "arming refused: the battery is low: 6%" in said(flown)
-    flown = fly(tmp_path, 0.5, script)
+    flown = fly(0.5, script)
     assert np.all(np.isnan(flown.column("battery", lambda m: m.percentage)))
     assert results(flown)[1] == 0
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
-def test_a_damaged_rotor_is_named_and_the_vehicle_lands(tmp_path, rotor):
+def test_a_damaged_rotor_is_named_and_the_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
     damage += ["effects.rotor_damage.thrust_left=0.55", "effects.rotor_damage.torque_left=0.55"]
-    flown = fly(tmp_path, 20, UP, *damage)
+    flown = fly(20, UP, *damage)
     assert "a motor has failed: land" in said(flown)
     failed = flown.column("status", lambda m: m.failed_motor)
     times = flown.times("status")
@@ -74,9 +70,9 @@ def test_a_damaged_rotor_is_named_and_the_vehicle_lands(tmp_path, rotor):
     assert not at(flown, "status", 20.0, lambda m: m.armed)
 
 
-def test_a_lost_rotor_is_noticed_before_the_vehicle_has_fallen(tmp_path):
+def test_a_lost_rotor_is_noticed_before_the_vehicle_has_fallen():
     damage = ["effects.rotor_damage.rotor=3", "effects.rotor_damage.time=8.0"]
-    flown = fly(tmp_path, 9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
+    flown = fly(9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
     failed, times = flown.column("status", lambda m: m.failed_motor), flown.times("status")
     assert failed[times >= 8.3 - 1e-6][0] == 3
     assert height(flown, 8.3) > 4.0
@@ -89,8 +85,8 @@ SENSORS = [
 ]  # fmt: skip
 
 
-def test_without_a_position_it_descends_and_tells_before(tmp_path):
-    flown = fly(tmp_path, 30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
+def test_without_a_position_it_descends_and_tells_before():
+    flown = fly(30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
     assert "the position is lost: descend in 2 s" in said(flown)
     assert "the position is lost: descend" in said(flown)
     assert mode(flown, 11.5) == "hold"
@@ -99,10 +95,10 @@ def test_without_a_position_it_descends_and_tells_before(tmp_path):
     assert np.hypot(*place(flown, 30.0)[:2]) < 2.0
 
 
-def test_who_holds_the_sticks_gets_the_vehicle_without_a_position(tmp_path):
+def test_who_holds_the_sticks_gets_the_vehicle_without_a_position():
     sticks = {(9.0, 20.0): [command("manual", 0.3, 0.0, 0.0, 0.0)], 16.0: [command("goto", 5.0, 0.0, 3.0, id=1)]}
     script = UP | {1.0: [command("takeoff", 3.0), command("arm")]} | sticks
-    flown = fly(tmp_path, 26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
+    flown = fly(26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
     assert "the position is lost: altitude_control" in said(flown)
     assert mode(flown, 18.0) == "altitude_control"
     assert height(flown, 18.0) == pytest.approx(3.0, abs=0.3)
@@ -113,9 +109,9 @@ def test_who_holds_the_sticks_gets_the_vehicle_without_a_position(tmp_path):
     assert mode(flown, 26.0) == "hold"  # there is a position again, and an operator
 
 
-def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back(tmp_path):
+def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back():
     soon = "autopilot.parameters.COM_POS_FS_DELAY=0.5"
-    flown = fly(tmp_path, 20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
+    flown = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
     modes = [name for name, _ in groupby(flown.column("status", lambda m: m.mode))]
     assert modes == ["mission", "descend", "land", "hold"]
     assert height(flown, 20.0) == pytest.approx(0.35, abs=0.05)
@@ -125,13 +121,10 @@ def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back(t
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("wind", [(3.0, 1.0), (8.0, 3.0)])
-def test_sound_motors_raise_no_alarm_in_the_delivery_mission(tmp_path, seed, wind):
+def test_sound_motors_raise_no_alarm_in_the_delivery_mission(seed, wind):
     mean, sigma = wind
     sets = [f"run.seed={seed}", f"effects.wind_random.mean=[{mean}, 1.0, 0.0]", f"effects.wind_random.sigma={sigma}"]
-    log = tmp_path / "mission.mcap"
-    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
-        fly_single(load(Path("scenes/delivery_mission.toml"), sets), log, None, display)
-    flown = Flown(log)
+    flown = memory_log.fly(load("delivery_mission", sets))
     assert set(flown.column("status", lambda m: m.failed_motor)) == {0}
     assert set(flown.column("status", lambda m: m.mode)) == {"mission"}
     assert flown.landed

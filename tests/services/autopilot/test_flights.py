@@ -20,13 +20,13 @@ from flights import (
     said,
 )
 
-from services.parameters import table
-from services.scene import load
+from services.common.parameters import table
+from services.table import load
 
 
-def test_takeoff_goto_land_and_disarm_by_itself(tmp_path):
+def test_takeoff_goto_land_and_disarm_by_itself():
     script = UP | {8: [command("goto", 4.0, 0.0, 3.0, 1.0, id=1)], 14: [command("land", id=2)]}
-    flown = fly(tmp_path, 25, script)
+    flown = fly(25, script)
     assert height(flown, 7.9) == pytest.approx(3.0, abs=0.1)
     assert mode(flown, 7.9) == "hold"
     assert place(flown, 14.0) == pytest.approx((4.0, 0.0, 3.0), abs=0.1)
@@ -37,7 +37,7 @@ def test_takeoff_goto_land_and_disarm_by_itself(tmp_path):
     assert results(flown) == {0: ACCEPTED, 1: ACCEPTED, 2: ACCEPTED}
 
 
-def test_a_mission_with_speed_jump_delay_and_return(tmp_path):
+def test_a_mission_with_speed_jump_delay_and_return():
     items = [
         item("takeoff", z=3.0),
         item("speed", values=(3.0,)),
@@ -48,7 +48,7 @@ def test_a_mission_with_speed_jump_delay_and_return(tmp_path):
         item("return"),
     ]
     script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
-    flown = fly(tmp_path, 60, {**script, 0.08: [command("finish")]}, "autopilot.parameters.RTL_RETURN_ALT=4.0")
+    flown = fly(60, {**script, 0.08: [command("finish")]}, "autopilot.parameters.RTL_RETURN_ALT=4.0")
     reached = [int(r) for r in flown.column("status", lambda m: m.mission_reached)]
     order = [r for i, r in enumerate(reached) if r != 65535 and (i == 0 or r != reached[i - 1])]
     assert order[:2] in ([0, 1], [1, 2])
@@ -59,7 +59,7 @@ def test_a_mission_with_speed_jump_delay_and_return(tmp_path):
     assert max(flown.column("truth", lambda m: m.pose.position.z)) == pytest.approx(4.0, abs=0.2)
 
 
-def test_refusals_say_why(tmp_path):
+def test_refusals_say_why():
     script = {
         0.04: [
             command("goto", 1.0, 1.0, 1.0, id=1),
@@ -71,15 +71,15 @@ def test_refusals_say_why(tmp_path):
             command("parameter", 3.0, text="MPC_XY_CRUISE", id=7),
         ],
     }
-    flown = fly(tmp_path, 0.5, script)
+    flown = fly(0.5, script)
     assert results(flown) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
     assert "mission: there is none; upload one first" in said(flown)
     assert any("MPC_XY_CRUISE: expected a number from 0.1 to 15" in text for text in said(flown))
 
 
-def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost(tmp_path):
+def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost():
     velocity = command("offboard_position", *[float("nan")] * 3, 1.0, 0.0, 0.0)
-    flown = fly(tmp_path, 14, UP | {(6, 9): [velocity], 6.2: [command("offboard", id=1)]})
+    flown = fly(14, UP | {(6, 9): [velocity], 6.2: [command("offboard", id=1)]})
     assert results(flown)[1] == ACCEPTED
     assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(1.0, abs=0.05)
     assert mode(flown, 9.5) == "offboard"
@@ -88,46 +88,46 @@ def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost(tmp_path)
     assert "the offboard setpoints are lost: hold" in said(flown)
 
 
-def test_a_lost_ground_station_brings_it_home_in_simulation_time(tmp_path):
+def test_a_lost_ground_station_brings_it_home_in_simulation_time():
     script = UP | {6: [command("goto", 4.0, 0.0, 3.0)], (0.5, 7): [command("link")]}
-    flown = fly(tmp_path, 14, script, "autopilot.parameters.COM_DL_LOSS_T=2.0")
+    flown = fly(14, script, "autopilot.parameters.COM_DL_LOSS_T=2.0")
     assert mode(flown, 8.5) == "goto"
     assert mode(flown, 9.3) == "return"
     assert at(flown, "status", 9.3, lambda m: m.failsafe)
 
 
-def test_sticks_ask_for_velocities_along_the_heading(tmp_path):
+def test_sticks_ask_for_velocities_along_the_heading():
     script = UP | {5.9: [command("position_control")], (6, 9): [command("manual", 0.2, 0.0, 0.0, 0.0)]}
-    flown = fly(tmp_path, 9, script)
+    flown = fly(9, script)
     assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
 
 
-def test_a_fence_turns_it_back(tmp_path):
+def test_a_fence_turns_it_back():
     ring = [item("fence_circle_in", 0.0, 0.0, 0.0, radius=5.0)]
     sticks = command("manual", 0.6, 0.0, 0.0, 0.0)
     script = UP | {5: [command("fence_upload", items=ring), command("position_control")], (5.1, 12): [sticks]}
-    flown = fly(tmp_path, 12, script, "autopilot.parameters.FS_FENCE_ACT=1")
+    flown = fly(12, script, "autopilot.parameters.FS_FENCE_ACT=1")
     assert "the vehicle has left the fence: hold" in said(flown)
     assert 5.0 < place(flown, 12.0)[0] < 9.0
 
 
-def test_what_stands_disarmed_cannot_return_or_land_and_says_so(tmp_path):
-    flown = fly(tmp_path, 1.0, {0.04: [command("return", id=1), command("land", id=2)]})
+def test_what_stands_disarmed_cannot_return_or_land_and_says_so():
+    flown = fly(1.0, {0.04: [command("return", id=1), command("land", id=2)]})
     assert results(flown) == {1: REJECTED, 2: REJECTED}
     assert said(flown) == ["return: the vehicle does not fly", "land: the vehicle does not fly"]
     assert mode(flown, 1.0) == "hold"
 
 
-def test_the_setpoint_is_what_is_followed_also_after_the_trajectory_was_left(tmp_path):
+def test_the_setpoint_is_what_is_followed_also_after_the_trajectory_was_left():
     script = {4.0: [command("goto", 2.0, 0.0, 1.5)]}
-    flown = fly(tmp_path, 10, script, "autopilot.operator=true", operated=False)
+    flown = fly(10, script, "autopilot.operator=true", operated=False)
     assert mode(flown, 3.9) == "mission"
     assert at(flown, "setpoint", 3.9, lambda m: m.phase) == "hover"
     assert at(flown, "setpoint", 9.9, lambda m: tuple(m.position)) == pytest.approx((2.0, 0.0, 1.5), abs=0.01)
     assert place(flown, 9.9) == pytest.approx((2.0, 0.0, 1.5), abs=0.1)
 
 
-def test_polygons_are_kept_out_of_and_in(tmp_path):
+def test_polygons_are_kept_out_of_and_in():
     def polygon(action, *corners):
         return [item(action, x, y, 0.0, values=(len(corners),)) for x, y in corners]
 
@@ -140,27 +140,27 @@ def test_polygons_are_kept_out_of_and_in(tmp_path):
         5.2: [command("fence_upload", items=yard[:2], id=5), command("position_control")],
         (5.3, 12): [stick],
     }
-    flown = fly(tmp_path, 14, script, "autopilot.parameters.FS_FENCE_ACT=1")
+    flown = fly(14, script, "autopilot.parameters.FS_FENCE_ACT=1")
     assert [results(flown)[k] for k in (1, 2, 3, 4, 5)] == [ACCEPTED, REJECTED, REJECTED, ACCEPTED, DENIED]
     assert "the vehicle has left the fence: hold" in said(flown)
     assert 6.0 < place(flown, 14.0)[0] < 8.0  # it stopped behind the edge of the tower
 
 
-def test_it_returns_to_the_nearest_rally_point(tmp_path):
+def test_it_returns_to_the_nearest_rally_point():
     points = [item("rally", 8.0, 3.0, 3.0), item("rally", -20.0, 0.0, 3.0)]
     script = UP | {5: [command("rally_upload", items=points), command("goto", 6.0, 0.0, 3.0)], 10: [command("return")]}
-    flown = fly(tmp_path, 30, script, "autopilot.parameters.RTL_RETURN_ALT=4.0")
+    flown = fly(30, script, "autopilot.parameters.RTL_RETURN_ALT=4.0")
     assert place(flown, 30.0) == pytest.approx((8.0, 3.0, 0.35), abs=0.1)
     assert not at(flown, "status", 30.0, lambda m: m.armed)
 
 
-def test_offboard_attitude_tilts_by_the_angle_along_the_heading(tmp_path):
+def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
     angle, yaw = 0.1, 0.5
     s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
     q = (c * math.cos(0.5 * yaw), -s * math.sin(0.5 * yaw), s * math.cos(0.5 * yaw), c * math.sin(0.5 * yaw))
     tilted = command("offboard_attitude", *q, *[float("nan")] * 4)  # nose down: forward along the heading
     script = UP | {5.9: [tilted], (6, 9): [tilted], 6.1: [command("offboard", id=1)]}
-    flown = fly(tmp_path, 9, script)
+    flown = fly(9, script)
     assert results(flown)[1] == ACCEPTED
     _, _, z, w = at(flown, "truth", 8.5, lambda m: tuple(m.pose.orientation))
     assert 2.0 * math.acos(math.hypot(w, z)) == pytest.approx(angle, abs=0.02)
@@ -170,14 +170,14 @@ def test_offboard_attitude_tilts_by_the_angle_along_the_heading(tmp_path):
     assert up == pytest.approx(-9.80665 * (1.0 - math.cos(angle)) * 2.4, abs=0.1)  # the thrust of hovering, tilted
 
 
-def test_gains_change_in_flight_and_act(tmp_path):
+def test_gains_change_in_flight_and_act():
     lift = table(load(SCENE))["MPC_Z_P"].default
     weak = [
         command("parameter", 0.3 * lift, text="MPC_Z_P", id=1),
         command("parameter", 99 * lift, text="MPC_Z_P", id=2),
     ]
     script = UP | {5: weak, 8: [command("goto", 0.0, 0.0, 6.0)]}
-    changed, same = (fly(tmp_path, 11, each) for each in (script, UP | {8: script[8]}))
+    changed, same = (fly(11, each) for each in (script, UP | {8: script[8]}))
     assert [results(changed)[k] for k in (1, 2)] == [ACCEPTED, DENIED]
     lag = []
     for flown in (changed, same):
@@ -187,13 +187,13 @@ def test_gains_change_in_flight_and_act(tmp_path):
     assert lag[0] > 1.2 * lag[1]
 
 
-def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again(tmp_path):
+def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
     sets = ["autopilot.estimator=sensors", *[f"sensors.{each}" for each in sensors]]
     for seed in (1, 2, 3):
         again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}
         script = {1: UP[0.04], 7: [command("land")]} | again
-        flown = fly(tmp_path, 20, script, *sets, f"run.seed={seed}")
+        flown = fly(20, script, *sets, f"run.seed={seed}")
         assert said(flown)[:3] == ["armed", "landed", "disarmed: landed"]
         assert results(flown)[6] == ACCEPTED
         for t in (13.0, 15.9):

@@ -1,7 +1,8 @@
 import pytest
 from closed_loop import AIRFRAME
 
-from services.autopilot.gains import FOLDER, build, load, names
+from services.autopilot.gains import FOLDER, load, names
+from services.autopilot.law import build
 
 
 def test_the_paper_s_set_is_table_6():
@@ -32,7 +33,7 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
         "short.toml": (text.replace("lift = [28.0, 22.0, 18.0]", "lift = [28.0]"), "lift"),
         "upright.toml": (
             text.replace("tilt_limit = 1.028", "tilt_limit = 1.6"),
-            "tilt_limit: Input should be less than 1.4",
+            "tilt_limit: expected a number above 0 and below 1.4, got 1.6",
         ),
     }
     for name, (content, message) in cases.items():
@@ -42,7 +43,7 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
             load(str(tmp_path / name))
         assert name in str(error.value)
         assert message in str(error.value)
-    with pytest.raises(ValueError, match="unknown gain set 'papr'; choose one of paper, tuned"):
+    with pytest.raises(ValueError, match="unknown gain set 'papr'; did you mean paper\\? expected one of paper, tuned"):
         load("papr")
 
 

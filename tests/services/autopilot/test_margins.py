@@ -5,7 +5,8 @@ import pytest
 from closed_loop import AIRFRAME, TICK
 from scipy.signal import cont2discrete
 
-from services.autopilot.gains import build, load
+from services.autopilot.gains import load
+from services.autopilot.law import build
 from services.autopilot.margins import FREQUENCIES, margins, open_loops
 
 

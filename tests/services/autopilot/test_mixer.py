@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from services.autopilot.gains import build, load
+from services.autopilot.gains import load
+from services.autopilot.law import build
 from services.autopilot.mixer import Quotas, mix, saturate
 
 SIGNS = build(load("paper"), AIRFRAME).signs

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from services.autopilot import motor_watch as watch
-from services.autopilot.gains import Airframe
+from services.autopilot.law import Airframe
 from services.autopilot.motor import Motor
 
 ARM, TICK = 0.35, 0.004
@@ -15,7 +15,7 @@ FRAME = Airframe(
 HOVER = 0.25 * FRAME.mass * FRAME.gravity
 
 
-def watched(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
+def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
     """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
     p, s, omega = watch.build(FRAME), watch.START, np.zeros(3)
     random = np.random.default_rng(seed)
@@ -36,27 +36,27 @@ def watched(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
 def test_the_rotor_that_lacks_thrust_is_named(rotor, share):
     left = np.ones(4)
     left[rotor - 1] = share
-    assert watched(left).failed == rotor
+    assert campaign_setup(left).failed == rotor
 
 
 def test_sound_rotors_and_a_vehicle_that_all_rotors_carry_less_well_are_not_blamed():
     for seed in range(5):
-        assert watched(np.ones(4), seconds=5.0, seed=seed).failed == 0
-    assert watched(np.full(4, 0.6)).failed == 0
+        assert campaign_setup(np.ones(4), seconds=5.0, seed=seed).failed == 0
+    assert campaign_setup(np.full(4, 0.6)).failed == 0
 
 
 def test_a_push_along_an_axis_is_nobodys_fault():
-    assert watched(np.ones(4), push=(6.0, 0.0)).failed == 0
-    assert watched(np.ones(4), push=(0.0, -6.0)).failed == 0
+    assert campaign_setup(np.ones(4), push=(6.0, 0.0)).failed == 0
+    assert campaign_setup(np.ones(4), push=(0.0, -6.0)).failed == 0
 
 
 def test_on_the_ground_the_feet_may_push():
-    assert watched(np.array([1.0, 1.0, 0.0, 1.0]), height=0.1).failed == 0
+    assert campaign_setup(np.array([1.0, 1.0, 0.0, 1.0]), height=0.1).failed == 0
 
 
 def test_the_disturbance_is_the_angular_acceleration_that_lacks():
     left = np.array([0.8, 1.0, 1.0, 1.0])  # too little to be blamed
-    s = watched(left)
+    s = campaign_setup(left)
     assert s.failed == 0
     expected = -0.2 * HOVER * ARM / FRAME.inertia_body[0], 0.2 * HOVER * ARM / FRAME.inertia_body[1]
     assert s.disturbance == pytest.approx(expected, rel=0.35)

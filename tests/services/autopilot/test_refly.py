@@ -1,33 +1,53 @@
 """A recorded run is flown again from its log bit for bit, with the commands at their ticks."""
 
+import shutil
 from pathlib import Path
 
-from flights import UP, command, fly
-from rich.console import Console
+from flights import OPERATED, UP, command, scripted
 
-from services.flight import fly_single
-from services.refly import refly
-from services.scene import load
+from cosim.log import LogReader
+from cosim.serialise import first_difference
+from lapwing.runs.refly import recorded_setup, refly
+from lapwing.runs.single import fly_single
+from services.table import load, resolve
+
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+def fly(log, setup, operator=None, sources=None):
+    """Fly into a log; its digest."""
+    fly_single(setup, log, sources, operator=operator)
+    with LogReader(log) as read:
+        return read.digest()
 
 
 def test_commands_come_again_at_their_ticks(tmp_path):
-    flown = fly(tmp_path, 6, UP | {4: [command("goto", 2.0, 1.0, 3.0)]})
-    before, after = refly(flown.path, Console(quiet=True))
-    assert before == after == flown.digest
+    log = tmp_path / "flight.mcap"
+    script = UP | {4: [command("goto", 2.0, 1.0, 3.0)]}
+    flown = fly(log, resolve(load("hover", [*OPERATED, "run.duration=6"])), scripted(script))
+    assert refly(log) == (flown, flown)
 
 
-class Silent:
-    """Shows nothing of a run."""
-
-    def begin(self):
-        pass
-
-    def show(self, *_):
-        pass
+def test_the_commands_of_a_plan_come_once(tmp_path):
+    log = tmp_path / "plan.mcap"
+    setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), plan=tuple(UP[0.04]))
+    flown = fly(log, setup)
+    assert refly(log) == (flown, flown)
 
 
 def test_a_run_that_listened_to_nobody_is_flown_again_too(tmp_path):
     log = tmp_path / "hover.mcap"
-    fly_single(load(Path(__file__).parents[3] / "scenes" / "hover.toml", ["run.duration=2"]), log, None, Silent())
-    before, after = refly(log, Console(quiet=True))
-    assert before == after
+    flown = fly(log, resolve(load("hover", ["run.duration=2"])))
+    assert refly(log) == (flown, flown)
+
+
+def test_the_log_alone_is_enough(tmp_path):
+    copy = shutil.copytree(SCENES, tmp_path / "scenes")
+    scene = load(copy / "hover.toml", ["run.duration=2", "airframe.mass.total=9.5", "gains.tilt_limit=0.5"])
+    shutil.rmtree(copy)
+    log, setup = tmp_path / "hover.mcap", resolve(scene)
+    flown = fly(log, setup, sources={name: content.decode() for name, content in scene.sources.items()})
+    assert refly(log) == (flown, flown)
+    with LogReader(log) as read:
+        assert first_difference(recorded_setup(read), setup) is None
+        assert read.attachments["airframe.toml"] == (SCENES / "vehicles" / "delivery_drone.toml").read_bytes()

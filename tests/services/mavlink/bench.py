@@ -7,8 +7,8 @@ from stand_in import PARAMETERS, PERIOD, StandIn
 from messages import OperatorInput
 from services.mavlink.adapter import Adapter
 from services.mavlink.dialect import mavlink
-from services.mavlink.vehicle import Vehicle
-from services.scene import load
+from services.mavlink.resolve import describe
+from services.table import load
 
 
 class Bench:
@@ -17,25 +17,27 @@ class Bench:
     def __init__(self, *overrides, recorded=False, **options):
         self.vehicle = StandIn()
         put = None if recorded else lambda command: self.vehicle.operate(OperatorInput(commands=(command,)).encode())
-        self.adapter = Adapter(Vehicle.of(load("scenes/hover.toml", overrides)), PARAMETERS, put, **options)
-        self.partners = []
+        self.adapter = Adapter(
+            describe(load("scenes/hover.toml", overrides))._replace(parameters=PARAMETERS), put, **options
+        )
+        self.stations = []
 
     @property
     def counts(self):
         return self.adapter.counts
 
-    def partner(self, **more):
-        partner = Partner(self, **more)
-        self.partners.append(partner)
-        return partner
+    def station(self, **more):
+        station = Station(self, **more)
+        self.stations.append(station)
+        return station
 
     def step(self, count=1):
         """So many steps of the telemetry; wall time runs as simulation time does."""
         for _ in range(count):
             for topic, message in self.vehicle.messages():
                 self.adapter.take(topic, self.vehicle.time_ns, message.encode(), self.vehicle.seconds)
-            for partner in self.partners:
-                partner.step()
+            for station in self.stations:
+                station.step()
 
     def until(self, true, seconds=10.0):
         for _ in range(round(seconds / PERIOD)):
@@ -45,7 +47,7 @@ class Bench:
         return bool(true())
 
 
-class Partner:
+class Station:
     """A client; on its way to and from it a share of the datagrams gets lost, and some come twice."""
 
     def __init__(self, bench, loss=0.0, twice=0.0, seed=0, local=True, system=255, key=None, link=0):
@@ -53,12 +55,12 @@ class Partner:
         self.codec.robust_parsing = True
         if key:
             self.codec.signing.secret_key, self.codec.signing.sign_outgoing = key, True
-            self.codec.signing.timestamp = bench.adapter._signature.state.timestamp
+            self.codec.signing.timestamp = bench.adapter.signature.state.timestamp
             self.codec.signing.link_id = link
         self.bench, self.loss, self.twice = bench, loss, twice
         self.random = random.Random(seed)
         self.got, self.sent = [], []
-        self.client = bench.adapter.connect(local, True, self._hear)
+        self.endpoint = bench.adapter.connect(local, True, self._hear)
         self.watch = lambda message: None  # called with each message
 
     def _times(self):
@@ -76,7 +78,7 @@ class Partner:
     def raw(self, data):
         self.sent.append(data)
         for _ in range(self._times()):
-            self.bench.adapter.receive(self.client, data)
+            self.bench.adapter.receive(self.endpoint, data)
 
     def send(self, kind, *fields, **more):
         message = getattr(mavlink, f"MAVLink_{kind}_message")(*fields, **more)

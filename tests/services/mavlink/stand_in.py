@@ -11,10 +11,11 @@ from contextlib import contextmanager
 
 from messages import Answer, Answers, Estimate, OperatorInput, Point, Pose, Quaternion, Status, Vector3, header
 from messages.topics import ANSWERS, ESTIMATE, STATUS
-from services.mavlink.hub import Hub, Options
-from services.mavlink.vehicle import Vehicle
-from services.parameters import Parameter
-from services.scene import load
+from services.common.parameters import Parameter
+from services.mavlink.hub import Hub
+from services.mavlink.options import Options
+from services.mavlink.resolve import describe
+from services.table import load
 
 PERIOD = 0.02  # [s] simulated
 SPEED = 8.0  # [m/s]
@@ -226,7 +227,8 @@ class Running:
     def __init__(self, *urls, speed=1.0, overrides=(), **options):
         self.vehicle = StandIn()
         scene = load("scenes/hover.toml", overrides)
-        self.hub = Hub(Vehicle.of(scene), Options(urls, speed=speed, **options), PARAMETERS, self.vehicle.operate)
+        description = describe(scene)._replace(parameters=PARAMETERS)
+        self.hub = Hub(description, Options(urls, speed=speed, **options), self.vehicle.operate)
         self._speed, self._over = speed, False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

@@ -10,6 +10,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.flavours import ardupilot, px4
 
 NAN = math.nan
+STANDING = 0.35  # [m] the body origin of the delivery drone above the ground
 
 
 def asked(bench, kind):
@@ -20,35 +21,35 @@ def asked(bench, kind):
 def test_a_takeoff_above_the_sea_is_one_above_home():
     bench = Bench()
     bench.vehicle.armed = True
-    assert bench.partner().command(22, 0.0, 0.0, 0.0, NAN, NAN, NAN, 292.0) == mavlink.MAV_RESULT_ACCEPTED
-    assert asked(bench, "takeoff")[0] == pytest.approx(12.0)  # home lies at 280 m
+    assert bench.station().command(22, 0.0, 0.0, 0.0, NAN, NAN, NAN, 292.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert asked(bench, "takeoff")[0] == pytest.approx(12.0)  # the world's origin lies at 280 m
 
 
-def test_a_takeoff_without_a_height_leaves_it_to_the_parameter():
+def test_a_takeoff_without_a_height_climbs_by_the_parameter():
     bench = Bench()
     bench.vehicle.armed = True
-    bench.partner().command(22, NAN, NAN, NAN, NAN, NAN, NAN, NAN)
-    assert math.isnan(asked(bench, "takeoff")[0])
+    bench.station().command(22, NAN, NAN, NAN, NAN, NAN, NAN, NAN)
+    assert asked(bench, "takeoff")[0] == pytest.approx(2.5 + STANDING)
 
 
 def test_ardupilot_counts_a_takeoff_from_home():
     bench = Bench("mavlink.flavour=ardupilot")
     bench.vehicle.armed = True
-    bench.partner().command(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0)
-    assert asked(bench, "takeoff")[0] == pytest.approx(12.0)
+    bench.station().command(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0)
+    assert asked(bench, "takeoff")[0] == pytest.approx(12.0 + STANDING)
 
 
 def test_what_a_reposition_does_not_say_stays():
     bench = Bench()
     bench.vehicle.armed, bench.vehicle.position = True, [3.0, 4.0, 5.0]
     bench.step()
-    partner = bench.partner()
-    partner.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, 290.0)
+    station = bench.station()
+    station.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, 290.0)
     x, y, z, yaw, speed = asked(bench, "goto")
     assert (x, y, z) == pytest.approx((3.0, 4.0, 10.0))
     assert math.isnan(yaw)
     assert math.isnan(speed)
-    partner.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, NAN)
+    station.command(192, -1.0, 1.0, 0.0, NAN, NAN, NAN, NAN)
     assert bench.vehicle.mode == "hold"
 
 
@@ -56,36 +57,36 @@ def test_what_a_reposition_does_not_say_stays():
 def test_what_the_autopilot_refuses_is_refused(number):
     bench = Bench()
     bench.vehicle.do_return = bench.vehicle.enter
-    assert bench.partner().command(number) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    assert bench.station().command(number) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 def test_progress_is_passed_on_before_the_end():
     bench = Bench()
     results = iter([Answer(result=Answer.IN_PROGRESS, progress=0.4)])
     bench.vehicle.obey = lambda c: next(results)._replace(id=c.id)
-    partner = bench.partner()
-    partner.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
+    station = bench.station()
+    station.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
     bench.step(2)
-    ack = partner.last("COMMAND_ACK")
+    ack = station.last("COMMAND_ACK")
     assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
     number = bench.vehicle.kinds["mission"].id
     bench.vehicle.answers = [Answer(id=number, result=Answer.ACCEPTED)]
     bench.step()
-    assert partner.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
+    assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
 
 
 def test_an_autopilot_that_does_not_answer_is_answered_for():
     bench = Bench()
     bench.vehicle.deaf = {"arm"}
-    partner = bench.partner()
-    assert partner.command(400, 1.0, seconds=1.5) is None
+    station = bench.station()
+    assert station.command(400, 1.0, seconds=1.5) is None
     bench.step(50)
-    assert partner.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 def test_a_recorded_flight_takes_no_commands():
     bench = Bench(recorded=True)
-    assert bench.partner().command(400, 1.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    assert bench.station().command(400, 1.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 @pytest.mark.parametrize("flavour", [px4, ardupilot])
@@ -105,9 +106,9 @@ def test_velocities_along_the_vehicles_axes_are_turned():
     bench = Bench()
     bench.vehicle.yaw = 0.5 * math.pi  # north
     bench.step()
-    partner = bench.partner()
+    station = bench.station()
     mask = 0b0000_1101_1100_0111  # velocities only
-    partner.send("set_position_target_local_ned", 0, 1, 1, 8, mask, 0, 0, 0, 2.0, 1.0, -0.5, 0, 0, 0, 0, 0)
+    station.send("set_position_target_local_ned", 0, 1, 1, 8, mask, 0, 0, 0, 2.0, 1.0, -0.5, 0, 0, 0, 0, 0)
     values = asked(bench, "offboard_position")
     assert values[3:6] == pytest.approx((1.0, 2.0, 0.5))  # forward is north, right is east
     assert all(map(math.isnan, (*values[:3], *values[6:])))
@@ -117,22 +118,22 @@ def test_offsets_count_from_the_vehicle():
     bench = Bench()
     bench.vehicle.position, bench.vehicle.yaw = [1.0, 2.0, 3.0], 0.0  # east
     bench.step()
-    partner = bench.partner()
+    station = bench.station()
     mask = 0b0000_1101_1111_1000
-    partner.send("set_position_target_local_ned", 0, 1, 1, 12, mask, 5.0, 0, -1.0, 0, 0, 0, 0, 0, 0, 0, 0)
+    station.send("set_position_target_local_ned", 0, 1, 1, 12, mask, 5.0, 0, -1.0, 0, 0, 0, 0, 0, 0, 0, 0)
     assert asked(bench, "offboard_position")[:3] == pytest.approx((6.0, 2.0, 4.0))
 
 
 def test_sticks_point_where_the_pilot_pushes():
     bench = Bench()
-    bench.partner().send("manual_control", 1, 500, 1000, 750, -1000, 0)
+    bench.station().send("manual_control", 1, 500, 1000, 750, -1000, 0)
     assert asked(bench, "manual") == pytest.approx((0.5, -1.0, 0.5, 1.0))
 
 
 def test_a_heartbeat_keeps_the_link_for_a_while():
     bench = Bench()
-    partner = bench.partner()
-    partner.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    station = bench.station()
+    station.send("heartbeat", 6, 8, 0, 0, 0, 3)
     links = []
     bench.vehicle.do_link = lambda c: links.append(bench.vehicle.seconds)
     bench.step(500)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from services.mavlink.frames import euler, swap_attitude, swap_body, swap_world, swap_yaw, whole, wrap
+from services.mavlink.frames import euler, saturated, swap_attitude, swap_body, swap_world, swap_yaw, wrap
 
 C = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
 D = np.diag([1, -1, -1.0])
@@ -59,9 +59,9 @@ def test_angles_are_wrapped():
 
 
 def test_whole_numbers_are_cut_off_at_the_limits_of_their_field():
-    assert whole(1.6, 8) == 2
-    assert whole(1e9, 16) == 32767
-    assert whole(-1e9, 16) == -32768
-    assert whole(-1.0, 16, unsigned=True) == 0
-    assert whole(math.nan, 16, unsigned=True) == 65535
-    assert whole(math.inf, 8, unknown=-1) == -1
+    assert saturated(1.6, 8) == 2
+    assert saturated(1e9, 16) == 32767
+    assert saturated(-1e9, 16) == -32768
+    assert saturated(-1.0, 16, unsigned=True) == 0
+    assert saturated(math.nan, 16, unsigned=True) == 65535
+    assert saturated(math.inf, 8, unknown=-1) == -1

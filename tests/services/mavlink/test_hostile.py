@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from stand_in import flying, free_port, until
 
 from services.mavlink.dialect import mavlink
-from services.mavlink.protocols import HANDLERS
+from services.mavlink.protocols import handlers
 from services.mavlink.protocols.commands import RULES
 
 NAN, INF = float("nan"), float("inf")
@@ -25,11 +25,11 @@ def shared():
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=600))
 def test_random_bytes_do_nothing(shared, data):
-    partner = shared.partner()
-    partner.raw(data)
-    partner.raw(b"\xfd" + data)
-    shared.adapter.disconnect(partner.client)
-    shared.partners.clear()
+    station = shared.station()
+    station.raw(data)
+    station.raw(b"\xfd" + data)
+    shared.adapter.disconnect(station.endpoint)
+    shared.stations.clear()
     assert set(shared.vehicle.kinds) <= {"link"}
 
 
@@ -40,20 +40,20 @@ def frames(bench):
         fields = []
         for field, kind in zip(cls.fieldnames, cls.fieldtypes, strict=True):
             length = cls.array_lengths[cls.ordered_fieldnames.index(field)]
-            fields.append(b"" if kind == "char" else [0] * length if length > 1 else 0)
+            fields.append(b"\0" if kind == "char" else [0] * length if length > 1 else 0)
         yield cls(*fields).pack(codec)
 
 
 def test_every_message_there_is_with_zeros_and_cut_short_and_damaged():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     chance = random.Random(1)
     for frame in frames(bench):
-        partner.raw(frame)
-        partner.raw(frame[: chance.randrange(len(frame))])
+        station.raw(frame)
+        station.raw(frame[: chance.randrange(len(frame))])
         damaged = bytearray(frame)
         damaged[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
-        partner.raw(bytes(damaged))
+        station.raw(bytes(damaged))
     bench.step(5)
     assert bench.counts["wrong checksum"] > 50
     assert not bench.vehicle.armed
@@ -68,12 +68,12 @@ ODD = {
 
 def test_every_message_that_is_answered_with_odd_values():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.step(2)
     chance = random.Random(2)
     for _ in range(150):
-        for number in HANDLERS:
-            partner.raw(odd(mavlink.mavlink_map[number], chance).pack(partner.codec))
+        for number in handlers():
+            station.raw(odd(mavlink.mavlink_map[number], chance).pack(station.codec))
         bench.step()
     assert bench.counts["received"] > 3000
 
@@ -104,53 +104,53 @@ def odd(cls, chance):
 
 def test_a_vehicle_that_has_lost_its_mind_is_still_reported():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.vehicle.armed, bench.vehicle.mode = True, "offboard"
     for bad in (NAN, INF, 1e30):
         bench.vehicle.setpoint = (bad,) * 11
         bench.vehicle.position, bench.vehicle.yaw = [bad] * 3, NAN
         bench.step(60)
-    assert partner.last("HEARTBEAT")
+    assert station.last("HEARTBEAT")
 
 
 def test_a_wrong_checksum_costs_only_its_own_frame():
     bench = Bench()
-    partner = bench.partner()
-    good = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(partner.codec)
+    station = bench.station()
+    good = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(station.codec)
     bad = good[:-1] + bytes([good[-1] ^ 1])
-    partner.raw(bad + good)
-    assert partner.last("PARAM_VALUE").param_id == "MPC_XY_P"
+    station.raw(bad + good)
+    assert station.last("PARAM_VALUE").param_id == "MPC_XY_P"
     assert bench.counts["wrong checksum"] == 1
 
 
 def test_others_commands_are_not_ours():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     for system, component in ((2, 1), (1, 100)):
-        partner.send("command_long", system, component, 400, 0, 1.0, *(0.0,) * 6)
+        station.send("command_long", system, component, 400, 0, 1.0, *(0.0,) * 6)
     bench.step(3)
     assert not bench.vehicle.armed
-    assert partner.last("COMMAND_ACK") is None
+    assert station.last("COMMAND_ACK") is None
     assert bench.counts["for another vehicle"] == 2
 
 
 @pytest.mark.parametrize("count", [1001, 10_000, 65_535])  # -1 is 65 535 on the wire
 def test_missions_of_too_many_items_are_refused_at_once(count):
     bench = Bench()
-    partner = bench.partner()
-    partner.send("mission_count", 1, 1, count, 0)
-    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_NO_SPACE
-    assert partner.last("MISSION_REQUEST_INT") is None
+    station = bench.station()
+    station.send("mission_count", 1, 1, count, 0)
+    assert station.last("MISSION_ACK").type == mavlink.MAV_MISSION_NO_SPACE
+    assert station.last("MISSION_REQUEST_INT") is None
 
 
 def test_a_mission_of_a_kind_that_is_none():
     bench = Bench()
-    partner = bench.partner()
-    partner.send("mission_count", 1, 1, 3, 77)
-    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
-    partner.send("mission_item_int", *item(0, kind=77))
-    partner.send("mission_request_int", 1, 1, 5, 0)
-    assert partner.last("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+    station = bench.station()
+    station.send("mission_count", 1, 1, 3, 77)
+    assert station.last("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
+    station.send("mission_item_int", *item(0, kind=77))
+    station.send("mission_request_int", 1, 1, 5, 0)
+    assert station.last("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
 
 
 @pytest.mark.parametrize(
@@ -174,28 +174,36 @@ def test_a_mission_of_a_kind_that_is_none():
     ],
 )
 def test_senseless_commands_are_answered(number, params, result):
-    assert Bench().partner().command(number, *params) == result
+    assert Bench().station().command(number, *params) == result
 
 
 @pytest.mark.parametrize("bad", [NAN, INF, -INF, 1e38])
 def test_senseless_setpoints_leave_the_vehicle_where_it_is(bad):
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.vehicle.armed = True
-    partner.send("set_attitude_target", 0, 1, 1, 0, [bad] * 4, bad, bad, bad, bad)
-    partner.send("set_position_target_local_ned", 0, 1, 1, 99, 0, *(bad,) * 11)
-    partner.send("set_position_target_global_int", 0, 1, 1, 6, 0, 2**31 - 1, -(2**31), *(bad,) * 9)
+    station.send("set_attitude_target", 0, 1, 1, 0, [bad] * 4, bad, bad, bad, bad)
+    station.send("set_position_target_local_ned", 0, 1, 1, 99, 0, *(bad,) * 11)
+    station.send("set_position_target_global_int", 0, 1, 1, 6, 0, 2**31 - 1, -(2**31), *(bad,) * 9)
     bench.step(5)
     assert bench.vehicle.position == [0.0, 0.0, 0.0]
 
 
 def test_intervals_that_are_too_short_do_not_flood_the_client():
     bench = Bench()
-    partner = bench.partner()
-    assert partner.command(511, 30.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # ATTITUDE each microsecond
-    partner.got.clear()
+    station = bench.station()
+    assert station.command(511, 30.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # ATTITUDE each microsecond
+    station.got.clear()
     bench.step(50)
-    assert len(partner.all("ATTITUDE")) == 50
+    assert len(station.all("ATTITUDE")) == 50
+
+
+def test_an_interval_that_is_too_long_for_its_message_is_cut_off():
+    bench = Bench()
+    station = bench.station()
+    assert station.command(511, 30.0, 1e38) == mavlink.MAV_RESULT_ACCEPTED
+    station.command(510, 30.0)
+    assert station.last("MESSAGE_INTERVAL").interval_us == 0x7FFFFFFF
 
 
 def test_a_flood_is_bounded_and_the_vehicle_flies_on():
@@ -222,7 +230,7 @@ def test_many_strangers_get_no_room():
             heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(mavlink.MAVLink(None, 200 + k, 1))
             s.sendto(b"nonsense", ("127.0.0.1", port))
             s.sendto(heartbeat, ("127.0.0.1", port))
-        assert until(lambda: running.counts["no room for another client"] >= 4)
-        assert len(running.hub.adapter.clients) == 8
+        assert until(lambda: running.counts["no room for another endpoint"] >= 4)
+        assert len(running.hub.adapter.sessions) == 8
         for s in sockets:
             s.close()

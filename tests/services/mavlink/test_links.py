@@ -9,8 +9,8 @@ import pytest
 from stand_in import flying, free_port, until
 
 from services.mavlink.dialect import mavlink
-from services.mavlink.lateness import Lateness
 from services.mavlink.links.link import Budget
+from services.mavlink.pacing import Pacing
 
 
 def frame():
@@ -36,7 +36,7 @@ def test_frames_in_pieces_over_tcp_and_a_client_that_goes():
                 client.sendall(bytes([byte]))
                 time.sleep(0.001)
             assert heard(lambda: client.recv(4096))
-        assert until(lambda: not running.hub.adapter.clients)
+        assert until(lambda: not running.hub.adapter.sessions)
 
 
 def test_a_serial_line_is_watched_but_not_obeyed():
@@ -64,10 +64,10 @@ def test_a_budget_is_a_seconds_worth():
     assert 100 <= sum(budget.take() for _ in range(1000)) < 200
 
 
-def test_jitter_is_the_step_beyond_its_due_and_lateness_the_widest_lag():
-    lateness = Lateness(2.0)
+def test_jitter_is_the_step_beyond_its_due_and_pacing_the_widest_lag():
+    pacing = Pacing(2.0)
     for simulated, wall in ((0.0, 10.0), (0.02, 10.01), (0.04, 10.025), (0.06, 10.03)):
-        lateness.note(simulated, wall)
-    assert lateness.jitter() == pytest.approx([0.0, 0.005, 0.005])
-    assert lateness.behind() == pytest.approx(0.005)
-    assert "no pace" in Lateness(None).report()
+        pacing.note(simulated, wall)
+    assert pacing.jitter() == pytest.approx([0.0, 0.005, 0.005])
+    assert pacing.behind() == pytest.approx(0.005)
+    assert "no pace" in Pacing(None).report()

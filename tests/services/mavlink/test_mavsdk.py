@@ -180,7 +180,9 @@ def test_parameters_rates_and_sticks():
         with pytest.raises(ParamError):
             await drone.param.get_param_float("NO_SUCH")
         everything = await drone.param.get_all_params()
-        assert len(everything.float_params) + len(everything.int_params) == len(PARAMETERS)
+        names = {p.name for p in (*everything.float_params, *everything.int_params)}
+        assert names > {p.name for p in PARAMETERS}
+        assert {p.name: p.value for p in everything.int_params}["SYS_AUTOSTART"] == 4001
 
         await drone.telemetry.set_rate_position(2.0)
         stamps = []

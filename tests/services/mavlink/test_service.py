@@ -12,16 +12,14 @@ from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
-from rich.console import Console
 from stand_in import StandIn, free_port, until
 
-from services.flight import fly_single
-from services.launcher import loopback_endpoints
-from services.log import LogReader, LogWriter
+from cosim.launcher import loopback_endpoints
+from cosim.log import LogReader, LogWriter
+from lapwing.runs.single import fly_single
 from services.mavlink.dialect import mavlink
 from services.mavlink.links import check
-from services.progress import Display
-from services.scene import load
+from services.table import load, resolve
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -29,7 +27,7 @@ HOVER = "scenes/hover.toml"
 
 
 def run(tmp_path, space, *more, **options):
-    command = [sys.executable, "-m", "services.cli", "run", HOVER, "--space", space, *more]
+    command = [sys.executable, "-m", "lapwing", "run", HOVER, "--space", space, *more]
     command += ["--log", str(tmp_path / f"{space}.mcap")]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
 
@@ -123,13 +121,13 @@ def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
     log = tmp_path / "flight.mcap"
     vehicle = StandIn()
     vehicle.armed, vehicle.mode, vehicle.target = True, "takeoff", [0.0, 0.0, 30.0]
-    with LogWriter(log, {}, {"scene.toml": b"[vehicle]\nname = 'drone1'\n"}) as writer:
+    with LogWriter(log, {}, {"scene.json": b'{"vehicle": {"name": "drone1"}}'}) as writer:
         for _ in range(300):
             for topic, message in vehicle.messages():
                 writer.write(topic.key("drone1"), topic.message, message.encode(), vehicle.time_ns)
     port, (endpoint,) = free_port(), loopback_endpoints(["a"]).values()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    command = [sys.executable, "-m", "services.cli", "replay", str(log), "--space", "test-mavlink-replay"]
+    command = [sys.executable, "-m", "lapwing", "replay", str(log), "--space", "test-mavlink-replay"]
     command += ["--listen", endpoint, "--mavlink", f"udpout:127.0.0.1:{port}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         heard(station, "HEARTBEAT")
@@ -162,8 +160,7 @@ def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
     assert sent > 100_000
     assert re.search(r"\d+ faster than a link takes", said), said
     quiet = tmp_path / "quiet.mcap"
-    with open(os.devnull, "w") as nowhere, Display(Console(file=nowhere), 1.0) as display:
-        fly_single(load(HOVER, ["autopilot.operator=true"]), quiet, None, display)
+    fly_single(resolve(load(HOVER, ["autopilot.operator=true"])), quiet)
     with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:
         assert flooded.digest() == read.digest()
 
@@ -184,4 +181,4 @@ def test_the_mission_of_a_plan_can_be_downloaded(tmp_path):
     station.close()
     assert [m.command for m in found] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
     assert found[5].param1 == 5.0
-    assert found[4].z == pytest.approx(10.35, abs=0.02)
+    assert found[4].z == pytest.approx(10.0, abs=0.02)  # above home: it stands 0.35 m above the ground

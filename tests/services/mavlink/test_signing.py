@@ -15,18 +15,18 @@ ARM = (1, 1, 400, 0, 1.0, *(0.0,) * 6)
 
 def test_signed_commands_are_taken_and_answered_signed():
     bench = Bench(key=KEY)
-    partner = bench.partner(key=KEY, local=False)
-    partner.send("command_long", *ARM)
+    station = bench.station(key=KEY, local=False)
+    station.send("command_long", *ARM)
     bench.step(3)
     assert bench.vehicle.armed
-    assert partner.last("COMMAND_ACK").get_signed()
+    assert station.last("COMMAND_ACK").get_signed()
 
 
 @pytest.mark.parametrize("key", [None, hashlib.sha256(b"wrong").digest()])
 def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
     bench = Bench(key=KEY)
-    partner = bench.partner(key=key)
-    partner.send("command_long", *ARM)
+    station = bench.station(key=key)
+    station.send("command_long", *ARM)
     bench.step(3)
     assert not bench.vehicle.armed
     assert bench.counts[REFUSED] == 1
@@ -34,12 +34,12 @@ def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
 
 def test_a_replayed_packet_is_refused_also_by_another_way():
     bench = Bench(key=KEY)
-    partner, thief = bench.partner(key=KEY), bench.partner(local=False)
-    partner.send("command_long", *ARM)
+    station, thief = bench.station(key=KEY), bench.station(local=False)
+    station.send("command_long", *ARM)
     bench.step(3)
     bench.vehicle.armed = False
-    partner.raw(partner.sent[0])
-    thief.raw(partner.sent[0])
+    station.raw(station.sent[0])
+    thief.raw(station.sent[0])
     bench.step(3)
     assert not bench.vehicle.armed
     assert bench.counts[REFUSED] == 2
@@ -47,12 +47,12 @@ def test_a_replayed_packet_is_refused_also_by_another_way():
 
 def test_a_forged_time_stamp_does_not_shut_out_the_keys_holder():
     bench = Bench(key=KEY)
-    partner = bench.partner(key=KEY)
-    partner.send("heartbeat", 6, 8, 0, 0, 0, 3)
-    forger = bench.partner(key=hashlib.sha256(b"wrong").digest())
+    station = bench.station(key=KEY)
+    station.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    forger = bench.station(key=hashlib.sha256(b"wrong").digest())
     forger.codec.signing.timestamp += 10**12
     forger.send("command_long", *ARM)
-    partner.send("command_long", *ARM)
+    station.send("command_long", *ARM)
     bench.step(3)
     assert bench.counts[REFUSED] == 1
     assert bench.vehicle.armed
@@ -60,7 +60,7 @@ def test_a_forged_time_stamp_does_not_shut_out_the_keys_holder():
 
 def test_without_a_key_other_machines_watch_but_do_not_command():
     bench = Bench()
-    stranger = bench.partner(local=False)
+    stranger = bench.station(local=False)
     assert stranger.command(400, 1.0) == mavlink.MAV_RESULT_DENIED
     assert stranger.command(512, 242.0) == mavlink.MAV_RESULT_ACCEPTED
     assert stranger.last("HOME_POSITION")
@@ -78,7 +78,7 @@ def test_without_a_key_other_machines_watch_but_do_not_command():
 
 def test_insecure_takes_commands_from_anywhere():
     bench = Bench(insecure=True)
-    assert bench.partner(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert bench.station(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
 
 
 def test_a_key_file_holds_one_passphrase(tmp_path):

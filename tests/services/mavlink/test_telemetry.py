@@ -11,9 +11,9 @@ from services.mavlink.dialect import mavlink
 
 
 def shown(bench, kind, steps=60):
-    partner = bench.partner()
+    station = bench.station()
     bench.step(steps)
-    return partner.last(kind)
+    return station.last(kind)
 
 
 def moved():
@@ -26,7 +26,7 @@ def test_position_on_the_earth():
     m = shown(moved(), "GLOBAL_POSITION_INT")
     assert (m.lat - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)  # metres to a degree there
     assert (m.lon - 147907000) * 1e-7 * 84_418 == pytest.approx(30.0, rel=2e-3)
-    assert (m.alt, m.relative_alt) == (292_000, 12_000)
+    assert (m.alt, m.relative_alt) == (292_000, 11_650)  # it stood 0.35 m above the ground
     assert m.hdg == 6000  # 30 degrees north of east
 
 
@@ -35,9 +35,9 @@ def test_local_position_is_north_east_down():
     assert (m.x, m.y, m.z) == (40.0, 30.0, -12.0)
 
 
-def test_rates_are_those_of_the_table_and_partners_may_change_them():
+def test_rates_are_those_of_the_table_and_stations_may_change_them():
     bench = Bench()
-    ground, onboard = bench.partner(), bench.partner(system=2)
+    ground, onboard = bench.station(), bench.station(system=2)
     onboard.send("heartbeat", mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 0, 3)
     ground.send("command_long", 1, 1, 511, 0, 30.0, 100_000.0, *(0.0,) * 5)
     bench.step(500)
@@ -50,22 +50,22 @@ def test_rates_are_those_of_the_table_and_partners_may_change_them():
 
 def test_another_mode_is_told_at_once():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.step(60)
-    partner.got.clear()
+    station.got.clear()
     bench.vehicle.armed = True
     bench.step(2)
-    assert partner.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 def test_what_hinders_arming_is_shown_and_long_texts_come_in_pieces():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.vehicle.prearm = ("no GPS fix",)
     bench.vehicle.text = ["x" * 60 + "y" * 60]
     bench.step(60)
-    assert not partner.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    pieces = partner.all("STATUSTEXT")
+    assert not station.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    pieces = station.all("STATUSTEXT")
     assert [m.chunk_seq for m in pieces] == [0, 1, 2]
     assert "".join(m.text for m in pieces) == "x" * 60 + "y" * 60
     assert len({m.id for m in pieces}) == 1
@@ -85,39 +85,37 @@ def test_a_vehicle_that_falls_freely_feels_its_acceleration_along_its_axes():
 def test_progress_of_a_mission():
     bench = Bench()
     bench.vehicle.items, bench.vehicle.current, bench.vehicle.reached, bench.vehicle.state = (), 1, 0, 3
-    partner = bench.partner()
+    station = bench.station()
     bench.step(60)
-    assert partner.last("MISSION_CURRENT").seq == 1
-    assert partner.last("MISSION_ITEM_REACHED") is None  # there is no mission
+    assert station.last("MISSION_CURRENT").seq == 1
+    assert station.last("MISSION_ITEM_REACHED") is None  # there is no mission
 
 
 def test_the_origin_is_echoed_exactly():
     bench = Bench()
-    partner = bench.partner()
-    partner.send("set_gps_global_origin", 1, 473977418, 85455939, 488123)
-    m = partner.last("GPS_GLOBAL_ORIGIN")
+    station = bench.station()
+    station.send("set_gps_global_origin", 1, 473977418, 85455939, 488123)
+    m = station.last("GPS_GLOBAL_ORIGIN")
     assert (m.latitude, m.longitude, m.altitude) == (473977418, 85455939, 488123)
 
 
 def test_clocks_are_compared():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.step(10)
-    partner.send("timesync", 0, 12345)
-    answers = [m for m in partner.all("TIMESYNC") if m.tc1]
+    station.send("timesync", 0, 12345)
+    answers = [m for m in station.all("TIMESYNC") if m.tc1]
     assert (answers[0].tc1, answers[0].ts1) == (bench.vehicle.time_ns, 12345)
-    partner.send("ping", 7, 3, 0, 0)
-    m = partner.last("PING")
+    station.send("ping", 7, 3, 0, 0)
+    m = station.last("PING")
     assert (m.time_usec, m.seq, m.target_system, m.target_component) == (7, 3, 255, 190)
 
 
 def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
     bench = Bench()
-    partner = bench.partner()
-    partner.send("file_transfer_protocol", 0, 1, 1, [5, 0, 2, 3] + [0] * 247)
-    assert partner.last("FILE_TRANSFER_PROTOCOL").payload[:6] == [6, 0, 2, 129, 1, 3]
-    partner.send("log_request_list", 1, 1, 0, 0xFFFF)
-    assert partner.last("LOG_ENTRY").num_logs == 0
+    station = bench.station()
+    station.send("log_request_list", 1, 1, 0, 0xFFFF)
+    assert station.last("LOG_ENTRY").num_logs == 0
 
 
 def test_the_battery_cell_by_cell_and_how_low_it_is():
@@ -127,29 +125,57 @@ def test_the_battery_cell_by_cell_and_how_low_it_is():
     )
     bench.vehicle.more = [(BATTERY, battery)]
     bench.vehicle.status = {"battery_warning": 1}
-    partner = bench.partner()
+    station = bench.station()
     bench.step(120)
-    m = partner.last("BATTERY_STATUS")
+    m = station.last("BATTERY_STATUS")
     assert sum([*m.voltages, *m.voltages_ext]) == 42_000  # as ground stations add them
     assert (m.current_battery, m.current_consumed, m.battery_remaining) == (2000, 8800, 12)
     assert m.charge_state == mavlink.MAV_BATTERY_CHARGE_STATE_LOW
-    s = partner.last("SYS_STATUS")
+    s = station.last("SYS_STATUS")
     assert (s.voltage_battery, s.current_battery, s.battery_remaining) == (42_000, 2000, 12)
     assert s.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     bench.vehicle.status = {"battery_warning": 3, "failed_motor": 2}
     bench.step(60)
-    health = partner.last("SYS_STATUS").onboard_control_sensors_health
+    health = station.last("SYS_STATUS").onboard_control_sensors_health
     assert not health & (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS)
 
 
 def test_home_is_where_it_was_armed_and_told_at_once():
     bench = Bench()
-    partner = bench.partner()
+    station = bench.station()
     bench.step(5)
-    partner.got.clear()
+    station.got.clear()
     bench.vehicle.status = {"home": Vector3(30.0, 40.0, 0.0)}
     bench.step(1)
-    m = partner.last("HOME_POSITION")
-    assert (m.x, m.y, m.z) == (40.0, 30.0, 0.0)
+    m = station.last("HOME_POSITION")
+    assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, -0.35))
     assert (m.latitude - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)
-    assert m.altitude == 280_000
+    assert m.altitude == 280_350
+
+
+def test_take_off_to_ten_metres_above_home_climbs_ten():
+    bench = Bench()
+    bench.vehicle.position = [0.0, 0.0, 0.35]
+    station = bench.station()
+    bench.step(60)
+    home, m = station.last("HOME_POSITION"), station.last("GLOBAL_POSITION_INT")
+    assert m.relative_alt == 0
+    assert m.alt == pytest.approx(home.altitude, abs=1)
+    assert station.last("ALTITUDE").altitude_relative == pytest.approx(0.0, abs=1e-6)
+    bench.vehicle.armed = True
+    station.command(
+        22, 0.0, 0.0, 0.0, math.nan, math.nan, math.nan, 1e-3 * home.altitude + 10.0
+    )  # as QGroundControl does
+    bench.step(300)
+    assert station.last("GLOBAL_POSITION_INT").relative_alt == pytest.approx(10_000, abs=300)
+    assert bench.vehicle.target[2] == pytest.approx(10.35, abs=1e-3)
+
+
+def test_home_keeps_the_heading_with_which_it_was_armed():
+    bench = Bench()
+    station = bench.station()
+    bench.vehicle.yaw = 0.0  # east
+    bench.step(5)
+    bench.vehicle.armed, bench.vehicle.yaw = True, 1.0
+    bench.step(200)
+    assert station.last("HOME_POSITION").q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.scene import SceneError
+from cosim.schedule import LockStepError
 from dynamics.integrators import get, simulate
 from messages import stamp_ns
-from messages.topics import BODIES, LIFT, TRUTH
-from services.lockstep import LockStepError
 from services.plant.models import gyrostat, os4
-from services.scene import SceneError, load
-from services.table import lockstep_services
+from services.table import load
+from tests.cosim import memory_log
 
 SCENES = Path(__file__).parents[3] / "scenes"
 SATELLITE, OS4 = SCENES / "gyrostat_feedback.toml", SCENES / "os4_experiment_3.toml"
@@ -23,9 +23,7 @@ LOAD, CRATE = SCENES / "cooperative_load.toml", SCENES / "unload.toml"
 
 def ticks(scene, count):
     """The plant's truth at the first `count` ticks, of a scene that nobody controls."""
-    plant = lockstep_services(scene)["plant"]
-    plant.prepare()
-    return [dict(plant.step(tick))[TRUTH] for tick in range(count)]
+    return memory_log.fly(scene, last=count - 1).messages("truth")
 
 
 @pytest.mark.parametrize(("path", "model"), [(SATELLITE, gyrostat), (OS4, os4)])
@@ -64,14 +62,8 @@ def test_motors_reach_the_speed_at_which_torque_and_drag_balance():
 
 def carry(scene, count):
     """(bodies, lift) of each tick, plant and control in turn."""
-    services = lockstep_services(scene)
-    plant, formation = services["plant"], services["formation"]
-    lift, flown = None, []
-    for tick in range(count):
-        bodies = dict(plant.step(tick, lift))[BODIES]
-        lift = dict(formation.step(tick, bodies))[LIFT]
-        flown.append((bodies, lift))
-    return flown
+    flown = memory_log.fly(scene, last=count - 1)
+    return list(zip(flown.messages("bodies"), flown.messages("lift"), strict=True))
 
 
 def three(path):
@@ -105,7 +97,7 @@ def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
     digests = set()
     for mode in ("processes", "single"):
         figures = tmp_path / f"{mode}.json"
-        command = [sys.executable, "-m", "services.cli", "run", str(LOAD), "--mode", mode, "--set", "run.duration=0.5"]
+        command = [sys.executable, "-m", "lapwing", "run", str(LOAD), "--mode", mode, "--set", "run.duration=0.5"]
         command += ["--json", str(figures), "--log", str(tmp_path / f"{mode}.mcap"), "--space", "test-formation"]
         subprocess.run(command, check=True, timeout=300, capture_output=True)
         digests.add(json.loads(figures.read_text())["digest"])
@@ -113,8 +105,12 @@ def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
 
 
 WRONG = {
-    "no such model": (SATELLITE, "vehicle.model=gyro", "vehicle.model: expected one of"),
-    "another model's table": (SATELLITE, "vehicle.model=os4", "os4: missing; the model os4 needs a table [os4]"),
+    "no such model": (
+        SATELLITE,
+        "vehicle.model=gyro",
+        "vehicle.model: unknown model 'gyro'; did you mean gyrostat? expected one of",
+    ),
+    "another model's table": (SATELLITE, "vehicle.model=os4", "os4: missing; expected a table [os4], which the mod"),
     "effects": (SATELLITE, "effects.gravity.acceleration=9.81", "effects: the model gyrostat knows no such table"),
     "no rotation": (
         SATELLITE,
@@ -142,7 +138,7 @@ WRONG = {
         "2 directions that are not zero",
     ),
     "too few directions": (LOAD, "formation.link_direction=[[1, 0, 0]]", "formation.link_direction: expected 2"),
-    "a pack that does not fit": (CRATE, "beer_carrier.depth=0.15", "beer_carrier.pack_size: a pack that fits into"),
+    "a pack that does not fit": (CRATE, "beer_carrier.depth=0.15", "beer_carrier.pack_size: expected a pack that fits"),
     "friction that grows": (CRATE, "beer_carrier.door_friction=[0.1, 0.2]", "expected [static, dynamic] with 0 < dyn"),
     "a step of zero": (OS4, "solver.step=0", "solver.step: expected a number above 0"),
     "control slower than the exchange": (LOAD, "rates.bodies=100", "rates.bodies: expected exchange.rate = 400 Hz"),

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from messages import Actuators, header
+from cosim.scene import SceneError
+from cosim.schedule import LockStepError
 from messages.topics import BODIES, TRUTH
-from services.lockstep import LockStepError
-from services.scene import SceneError, load
-from services.table import lockstep_services
+from services.common.ports import MotorCommand
+from services.table import load
+from tests.cosim.alone import Alone
 
 MISSION = Path(__file__).parents[3] / "scenes/delivery_mission.toml"
 FLOWN = "vehicle.model=multibody"
@@ -23,10 +24,10 @@ def full(tick):
 
 def lifted(overrides, ticks=50, volts=full):
     """(truth, bodies) after ticks of 4 ms, 0.2 s, at these voltages, full ones unless given."""
-    plant = lockstep_services(load(MISSION, overrides))["plant"]
+    plant = Alone(load(MISSION, overrides), "plant")
     for tick in range(ticks + 1):
-        said = dict(plant.step(tick, Actuators(header(0, "drone1"), motor_voltage=volts(tick)), None))
-    return said[TRUTH], said.get(BODIES)
+        plant.step(actuators=MotorCommand(volts(tick), True, (0.0,) * 4, (0.0,) * 3))
+    return plant.message(TRUTH), plant.message(BODIES)
 
 
 def test_it_rises_as_the_reduced_model_does():
@@ -92,7 +93,7 @@ WRONG = {
     "no such propeller": (
         [FLOWN],
         f"multibody.event=[{event(1.0, 5, 'free')}]",
-        "multibody.event.0.propeller: expected a number not above 4, got 5",
+        "multibody.event.0.propeller: expected a whole number at least 1 and at most 4, got 5",
     ),
     "an event after the end": (
         [FLOWN, "run.duration=2"],
@@ -102,7 +103,7 @@ WRONG = {
     "an event before the start": (
         [FLOWN],
         f"multibody.event=[{event(-1.0, 1, 'free')}]",
-        "multibody.event.0.time: expected a number not below 0, got -1",
+        "multibody.event.0.time: expected a number at least 0, got -1",
     ),
     "an unknown fate": (
         [FLOWN],
@@ -128,7 +129,7 @@ WRONG = {
     "a long step": (
         [FLOWN],
         "solver.step=0.004",
-        "solver.step: propellers turn at up to 465 rad/s: take at most 0.001 s",
+        "solver.step: propellers turn at up to 465 rad/s; expected at most 0.001 s",
     ),
 }
 

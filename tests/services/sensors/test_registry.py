@@ -27,9 +27,9 @@ def test_a_table_changes_single_values():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"preset": "mpu9999"}, ["preset", "mpu6000, bmi088, ideal"]),
-        ({"rate": -1}, ["rate", "greater than 0", "-1"]),
-        ({"gyro": {"noise_dps_per_sqrt_hz": -0.1}}, ["gyro.noise_dps_per_sqrt_hz", "greater than or equal to 0"]),
+        ({"preset": "mpu9999"}, ["preset", "bmi088, ideal, mpu6000"]),
+        ({"rate": -1}, ["imu.rate", "above 0", "-1"]),
+        ({"gyro": {"noise_dps_per_sqrt_hz": -0.1}}, ["gyro.noise_dps_per_sqrt_hz", "at least 0"]),
         ({"gyro": {"noise": 1.0}}, ["gyro.noise", "unknown key", "noise_dps_per_sqrt_hz"]),
         ({"ratio": 1.0}, ["ratio", "unknown key", "rate"]),
         ({"rate": "fast"}, ["rate", "number", "'fast'"]),

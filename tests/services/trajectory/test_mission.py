@@ -1,12 +1,16 @@
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.trajectory.mission import compile
+from cosim.scene import SceneError
+from dynamics.errors import KeyedError
+from services.table import load
+from services.trajectory import mission
+from services.trajectory.mission import Compiled
+from services.trajectory.phases import Phases
 from services.trajectory.piece import channel_at, evaluate
 
 RAMP = {"kind": "ramp", "to": 10.0, "rate": 1.0}
@@ -22,6 +26,11 @@ DELIVERY = [
     {"name": "descend", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}},
 ]
 TURN = math.pi / 2 / 0.3
+
+
+def compile(tables: dict, *origin) -> Compiled:
+    """A trajectory from the tables of a scene."""
+    return mission.compile(Phases.model_validate(tables), *origin)
 
 
 def test_delivery_mission_is_at_each_corner_when_it_should_be():
@@ -90,34 +99,50 @@ def test_everything_but_a_step_joins_continuously(pairs):
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ({}, "trajectory.phase: Field required"),
-        ({"phase": []}, "at least 1"),
-        (
-            {"phase": [{"name": "a", "z": {"kind": "rump"}}]},
-            "trajectory.phase.0.z: unknown kind of segment 'rump'; choose one of chirp, hold",
-        ),
-        ({"phase": [{"name": "a", "z": 3.0}]}, "a segment is a table with a kind"),
-        (
-            {"phase": [{"name": "a", "z": {"kind": "hold", "duration": -1.0}}]},
-            "trajectory.phase.0.z.duration: Input should be greater than 0",
-        ),
-        ({"phase": [{"name": "a", "z": {"kind": "ramp", "to": 1.0}}]}, "either rate or duration"),
-        ({"phase": [{"name": "a", "q": 1.0}]}, "trajectory.phase.0.q"),
-        ({"phase": [{"name": "a"}, {"name": "a"}]}, "two phases are named 'a'"),
         (
             {"phase": [{"name": "a", "duration": 1.0, "z": RAMP}]},
-            "phase 'a': its segments last 10 s, longer than its duration 1 s",
+            "trajectory.phase.0.duration: expected not less than its segments last, 10 s, got 1 s in phase 'a'",
         ),
-        ({"phase": [{"name": "a", "z": {"kind": "ramp", "to": math.inf, "rate": 1.0}}]}, "finite"),
         (
-            {"phase": [{"name": "a", "z": {"kind": "table", "file": "none.csv"}}]},
-            "phase 'a', z: table none.csv: cannot be read",
+            {"phase": [{"name": "a", "x": [RAMP, {"kind": "table", "points": [[0.0, 3.0], [1.0, 4.0]]}]}]},
+            "trajectory.phase.0.x.points.0.1: the table starts at 3.0, but the channel is at 10.0: put a ramp",
         ),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(spec, message):
-    with pytest.raises(ValueError, match=r"\A[^\n]+\Z") as error:
-        compile(spec, folder=Path())
+def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
+    with pytest.raises(KeyedError, match=r"\A[^\n]+\Z") as error:
+        compile(spec)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("trajectory={}", "trajectory.phase: missing; expected a list of tables"),
+        ("trajectory.phase=[]", "at least 1"),
+        (
+            "trajectory.phase.0.z.kind=rump",
+            "phase.0.z.kind: unknown kind of segment 'rump'; did you mean ramp? expected",
+        ),
+        (
+            "trajectory.phase.0.z=3.0",
+            "trajectory.phase.0.z: expected a table with a kind of segment (chirp, hold, mini",
+        ),
+        ("trajectory.phase.0.z={kind='hold', duration=-1}", "phase.0.z.duration: expected a number above 0, got -1"),
+        (
+            "trajectory.phase.0.z=[{kind='hold', duration=-1}]",
+            "phase.0.z.0.duration: expected a number above 0, got -1",
+        ),
+        ("trajectory.phase.0.z={kind='ramp', to=1.0}", "either rate or duration"),
+        ("trajectory.phase.0.q=1.0", "trajectory.phase.0.q"),
+        ("trajectory.phase.0.name=hover", "two phases are named 'hover'"),
+        ("trajectory.phase.0.duration=1.0", "expected not less than its segments last, 3 s, got 1 s in phase 'climb'"),
+        ("trajectory.phase.0.z={kind='ramp', to=inf, rate=1.0}", "finite"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(override, message):
+    with pytest.raises(SceneError, match=r"\A--set trajectory[^\n]+\Z") as error:
+        load("hover", [override])
     assert message in str(error.value)
 
 

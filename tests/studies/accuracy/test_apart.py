@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import made_up
 import numpy as np
 import pytest
 
-from services.scene import load
-from studies.accuracy.apart import SOURCES, Track, difference, errors, fly
+from services.table import load
+from studies.accuracy.apart import SOURCES, difference, errors
+from studies.fly import fly
 
 ROOT = Path(__file__).parents[3]
 
@@ -15,29 +17,34 @@ def turned(angle):
     return [0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]
 
 
+def flight(rate, position, orientation):
+    truth = {"pose.position": position, "pose.orientation": orientation}
+    return made_up.flight(len(position), rate, truth=truth)
+
+
 def test_difference_at_common_ticks():
-    fine = Track(0.1, np.array([[0.1 * k, 0, 0] for k in range(7)]), np.array([turned(0.0)] * 7))
-    coarse = Track(0.2, fine.position[::2] + np.array([0, 0.3, 0]), np.array([turned(1e-9)] * 4))
+    fine = flight(10, np.array([[0.1 * k, 0, 0] for k in range(7)]), turned(0.0))
+    coarse = flight(5, fine.truth.position[::2] + np.array([0, 0.3, 0]), turned(1e-9))
     for one, other in ((fine, coarse), (coarse, fine)):
         position, angle, largest = difference(one, other)
         assert (position, largest) == pytest.approx((0.3, 0.3))
         assert angle == pytest.approx(1e-9)
-    opposite = fine._replace(attitude=-fine.attitude)
+    opposite = flight(10, fine.truth.position, -fine.truth.orientation)
     assert difference(fine, opposite) == (0.0, 0.0, 0.0)
 
 
 def test_a_flight_in_memory_is_the_plants_own():
-    track = fly(load(ROOT / "scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
-    assert len(track.position) == 101
-    assert track.interval == 0.004
+    flown = fly(load(ROOT / "scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
+    assert len(flown.truth) == 101
+    assert flown.setup.interval == 0.004
     t = 0.4
-    assert track.position[-1, 1] > 0.0  # experiment 2 moves to +y
-    assert abs(track.position[-1, 2]) < 1e-3 * 9.81 * t * t
+    assert flown.truth.position[-1, 1] > 0.0  # experiment 2 moves to +y
+    assert abs(flown.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
 
 
 def test_errors_fall_with_what_causes_them():
     scene = load(ROOT / "scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
-    parts = errors(scene, ["run.duration=1.0", "solver.integrator=rkmk2"])
+    parts = errors(scene)
     by = {source: [p for p in parts if p.source == source] for source in SOURCES}
     steps = [p.position for p in by["plant step"]]
     assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.2)  # second order

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from cosim.scene import SceneError
 from services.plant.config import Solver, method
-from services.scene import SceneError, load
+from services.table import load
 from studies.accuracy import choice, integrate, scenes
 from studies.accuracy.measure import Point
 
@@ -33,7 +34,7 @@ def scene(tmp_path, solver):
 def measured(monkeypatch, tmp_path):
     """Counts measurements, whose points are given; the cache is empty."""
     calls = []
-    monkeypatch.setattr(choice, "CACHE", tmp_path / "cache")
+    monkeypatch.setattr(choice, "cache_folder", lambda: tmp_path / "cache")
     monkeypatch.setattr(choice, "measure", lambda problem: calls.append(problem.title) or list(POINTS))
     return calls
 
@@ -78,7 +79,7 @@ def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
 
 
 def test_measured_in_earnest_on_a_scene(monkeypatch, tmp_path):
-    monkeypatch.setattr(choice, "CACHE", tmp_path)
+    monkeypatch.setattr(choice, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(integrate, "applicable", lambda x: ["lie_euler", "erk4m", "rkmk4"])  # each is compiled
     path = scene(tmp_path, "accuracy = 1e-6")
     found = choice.overrides(load(path), lambda text: None)

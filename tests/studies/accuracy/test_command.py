@@ -70,7 +70,9 @@ def test_a_goal_that_is_no_error_is_refused(goal):
 
 
 def test_a_misspelt_target_lists_the_choices():
-    with pytest.raises(ValueError, match=r"unknown target gyrostat_bloked: did you mean gyrostat_blocked\? .*free"):
+    with pytest.raises(
+        ValueError, match=r"unknown problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? \(problems: .*free"
+    ):
         find("gyrostat_bloked")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from services.plant.models.multibody import longest_step
-from services.scene import load
+from services.table import load
 from studies.accuracy import plant, scenes
 from studies.accuracy.coordinates import error
 

@@ -4,41 +4,36 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
+from made_up import moved
 from rich.console import Console
 
-from services.scene import load
-from services.sections import Effects
+from services.common.sections import Effects
+from services.table import load
 from studies.effects import show
 from studies.effects.influence import Influence, influence
 from studies.effects.study import Row, Study, _smallest
 from studies.effects.study import study as run_study
 from studies.effects.variants import refusal, variant
-from studies.flight import Trace, fly
+from studies.fly import fly
 
 HOVER = Path(__file__).parents[3] / "scenes/hover.toml"
 
 
-def trace(x, power=100.0, failure=""):
-    x = np.asarray(x, float)
-    return Trace(0.5, np.column_stack([x, 0 * x, 0 * x]), np.full(len(x), power), failure)
-
-
 def test_difference_of_two_flights():
-    found = influence(trace([0, 1, 2, 3]), trace([0, 1, 4, 2], power=110.0))
+    found = influence(moved([0, 1, 2, 3]), moved([0, 1, 4, 2], power=110.0))
     assert found.trajectory == 2.0
     assert found.final == 1.0
     assert found.energy == pytest.approx(0.1)
 
 
 def test_who_has_landed_earlier_stays_there():
-    assert influence(trace([0, 1, 2]), trace([0, 1, 2, 5])).final == 3.0
-    assert influence(trace([0, 1, 2, 5]), trace([0, 1])).trajectory == 4.0
+    assert influence(moved([0, 1, 2]), moved([0, 1, 2, 5])).final == 3.0
+    assert influence(moved([0, 1, 2, 5]), moved([0, 1])).trajectory == 4.0
 
 
 def test_a_flight_without_end_is_infinitely_far():
-    found = influence(trace([0, 1]), trace([0], failure="not finite at t = 1 s"))
+    found = influence(moved([0, 1]), moved([0], failure="not finite at t = 1 s"))
     assert found.trajectory == math.inf
     assert found.failure == "not finite at t = 1 s"
 
@@ -50,26 +45,26 @@ class Crew:
         self.worth = worth
 
     def fly(self, variants):
-        return iter([trace([0, sum(w for n, w in self.worth.items() if n not in tables)]) for tables in variants])
+        return iter([moved([0, sum(w for n, w in self.worth.items() if n not in tables)]) for tables in variants])
 
 
 def test_the_smallest_set_leaves_out_all_that_may_go_together():
     worth = {"a": 0.001, "b": 0.004, "c": 0.008, "d": 5.0}
     said = []
     kept, apart = _smallest(
-        Crew(worth), {name: {} for name in worth}, trace([0, 0]), ["a", "b", "c"], 0.01, said.append
+        Crew(worth), {name: {} for name in worth}, moved([0, 0]), ["a", "b", "c"], 0.01, said.append
     )
     assert list(kept) == ["c", "d"]
     assert apart == pytest.approx(0.005)
     assert said == ["without a, b, c together", "without a, b together"]
-    assert _smallest(Crew(worth), {name: {} for name in worth}, trace([0, 0]), [], 0.01, said.append)[1] == 0.0
+    assert _smallest(Crew(worth), {name: {} for name in worth}, moved([0, 0]), [], 0.01, said.append)[1] == 0.0
 
 
 def test_density_changes_a_real_flight_a_little():
     scene = load(HOVER, ["run.duration=2.0"])
     tables = dict(scene[Effects].tables)
     one, again, thinner = (fly(variant(scene, t)) for t in (tables, tables, tables | {"air_density": {}}))
-    assert (one.position_world == again.position_world).all()
+    assert (one.truth.position == again.truth.position).all()
     assert 0.0 < influence(one, thinner).trajectory < 0.01
     # [J] what hovering takes is about the ideal power over the efficiency; here for less than 2 s
     assert 100.0 < one.energy < 4000.0
@@ -77,8 +72,8 @@ def test_density_changes_a_real_flight_a_little():
 
 def test_effects_that_cannot_be_say_why():
     scene = load(HOVER)
-    assert refusal(scene, {"gravity": {}, "gravity_altitude": {}}).startswith("gravity_altitude: excludes")
-    assert refusal(scene, {"wind_gust": {}}).startswith("wind_gust.peak: ")
+    assert refusal(scene, {"gravity": {}, "gravity_altitude": {}}).startswith("effects.gravity_altitude: excludes")
+    assert refusal(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
     assert refusal(scene, scene[Effects].tables) == ""
 
 

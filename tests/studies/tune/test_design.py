@@ -3,10 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from services.autopilot.gains import build, load
+from services.autopilot.gains import load
+from services.autopilot.law import build
 from services.autopilot.margins import margins, open_loops, stable
-from services.autopilot.service import known_airframe
-from services.scene import load as load_scene
+from services.autopilot.resolve import known_airframe
+from services.table import load as load_scene
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.design import GAIN, PHASE, believed, design, gain_set, shortfalls
 from studies.tune.linearise import hover
@@ -48,17 +49,18 @@ def test_the_reaction_to_speeding_rotors_up_leads_the_yaw():
     assert with_inertia.yaw_lead == pytest.approx(known.yaw_lead, rel=0.01)  # at 50 m the air is a little thinner
     assert without.yaw_lead == 0.0
     assert known_airframe(SCENE).yaw_lead == 0.0
-    loops = open_loops(build(load("tuned"), known), believed(known, with_inertia), TICK)
+    loops = open_loops(build(load("tuned").plain(), known), believed(known, with_inertia), TICK)
     assert shortfalls(loops) == {}
     assert (
         margins(loops["yaw"]).crossover
-        > 5.0 * margins(open_loops(build(load("tuned"), known), believed(known, without), TICK)["yaw"]).crossover
+        > 5.0
+        * margins(open_loops(build(load("tuned").plain(), known), believed(known, without), TICK)["yaw"]).crossover
     )
 
 
 def test_a_loop_is_stable_up_to_its_margins_and_no_further(airframe):
     for name in ("paper", "tuned"):
-        loops = open_loops(build(load(name), airframe), airframe, TICK)
+        loops = open_loops(build(load(name).plain(), airframe), airframe, TICK)
         for loop in ("lift", "yaw", "x_motors", "y_motors"):
             m, response = margins(loops[loop]), loops[loop]
             assert stable(response), loop
@@ -73,7 +75,7 @@ def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airfram
     said = []
     wanted = Bandwidths(*(factor * w for w in Bandwidths()))
     gains = gain_set(model, design(model, airframe, TICK, wanted, said.append))
-    loops = open_loops(build(gains, airframe), believed(airframe, model), TICK)
+    loops = open_loops(build(gains.plain(), airframe), believed(airframe, model), TICK)
     for m in map(margins, loops.values()):
         assert math.degrees(m.phase) >= PHASE
         assert m.gain >= 10.0 ** (GAIN / 20.0)
@@ -85,6 +87,6 @@ def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airfram
 
 def test_unstable_and_weak_gains_are_named(airframe):
     fast = load("tuned").model_copy(update={"lift": (160.0, 120.0, 3200.0)})
-    assert shortfalls(open_loops(build(fast, airframe), airframe, TICK))["lift"] == "unstable"
-    assert "phase margin 2" in shortfalls(open_loops(build(load("paper"), airframe), airframe, TICK))["roll"]
-    assert shortfalls(open_loops(build(load("tuned"), airframe), airframe, TICK)) == {}
+    assert shortfalls(open_loops(build(fast.plain(), airframe), airframe, TICK))["lift"] == "unstable"
+    assert "phase margin 2" in shortfalls(open_loops(build(load("paper").plain(), airframe), airframe, TICK))["roll"]
+    assert shortfalls(open_loops(build(load("tuned").plain(), airframe), airframe, TICK)) == {}

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from services.autopilot.gains import build, load
-from services.autopilot.service import known_airframe
-from services.flight import fly_single
-from services.outside import nobody
-from services.scene import load as load_scene
-from services.scene import parse
-from studies.flown import Flown
+from services.autopilot.gains import load
+from services.autopilot.law import build
+from services.autopilot.resolve import known_airframe
+from services.table import load as load_scene
+from services.table import parse
+from studies.fly import fly
 from studies.tune.identify import identify
 from studies.tune.linearise import hover
 
@@ -20,23 +19,8 @@ UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, 
 CLOSE = {"lift": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "yaw_lead": 0.15, "lag": 0.1}
 
 
-class Silent:
-    """Shows nothing of a run."""
-
-    def begin(self):
-        pass
-
-    def show(self, *_):
-        pass
-
-
-def logged(scene, path):
-    fly_single(scene, path, None, Silent(), nobody)
-    return Flown(path)
-
-
-def found(scene, path):
-    return identify(logged(scene, path), build(load("tuned"), known_airframe(scene)), hover(scene))
+def found(scene):
+    return identify(fly(scene), build(load("tuned").plain(), known_airframe(scene)), hover(scene))
 
 
 def excited(kind, overrides=()):
@@ -55,9 +39,9 @@ def excited(kind, overrides=()):
 
 
 @pytest.mark.parametrize("kind", ["chirp", "step", "relay"])
-def test_gains_and_lag_are_found_again(kind, tmp_path):
+def test_gains_and_lag_are_found_again(kind):
     scene = load_scene(SCENES / "excitation.toml") if kind == "chirp" else excited(kind)
-    true, it = hover(scene), found(scene, tmp_path / "flight.mcap")
+    true, it = hover(scene), found(scene)
     for name, within in CLOSE.items():
         assert getattr(it.model, name) == pytest.approx(getattr(true, name), rel=within), name
     assert min(it.fit.values()) > 75.0
@@ -69,13 +53,12 @@ def test_a_vehicle_that_is_heavier_than_believed_shows(tmp_path):
     heavy_file.write_text(re.sub(r"^total = .*$", "total = 12.0", airframe, count=1, flags=re.MULTILINE))
     light = load_scene(SCENES / "excitation.toml")
     heavy = load_scene(SCENES / "excitation.toml", [f"vehicle.airframe={heavy_file}"])
-    flown = logged(heavy, tmp_path / "flight.mcap")
-    it = identify(flown, build(load("tuned"), known_airframe(light)), hover(light))
+    it = identify(fly(heavy), build(load("tuned").plain(), known_airframe(light)), hover(light))
     assert it.model.lift == pytest.approx(hover(heavy).lift, rel=0.03)
     assert it.model.lift == pytest.approx(4.0 / 12.0, rel=0.03)
 
 
-def test_a_flight_that_moves_nothing_is_refused(tmp_path):
+def test_a_flight_that_moves_nothing_is_refused():
     scene = load_scene(SCENES / "hover.toml")
-    with pytest.raises(ValueError, match=r"roll was not moved .* fly scenes/excitation.toml"):
-        found(scene, tmp_path / "flight.mcap")
+    with pytest.raises(ValueError, match=r"hover: roll was not moved .* fly scenes/excitation.toml"):
+        found(scene)

@@ -4,11 +4,11 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
+from lapwing.cli.main import app
 from services.autopilot.gains import load
 from services.autopilot.unstable import unstable_loops
-from services.cli import app
-from services.scene import load as load_scene
-from studies.flight import fly
+from services.table import load as load_scene
+from studies.fly import fly
 from studies.tune import report, show
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.polish import rmse
@@ -29,8 +29,8 @@ def test_what_is_written_can_be_read_and_flown(found, tmp_path):
     assert load(str(path)) == found.gains
     flown = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
     assert flown.failure == ""
-    stand = flown.position_world[0, 2]
-    assert flown.position_world[:, 2].max() - stand == pytest.approx(1.0, abs=0.05)
+    height = flown.truth.position[:, 2]
+    assert height.max() - height[0] == pytest.approx(1.0, abs=0.05)
 
 
 def test_polishing_keeps_the_margins_and_lessens_the_error(found):

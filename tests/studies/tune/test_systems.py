@@ -7,10 +7,11 @@ import control
 import numpy as np
 import pytest
 
-from services.autopilot.gains import build, load
+from services.autopilot.gains import load
+from services.autopilot.law import build
 from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
-from services.autopilot.service import known_airframe
-from services.scene import load as load_scene
+from services.autopilot.resolve import known_airframe
+from services.table import load as load_scene
 from studies.tune.systems import closed, step, systems
 
 TICK, DELAY = 0.004, 1
@@ -24,7 +25,7 @@ def airframe(request):
 
 @pytest.mark.parametrize("name", ["tuned", "paper"])
 def test_the_same_responses_margins_and_stability(name, airframe):
-    p = build(load(name), airframe)
+    p = build(load(name).plain(), airframe)
     own = open_loops(p, airframe, TICK, DELAY)
     for loop, system in systems(p, airframe, TICK, DELAY).items():
         seen = FREQUENCIES < 200.0
@@ -47,6 +48,6 @@ def test_step_of_a_first_order_loop_is_the_closed_form():
 
 
 def test_steps_settle_at_the_setpoint(airframe):
-    loops = systems(build(load("tuned"), airframe), airframe, TICK, DELAY)
+    loops = systems(build(load("tuned").plain(), airframe), airframe, TICK, DELAY)
     for loop in ("lift", "yaw", "x", "y"):
         assert step(loops[loop], 6.0).value[-1] == pytest.approx(1.0, abs=0.01)

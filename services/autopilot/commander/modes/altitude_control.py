@@ -1,32 +1,31 @@
 """By hand without knowing where: the sticks ask for tilts, a vertical speed and a yaw rate."""
 
-from typing import TYPE_CHECKING
-
-from services.autopilot.commander.modes.base import FlightMode, stick
-from services.autopilot.commander.modes.level import Level
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.altitude_flight import AltitudeFlight
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
 
 NAME = "altitude_control"
-SHARE = 0.6  # of the highest tilt at full stick: the rest is left to the wind
+TILT_FRACTION = 0.6  # of the maximum tilt at full stick: the rest is left to the wind
 
 
 class Mode(FlightMode):
-    """Sticks: forward, left, up, yaw rate, each from -1 to 1; let go of, it holds its height and drifts."""
+    """Sticks: forward, left, up, yaw rate, each from -1 to 1; let go of, it stays at its altitude and drifts."""
 
     needs_flight, needs_position = True, False
 
-    def __init__(self, pilot: "Pilot", *values: float):
-        self._level = Level(pilot)
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        self._flight = AltitudeFlight(guidance)
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
         """Fly as the sticks say; when nobody holds them any more, by itself."""
-        if not pilot.flying:
-            return
-        if not pilot.sticks_fresh:
-            self.next = "descend" if pilot.position_lost else "hold"
-        forward, left, up, yaw = (stick(pilot, k) for k in range(4))
-        limits, tilt = pilot.limits, SHARE * pilot.parameters["MPC_TILT_MAX"]
-        climb = up * (limits.up if up > 0.0 else limits.down)
-        self._level.step(pilot, dt, climb, yaw * limits.yaw_rate, (tilt * forward, tilt * left))
+        if not guidance.flying:
+            return None
+        if not guidance.inputs.sticks_fresh:
+            self.next_mode = "descend" if view.position_lost else "hold"
+        forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
+        limits, tilt = guidance.limits, TILT_FRACTION * guidance.parameters["MPC_TILT_MAX"]
+        climb_rate = up * (limits.up if up > 0.0 else limits.down)
+        tilts = (tilt * forward, tilt * left)
+        return self._flight.step(constants, view, guidance, climb_rate, yaw * limits.yaw_rate, tilts)

@@ -1,16 +1,14 @@
 """Down without knowing where: level but for what leans against the wind, as PX4's mode of this name does."""
 
-from typing import TYPE_CHECKING
-
-from services.autopilot.commander.modes.base import FlightMode
-from services.autopilot.commander.modes.land import sinking
-from services.autopilot.commander.modes.level import Level
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.altitude_flight import AltitudeFlight
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.modes.land import descent_speed
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
 
 NAME = "descend"
-SURE = 1.0  # [s] for which the position must be known again
+RECOVERY_TIME = 1.0  # [s] for which the position must be known again
 
 
 class Mode(FlightMode):
@@ -18,15 +16,16 @@ class Mode(FlightMode):
 
     needs_flight, needs_position = True, False
 
-    def __init__(self, pilot: "Pilot", *values: float):
-        self._level = Level(pilot)
-        self._known = 0.0  # [s]
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        self._flight = AltitudeFlight(guidance)
+        self._position_known = 0.0  # [s]
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
-        """One tick of dt [s]."""
-        if not pilot.flying:
-            return
-        self._known = 0.0 if pilot.position_lost else self._known + dt
-        if self._known > SURE:
-            self.next = "hold" if pilot.operated else "land"
-        self._level.step(pilot, dt, -sinking(pilot, self._level.height), 0.0, (0.0, 0.0))
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+        """Sink for one tick."""
+        if not guidance.flying:
+            return None
+        self._position_known = 0.0 if view.position_lost else self._position_known + view.dt
+        if self._position_known > RECOVERY_TIME:
+            self.next_mode = "hold" if constants.has_operator else "land"
+        speed = descent_speed(constants, guidance, self._flight.altitude)
+        return self._flight.step(constants, view, guidance, -speed, 0.0, (0.0, 0.0))

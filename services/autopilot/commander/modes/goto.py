@@ -1,12 +1,10 @@
 """To a place in the world, and stay there."""
 
 import math
-from typing import TYPE_CHECKING
 
-from services.autopilot.commander.modes.base import FlightMode, tuple_of, value
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants, View
 
 NAME = "goto"
 
@@ -16,19 +14,17 @@ class Mode(FlightMode):
 
     needs_flight = True
 
-    def __init__(self, pilot: "Pilot", *values: float):
-        here = pilot.guide.position
-        x, y, z = (value(values, k) for k in range(3))
-        self._target = tuple_of(here, (x, y, z))
-        if not all(map(math.isfinite, self._target)) or self._target[2] <= pilot.ground:
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        self._target = fill_in(guidance.smoothing.position, vector(values, 0))
+        if not all(map(math.isfinite, self._target)) or self._target[2] <= constants.resting_height:
             raise ValueError("go to: expected a place above the ground")
-        if not pilot.fence.allows(self._target[0], self._target[1]):
+        if not guidance.fence.allows(self._target[0], self._target[1]):
             raise ValueError("go to: the place is outside of the fence")
         self._yaw, speed = value(values, 3), value(values, 4)
         if speed > 0.0:
-            pilot.speed = speed
+            guidance.speed = speed
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """Fly there."""
-        pilot.guide.to(self._target, pilot.limits, dt)
-        pilot.guide.turn_to(self._yaw, pilot.limits, dt)
+        guidance.smoothing.move_to(self._target, guidance.limits, view.dt)
+        guidance.smoothing.turn_to(self._yaw, guidance.limits, view.dt)

@@ -1,32 +1,29 @@
 """Stop, and stay there."""
 
-from typing import TYPE_CHECKING
-
 from dynamics.vector import ZERO, Vec3, norm
-from services.autopilot.commander.modes.base import FlightMode
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants, View
 
 NAME = "hold"
 STOPPED = 0.05  # [m/s]
 
 
 class Mode(FlightMode):
-    """Brake first, then hold the place where the guide has come to rest."""
+    """Brake first, then hold the position where the setpoint has come to rest."""
 
-    def __init__(self, pilot: "Pilot", *values: float):
-        self._place: Vec3 | None = None
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        self._position: Vec3 | None = None
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """Brake or stay."""
-        if not pilot.flying:
+        if not guidance.flying:
             return
-        guide, limits = pilot.guide, pilot.limits
-        if self._place is None:
-            guide.along(ZERO, limits, dt)
-            if norm(guide.velocity) < STOPPED:
-                self._place = guide.position
+        smoothing, limits = guidance.smoothing, guidance.limits
+        if self._position is None:
+            smoothing.move_at(ZERO, limits, view.dt)
+            if norm(smoothing.velocity) < STOPPED:
+                self._position = smoothing.position
         else:
-            guide.to(self._place, limits, dt)
-        guide.turn_at(0.0, limits, dt)
+            smoothing.move_to(self._position, limits, view.dt)
+        smoothing.turn_at(0.0, limits, view.dt)

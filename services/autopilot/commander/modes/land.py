@@ -1,23 +1,21 @@
 """Down to the ground, where it is."""
 
-from typing import TYPE_CHECKING
-
 from dynamics.vector import ZERO
-from services.autopilot.commander.guide import approach
-from services.autopilot.commander.modes.base import FlightMode
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.smoothing import braking_speed
+from services.autopilot.commander.view import Constants, View
 
 NAME = "land"
 SLOW_HEIGHT = 3.0  # [m] above the ground, as estimated; below it the last metres begin
+STOPPED = 0.05  # [m/s]
 
 
-def sinking(pilot: "Pilot", height: float) -> float:
-    """Speed [m/s] of going down at a height [m] of the world."""
-    limits, slow = pilot.limits, pilot.parameters["MPC_LAND_SPEED"]
-    above = max(0.0, height - pilot.ground - SLOW_HEIGHT)
-    return max(slow, min(limits.down, slow + approach(above, limits.acceleration)))
+def descent_speed(constants: Constants, guidance: Guidance, altitude: float) -> float:
+    """Speed [m/s] of going down at an altitude: world z [m]."""
+    limits, slow = guidance.limits, guidance.parameters["MPC_LAND_SPEED"]
+    above = max(0.0, altitude - constants.resting_height - SLOW_HEIGHT)
+    return max(slow, min(limits.down, slow + braking_speed(above, limits.acceleration)))
 
 
 class Mode(FlightMode):
@@ -25,22 +23,22 @@ class Mode(FlightMode):
 
     needs_flight = True
 
-    def __init__(self, pilot: "Pilot", *values: float):
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._place: tuple[float, float] | None = None
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """Stop where it is, and sink."""
-        if not pilot.flying:
+        if not guidance.flying:
             return
-        guide, limits = pilot.guide, pilot.limits
-        x, y, z = guide.position
-        speed = sinking(pilot, z)
-        across = limits._replace(down=speed)
+        smoothing, limits = guidance.smoothing, guidance.limits
+        x, y, z = smoothing.position
+        speed = descent_speed(constants, guidance, z)
+        slowed = limits._replace(down=speed)
         if self._place is None:
             vx, vy, _ = ZERO
-            if abs(guide.velocity[0]) + abs(guide.velocity[1]) < 0.05:
+            if abs(smoothing.velocity[0]) + abs(smoothing.velocity[1]) < STOPPED:
                 self._place = (x, y)
         else:
-            vx, vy, _ = guide.towards((*self._place, z), across)
-        guide.along((vx, vy, -speed), across, dt)
-        guide.turn_at(0.0, limits, dt)
+            vx, vy, _ = smoothing.velocity_to((*self._place, z), slowed)
+        smoothing.move_at((vx, vy, -speed), slowed, view.dt)
+        smoothing.turn_at(0.0, limits, view.dt)

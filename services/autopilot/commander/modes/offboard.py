@@ -1,75 +1,81 @@
 """Setpoints from outside: positions, velocities, accelerations, or an attitude with its thrust."""
 
 import math
-from typing import TYPE_CHECKING
 
 from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
-from dynamics.vector import ZERO, Vec3, add, scale, subtract
-from services.autopilot.commander.guide import shortened
-from services.autopilot.commander.modes.base import FlightMode, value
+from dynamics.vector import Vec3, add, scale
+from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.smoothing import clamp_norm
+from services.autopilot.commander.view import Constants, View
 from services.autopilot.interface import Setpoint
 
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
-
 NAME = "offboard"
+ACCELERATION_TIME = 0.5  # [s] for which an acceleration is taken to last
 
 
 class Mode(FlightMode):
-    """Follows the newest setpoint; the pilot's failsafe watches that there is one."""
+    """Follows the newest setpoint; a failsafe watches that there is one."""
 
-    def __init__(self, pilot: "Pilot", *values: float):
-        if not pilot.offboard_fresh:
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        if not guidance.offboard_fresh:
             raise ValueError("offboard: no setpoints are coming")
 
-    def step(self, pilot: "Pilot", dt: float) -> None:
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
         """Towards the setpoint, within the limits."""
-        kind, values = pilot.offboard
-        if not pilot.armed:
-            return
-        if kind == "offboard_attitude":
-            self._tilt(pilot, values)
-            return
-        place, velocity, acceleration = ([value(values, 3 * row + k) for k in range(3)] for row in range(3))
-        guide, limits = pilot.guide, pilot.limits
-        if place[2] > guide.position[2] or velocity[2] > 0.0 or acceleration[2] > 0.0:
-            pilot.lift_off()
-        if not pilot.flying:
-            return
-        target = tuple(h if math.isnan(p) else p for h, p in zip(guide.position, place, strict=True))
-        way = guide.towards(target, limits)  # type: ignore[arg-type]
-        pushed = scale(0.5, shortened(_or_zero(acceleration), limits.acceleration))  # held for half a second
-        kept = tuple(
-            v if math.isnan(p) and math.isnan(asked) and not math.isnan(a) else 0.0
-            for v, p, asked, a in zip(guide.velocity, place, velocity, acceleration, strict=True)
-        )
-        guide.along(add(add(way, _or_zero(velocity)), add(pushed, kept)), limits, dt)  # type: ignore[arg-type]
-        rate = value(values, 10)
-        if math.isnan(rate):
-            guide.turn_to(value(values, 9), limits, dt)
-        else:
-            guide.turn_at(rate, limits, dt)
-
-    def _tilt(self, pilot: "Pilot", values: tuple[float, ...]) -> None:
-        """An attitude as what the controller makes it of: tilts are accelerations, a thrust one upwards."""
-        thrust = value(values, 7)
-        if thrust > pilot.hover_share:
-            pilot.lift_off()
-        if not pilot.flying:
-            return
-        q = Quaternion(*(value(values, k) for k in range(4)))
-        roll, pitch, yaw = (0.0, 0.0, pilot.guide.yaw) if math.isnan(q.w) else to_roll_pitch_yaw(q)
-        s, c, g = math.sin(yaw), math.cos(yaw), pilot.gravity
-        forward, left = g * pitch, -g * roll
-        share = pilot.hover_share if math.isnan(thrust) else thrust
-        up = g * (share / pilot.hover_share * math.cos(roll) * math.cos(pitch) - 1.0)
-        rate = value(values, 6)
-        acceleration = (c * forward - s * left, s * forward + c * left, up)
-        e = pilot.estimate
-        direct = Setpoint(e.position_world, e.velocity_world, acceleration, yaw, 0.0 if math.isnan(rate) else rate)
-        pilot.follow(direct)
+        values = guidance.inputs.offboard
+        if not guidance.armed:
+            return None
+        if guidance.inputs.offboard_kind == "offboard_attitude":
+            return _follow_attitude(constants, view, guidance, values)
+        position, velocity, acceleration = (vector(values, 3 * row) for row in range(3))
+        if position[2] > guidance.smoothing.position[2] or velocity[2] > 0.0 or acceleration[2] > 0.0:
+            guidance.lift_off(constants, view)
+        if guidance.flying:
+            _follow_position(view, guidance, position, velocity, acceleration)
+            rate = value(values, 10)
+            if math.isnan(rate):
+                guidance.smoothing.turn_to(value(values, 9), guidance.limits, view.dt)
+            else:
+                guidance.smoothing.turn_at(rate, guidance.limits, view.dt)
+        return None
 
 
-def _or_zero(v: list[float]) -> Vec3:
+def _follow_position(view: View, guidance: Guidance, position: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
+    """Move the setpoint by what is given of position [m], velocity [m/s] and acceleration [m/s^2]; NaN: not given."""
+    smoothing, limits = guidance.smoothing, guidance.limits
+    approach = smoothing.velocity_to(fill_in(smoothing.position, position), limits)
+    gained = scale(ACCELERATION_TIME, clamp_norm(_or_zero(acceleration), limits.acceleration))
+    x, y, z = (
+        v if math.isnan(p) and math.isnan(asked) and not math.isnan(a) else 0.0
+        for v, p, asked, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
+    )  # where an acceleration alone is given, it adds to the present velocity
+    smoothing.move_at(add(add(approach, _or_zero(velocity)), add(gained, (x, y, z))), limits, view.dt)
+
+
+def _follow_attitude(
+    constants: Constants, view: View, guidance: Guidance, values: tuple[float, ...]
+) -> Setpoint | None:
+    """An attitude as what the controller makes it of: tilts are accelerations, a thrust one upwards."""
+    thrust = value(values, 7)
+    if thrust > constants.hover_thrust:
+        guidance.lift_off(constants, view)
+    if not guidance.flying:
+        return None
+    q = Quaternion(*(value(values, k) for k in range(4)))
+    roll, pitch, yaw = (0.0, 0.0, guidance.smoothing.yaw) if math.isnan(q.w) else to_roll_pitch_yaw(q)
+    s, c, g = math.sin(yaw), math.cos(yaw), constants.gravity
+    forward, left = g * pitch, -g * roll
+    share = constants.hover_thrust if math.isnan(thrust) else thrust
+    up = g * (share / constants.hover_thrust * math.cos(roll) * math.cos(pitch) - 1.0)
+    rate = value(values, 6)
+    acceleration = (c * forward - s * left, s * forward + c * left, up)
+    e = view.estimate
+    setpoint = Setpoint(e.position_world, e.velocity_world, acceleration, yaw, 0.0 if math.isnan(rate) else rate)
+    guidance.follow(setpoint)
+    return setpoint
+
+
+def _or_zero(v: Vec3) -> Vec3:
     x, y, z = (0.0 if math.isnan(c) else c for c in v)
-    return subtract((x, y, z), ZERO)
+    return x, y, z

@@ -1,11 +1,8 @@
 """The scene's own `[trajectory]`, setpoint by setpoint."""
 
-from typing import TYPE_CHECKING
-
-from services.autopilot.commander.modes.base import FlightMode
-
-if TYPE_CHECKING:
-    from services.autopilot.commander.pilot import Pilot
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants
 
 NAME = "phases"
 
@@ -13,5 +10,5 @@ NAME = "phases"
 class Mode(FlightMode):
     """Follows the setpoints of the trajectory; once left, it is not entered again."""
 
-    def __init__(self, pilot: "Pilot", *values: float):
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         raise ValueError("phases: the trajectory of the scene has been left")

@@ -1,10 +1,8 @@
-from pathlib import Path
-
 from services.trajectory.piece import Piece
 from services.trajectory.segments import KINDS
 
 
 def test_hold_stays_where_it_is():
     hold = KINDS["hold"](duration=2.0)
-    assert hold.pieces(3.0, Path()) == [Piece(2.0, (3.0,))]
-    assert hold.end(3.0, Path()) == 3.0
+    assert hold.pieces(3.0) == [Piece(2.0, (3.0,))]
+    assert hold.end(3.0) == 3.0

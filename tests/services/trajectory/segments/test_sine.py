@@ -1,5 +1,4 @@
 import math
-from pathlib import Path
 
 from services.trajectory.piece import Piece
 from services.trajectory.segments import KINDS
@@ -8,11 +7,9 @@ Sine = KINDS["sine"]
 
 
 def test_sine_swings_about_where_it_starts():
-    assert Sine(amplitude=2.0, frequency=0.5, duration=4.0).pieces(1.0, Path()) == [Piece(4.0, (1.0,), 2.0, math.pi)]
+    assert Sine(amplitude=2.0, frequency=0.5, duration=4.0).pieces(1.0) == [Piece(4.0, (1.0,), 2.0, math.pi)]
 
 
 def test_whole_cycles_end_where_they_began():
-    assert Sine(amplitude=2.0, frequency=0.5, duration=4.0).end(1.0, Path()) == 1.0
-    assert Sine(amplitude=2.0, frequency=0.5, duration=4.5).end(1.0, Path()) == 1.0 + 2.0 * math.sin(
-        math.pi / 4.0 * 2.0
-    )
+    assert Sine(amplitude=2.0, frequency=0.5, duration=4.0).end(1.0) == 1.0
+    assert Sine(amplitude=2.0, frequency=0.5, duration=4.5).end(1.0) == 1.0 + 2.0 * math.sin(math.pi / 4.0 * 2.0)

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from services.trajectory.segments import KINDS
 
 def test_it_starts_and_ends_at_rest_and_peaks_halfway():
     segment = KINDS["smoothstep"](to=-1.0, duration=2.0)
-    (piece,) = segment.pieces(3.0, Path())
+    (piece,) = segment.pieces(3.0)
     channel = Channel(np.array([0.0]), np.array([piece.row()]))
     start, middle, end = (channel_at(channel, t) for t in (0.0, 1.0, 2.0))
     assert start[:2] == (
@@ -24,4 +22,4 @@ def test_it_starts_and_ends_at_rest_and_peaks_halfway():
         ),
         abs=1e-12,
     )
-    assert segment.end(3.0, Path()) == -1.0
+    assert segment.end(3.0) == -1.0

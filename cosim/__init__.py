@@ -1,0 +1,1 @@
+"""The co-simulation engine: scenes, lock step, executors, bus, log. It knows no service by name."""

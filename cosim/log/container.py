@@ -1,0 +1,171 @@
+"""The MCAP container: records one after the other, and at the end the index of what is where."""
+
+import mimetypes
+import zlib
+from collections.abc import Sequence
+from typing import BinaryIO
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC
+
+from cosim.log.chunk import Messages
+
+METADATA = "lapwing"  # name of the metadata record
+DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
+COMPRESSION_LEVEL = 2  # zstd: level 3, its default, makes such logs larger; level 9 saves 3 % for five times the work
+_CRC = 4  # [bytes] of the footer's checksum, which it does not cover itself
+
+
+class Container:
+    """Writes a file's records in order and remembers where they are. All methods may raise OSError."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        """Begin a file that is open for writing and empty."""
+        self._file = file
+        self._offset = 0
+        self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._chunks: list[ChunkIndex] = []
+        self._attachments: list[AttachmentIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._counts: dict[int, int] = {}  # messages by channel
+        self._write(MCAP0_MAGIC)
+        self._write(encoded(Header(profile="ros2", library="lapwing")))
+
+    def add_attachment(self, name: str, data: bytes) -> None:
+        """Write an attachment; its media type follows from the file name."""
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        record = encoded(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
+        self._attachments.append(
+            AttachmentIndex(
+                offset=self._offset,
+                length=len(record),
+                log_time=0,
+                create_time=0,
+                data_size=len(data),
+                name=name,
+                media_type=kind,
+            )
+        )
+        self._write(record)
+
+    def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
+        """Write a metadata record."""
+        record = encoded(Metadata(metadata=metadata, name=name))
+        self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
+        self._write(record)
+
+    def add_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
+        """Write a compressed chunk with the index of its messages, and bring it to the disk.
+
+        Args:
+            declarations: the schemas and channels that this chunk is the first to use; they go into it.
+            messages: at least one.
+        """
+        for record in declarations:
+            if isinstance(record, Schema):
+                self._schemas.append(record)
+            else:
+                self._channels.append(record)
+        head = b"".join(map(encoded, declarations))
+        data = head + messages.data
+        compressed = self._compressor.compress(data)
+        chunk = Chunk(
+            compression="zstd",
+            data=compressed,
+            message_start_time=messages.start_ns,
+            message_end_time=messages.end_ns,
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
+        offset = self._offset
+        self._write(encoded(chunk))
+        length = self._offset - offset
+        places: dict[int, int] = {}
+        for index in messages.indexes:
+            places[index.channel_id] = self._offset
+            self._write(index.record(len(head)))
+            self._counts[index.channel_id] = self._counts.get(index.channel_id, 0) + len(index.times_ns)
+        self._chunks.append(
+            ChunkIndex(
+                chunk_start_offset=offset,
+                chunk_length=length,
+                compression=chunk.compression,
+                compressed_size=len(compressed),
+                uncompressed_size=len(data),
+                message_start_time=messages.start_ns,
+                message_end_time=messages.end_ns,
+                message_index_offsets=places,
+                message_index_length=self._offset - offset - length,
+            )
+        )
+        self._file.flush()
+
+    def finish(self) -> None:
+        """Write the summary and the end."""
+        self._write(encoded(DataEnd(data_section_crc=0)))
+        start = self._offset
+        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
+            (Opcode.SCHEMA, self._schemas),
+            (Opcode.CHANNEL, self._channels),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
+        ]
+        summary = b""
+        offsets = b""
+        for opcode, group in groups:
+            data = b"".join(map(encoded, group))
+            offsets += encoded(
+                SummaryOffset(group_length=len(data), group_opcode=opcode, group_start=start + len(summary))
+            )
+            summary += data
+        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        summary += offsets
+        footer.summary_crc = zlib.crc32(summary + encoded(footer)[:-_CRC])
+        self._write(summary + encoded(footer) + MCAP0_MAGIC)
+        self._file.flush()
+
+    def _statistics(self) -> Statistics:
+        return Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_start_time=min((chunk.message_start_time for chunk in self._chunks), default=0),
+            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+    def _write(self, data: bytes) -> None:
+        self._file.write(data)
+        self._offset += len(data)
+
+
+def encoded(record: McapRecord) -> bytes:
+    """A record's bytes."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()

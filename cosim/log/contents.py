@@ -1,0 +1,143 @@
+"""The contents of an MCAP file: what it declares, where its chunks are, and the messages of a chunk."""
+
+import io
+import os
+import struct
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.stream_reader import get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC
+
+from cosim.log.container import METADATA
+
+_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
+_TIMES = struct.Struct("<QQ")
+_CHANNEL = struct.Struct("<H")
+_DECLARATIONS: dict[int, Any] = {
+    Opcode.SCHEMA: records.Schema,
+    Opcode.CHANNEL: records.Channel,
+    Opcode.METADATA: records.Metadata,
+    Opcode.ATTACHMENT: records.Attachment,
+}
+
+
+class ChunkPlace(NamedTuple):
+    """Where a chunk is, the times of its first and last message, and whose messages it holds."""
+
+    offset: int  # [bytes]
+    start_ns: int
+    end_ns: int
+    channels: set[int]  # as the index behind the chunk says; empty: not known
+
+    def may_hold(self, channels: Collection[int]) -> bool:
+        """Whether a message of these channels can be in it."""
+        return not self.channels or not self.channels.isdisjoint(channels)
+
+
+class Contents:
+    """What is in a file.
+
+    Attributes:
+        metadata: of the record `lapwing`.
+        attachments: file name to contents.
+        schemas: type name by schema id.
+        channels: by channel id.
+        chunks: in order of the file.
+        complete: whether the file has its end.
+
+    Raises:
+        ValueError: no MCAP file, or a damaged one.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        self.metadata: dict[str, str] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.schemas: dict[int, str] = {}
+        self.channels: dict[int, records.Channel] = {}
+        self.chunks: list[ChunkPlace] = []
+        self.complete = False
+        self._path, self._file = path, file
+        try:
+            self._scan()
+        except struct.error as fault:
+            raise ValueError(f"{path}: damaged record: {fault}") from None
+
+    def read_chunk(self, offset: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
+        """Time, channel and payload of a chunk's messages of some channels, in order of writing.
+
+        Raises:
+            ValueError: the chunk is damaged.
+        """
+        self._file.seek(offset + _RECORD.size)
+        try:
+            chunk = records.Chunk.read(ReadDataStream(self._file))
+            stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+            data = stream.read(size)
+        except Exception as fault:  # whatever the decompressor raises
+            raise ValueError(f"{self._path}: damaged chunk at byte {offset}: {fault}") from None
+        found = []
+        place = 0
+        while place < size:
+            opcode, length = _RECORD.unpack_from(data, place)
+            place += _RECORD.size
+            if opcode == Opcode.MESSAGE:
+                channel, _, time_ns, _ = _MESSAGE.unpack_from(data, place)
+                if channel in channels:
+                    found.append((time_ns, channel, data[place + _MESSAGE.size : place + length]))
+            elif opcode in _DECLARATIONS:
+                self._declare(opcode, data[place : place + length])
+            place += length
+        return found
+
+    def _scan(self) -> None:
+        """Walk over the records, noting where the chunks are without reading them."""
+        file = self._file
+        size = os.fstat(file.fileno()).st_size
+        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            raise ValueError(f"{self._path}: not an MCAP file")
+        offset = len(MCAP0_MAGIC)
+        while offset + _RECORD.size <= size:
+            opcode, length = _RECORD.unpack(file.read(_RECORD.size))
+            if opcode == 0 or offset + _RECORD.size + length > size:
+                break  # a record that was never finished
+            if opcode == Opcode.FOOTER:
+                self.complete = True
+                break
+            if opcode == Opcode.CHUNK:
+                start_ns, end_ns = _TIMES.unpack(file.read(_TIMES.size))
+                self.chunks.append(ChunkPlace(offset, start_ns, end_ns, set()))
+            elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
+                self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
+            elif opcode == Opcode.MESSAGE:
+                raise ValueError(f"{self._path}: holds messages outside of chunks, expected a chunked log")
+            elif opcode in _DECLARATIONS:
+                self._declare(opcode, file.read(length))
+            offset += _RECORD.size + length
+            file.seek(offset)
+        if not self.complete and self.chunks:
+            self.chunks[-1].channels.clear()  # its index may lack channels
+        if not (self.complete and self.channels):
+            for chunk in self.chunks:
+                self.read_chunk(chunk.offset, ())
+
+    def _declare(self, opcode: int, data: bytes) -> None:
+        try:
+            record = _DECLARATIONS[opcode].read(ReadDataStream(io.BytesIO(data)))
+        except (McapError, struct.error, UnicodeDecodeError) as fault:
+            raise ValueError(f"{self._path}: damaged {Opcode(opcode).name.lower()} record: {fault}") from None
+        if isinstance(record, records.Schema):
+            self.schemas[record.id] = record.name
+        elif isinstance(record, records.Channel):
+            self.schemas.setdefault(record.schema_id, "")
+            self.channels[record.id] = record
+        elif isinstance(record, records.Attachment):
+            self.attachments[record.name] = record.data
+        elif record.name == METADATA:
+            self.metadata = record.metadata

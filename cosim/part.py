@@ -1,0 +1,247 @@
+"""A part of a service's core, compiled: takes the rows that are due, steps, and gives rows.
+
+A part is described by its parameters, a NamedTuple. The module of their class has the pure function
+
+    step(parameters, state, tick, inputs) -> (state, outputs, signal)
+
+`inputs` is a tuple of `Received`, `outputs` a tuple of trees, one for each port; the state lives in a cell, which parts
+of one service may share. Every part is compiled once, to a function of (its memory, tick), and every executor calls
+that same machine code by its address: whatever the executor, the bits are the same.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+from cosim.schedule import KEPT, Input, Port, due
+from dynamics.cell import Cell
+from dynamics.kernel import kernel, leaf
+from dynamics.rows import load, store
+
+GO_ON, LOOK, END, FAILED = range(4)
+"""Signals of a step: nothing; Python parts are to act at this tick; the tick is the last; the state is unsound."""
+
+_ADDRESS = -1  # the tick at which `advance` gives the address of its memory
+
+
+class Received(NamedTuple):
+    """What an input has at a tick; without a message that is due the value means nothing."""
+
+    due: bool
+    value: Any
+
+
+class InputRows(NamedTuple):
+    """Where an input is read: a ring of rows."""
+
+    like: Any
+    rows: np.ndarray  # (depth, width), the depth a power of two
+    period: int
+    delay: int
+
+
+class OutputRows(NamedTuple):
+    """Where an output is written: a ring of rows."""
+
+    rows: np.ndarray  # (depth, width)
+    period: int
+
+
+class Core(NamedTuple):
+    """All that a compiled part is given at a tick."""
+
+    parameters: Any
+    state: Any  # cell
+    inputs: tuple
+    outputs: tuple
+
+
+@dataclass
+class Part:
+    """A compiled part, as its service declares it.
+
+    Attributes:
+        name: "plant", "sensors.imu".
+        parameters: a NamedTuple whose module has `step`.
+        state: the cell that holds its state.
+        inputs: what it takes, in the order of the argument `inputs`.
+        outputs: the ports that it gives, in the order of its outputs.
+        every: ticks between two steps.
+        failure: the error of a step at a tick that says that the state is unsound.
+    """
+
+    name: str
+    parameters: Any
+    state: Any
+    inputs: tuple[Input, ...] = ()
+    outputs: tuple[Port, ...] = ()
+    every: int = 1
+    failure: Callable[[int], Exception] | None = None
+
+
+class Code(NamedTuple):
+    """The machine code of a bound part."""
+
+    function: int  # address
+    memory: int  # address
+    cell: Any  # what is at that address; it must live as long as the code is called
+
+
+def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Code:
+    """Compile a part or load it, on the rows of its ports."""
+    inputs = tuple(InputRows(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
+    outputs = tuple(OutputRows(rows[port.name], port.period) for port in part.outputs)
+    cell = Cell(Core(part.parameters, part.state, inputs, outputs))
+    memory = advance(cell, _ADDRESS)
+    compiled: Any = advance.overloads[  # type: ignore[attr-defined]
+        (numba.typeof(cell), types.int64)
+    ]
+    return Code(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name), memory, cell)
+
+
+def step(parameters, state, tick, inputs):
+    """`step` of the module that declares the class of the parameters."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(step, jit_options={"forceinline": True})
+def _step(parameters, state, tick, inputs):
+    found = sys.modules[parameters.instance_class.__module__].step
+    return lambda parameters, state, tick, inputs: found(parameters, state, tick, inputs)
+
+
+@leaf
+def row_of(stamp, period, rows):
+    """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
+    if period == 1:
+        return stamp & (rows.shape[0] - 1)
+    return 0 if period == KEPT else (stamp // period) & (rows.shape[0] - 1)
+
+
+@leaf
+def _take(given, tick):
+    stamp = due(tick, given.period, given.delay)
+    return Received(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
+
+
+@leaf
+def _give(value, taken, tick):
+    if due(tick, taken.period, 0) >= 0:
+        store(value, taken.rows, row_of(tick, taken.period, taken.rows))
+
+
+def _take_all(inputs, tick):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_take_all, jit_options={"forceinline": True})
+def _take_each(inputs, tick):
+    calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
+    names: dict[str, Any] = {"take": _take}
+    exec(f"def take_all(inputs, tick):\n    return ({calls})\n", names)
+    return names["take_all"]
+
+
+def _give_all(values, outputs, tick):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_give_all, jit_options={"forceinline": True})
+def _give_each(values, outputs, tick):
+    calls = "".join(f"    give(values[{i}], outputs[{i}], tick)\n" for i in range(len(outputs)))
+    names: dict[str, Any] = {"give": _give}
+    exec(f"def give_all(values, outputs, tick):\n{calls}    return None\n", names)
+    return names["give_all"]
+
+
+@intrinsic
+def _address(typing_context, cell):
+    def generate(context, builder, signature, arguments):
+        return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
+
+    return types.int64(cell), generate
+
+
+@kernel
+def advance(memory, tick):
+    """One step of the part whose `Core` is in the cell `memory`; its signal. At tick -1: the cell's address."""
+    if tick < 0:
+        return _address(memory)
+    core = memory.value
+    s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
+    core.state.value = s
+    _give_all(outputs, core.outputs, tick)
+    return signal
+
+
+@intrinsic
+def _invoke(typing_context, function, memory, tick):
+    def generate(context, builder, signature, arguments):
+        pointer = ir.IntType(8).as_pointer()
+        structure = ir.LiteralStructType([pointer])
+        kind = ir.FunctionType(ir.IntType(64), [structure, ir.IntType(64)])
+        cell = builder.insert_value(ir.Constant(structure, ir.Undefined), builder.inttoptr(arguments[1], pointer), 0)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [cell, arguments[2]])
+
+    return types.int64(types.int64, types.int64, types.int64), generate
+
+
+class Schedule(NamedTuple):
+    """The parts of a graph in their order of execution, as the compiled loop calls them."""
+
+    function: np.ndarray  # (n,) int64 address; 0: a part in Python
+    memory: np.ndarray  # (n,) int64 address
+    every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled part
+    next: np.ndarray  # (n,) int64 tick of the next step, or of a Python part's next say
+    ended: np.ndarray  # (1,) int64: 1 once a part has said that the tick is the last
+
+
+def schedule(codes: Sequence[Code | None], every: Sequence[int]) -> Schedule:
+    """The schedule of these parts; None stands for a part in Python, which looks first at tick 0."""
+    return Schedule(
+        np.array([code.function if code else 0 for code in codes], np.int64),
+        np.array([code.memory if code else 0 for code in codes], np.int64),
+        np.array(every, np.int64),
+        np.zeros(len(codes), np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+@kernel
+def run(schedule, tick, first, stop):
+    """Run the schedule in a cell from part `first` of `tick` until before the tick `stop`, or until somebody has a say.
+
+    Returns:
+        (tick, part, signal): LOOK: the Python part is to act at the tick, then go on with the next; FAILED: the part's
+        state is unsound; END: the tick before was the last; GO_ON: `stop` is reached.
+    """
+    plan = schedule.value
+    while tick < stop:
+        for k in range(first, len(plan.function)):
+            if plan.next[k] > tick:
+                continue
+            if plan.function[k] == 0:
+                return tick, k, LOOK
+            plan.next[k] = tick + plan.every[k]
+            signal = _invoke(plan.function[k], plan.memory[k], tick)
+            if signal != GO_ON:
+                if signal == FAILED:
+                    return tick, k, FAILED
+                if signal == END:
+                    plan.ended[0] = 1
+                elif signal == LOOK:
+                    for j in range(k + 1, len(plan.function)):
+                        if plan.function[j] == 0:
+                            plan.next[j] = tick
+        first = 0
+        tick += 1
+        if plan.ended[0] == 1:
+            return tick, 0, END
+    return tick, 0, GO_ON

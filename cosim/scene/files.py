@@ -1,0 +1,90 @@
+"""The files that a scene names: found by path or by name, read once, remembered for the log."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from cosim.scene.errors import SceneError, Source
+from dynamics.errors import KeyedError
+
+
+class Files:
+    """Reads the files of one scene."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder  # of the scene; paths are relative to it
+        self.sources: dict[str, bytes] = {}  # every file that was read, by what it says: airframe.toml
+        self.read_from: dict[str, Path] = {}  # file by the dotted key that its content has in the scene
+        self.texts: dict[str, str] = {}  # its text, by the same
+
+    def find(self, key: str, what: str, name: str, beside: str, shipped: Path) -> Path:
+        """The TOML file that a key names: by path, or by name in a folder beside the scene or that of the package.
+
+        Args:
+            key: dotted key whose value is the name.
+            what: what the name is of, for the message.
+            name: a path that ends in .toml, relative to the scene; or a name.
+            beside: name of a folder beside the scene.
+            shipped: folder of the package.
+
+        Raises:
+            KeyedError: there is none; lists the choices.
+        """
+        if name.endswith(".toml"):
+            if not (self.folder / name).is_file():
+                raise KeyedError(
+                    key, f"no file {self.folder / name}", "the path of a .toml file beside the scene, or a name"
+                )
+            return self.folder / name
+        places = (self.folder / beside, shipped)
+        for place in places:
+            if (place / f"{name}.toml").is_file():
+                return place / f"{name}.toml"
+        choices = {path.stem for place in places for path in place.glob("*.toml")}
+        error = KeyedError.unknown(key, what, name, choices)
+        raise KeyedError(key, error.message, f"{error.expected}, or the path of a .toml file")
+
+    def text(self, key: str, named_by: str, path: Path) -> str:
+        """The text of a file.
+
+        Args:
+            key: dotted key that its content will have in the scene.
+            named_by: dotted key whose value names the file.
+            path: of the file.
+
+        Raises:
+            KeyedError: it cannot be read.
+        """
+        try:
+            content = path.read_bytes()
+            text = content.decode("utf-8")
+        except OSError as error:
+            raise KeyedError(named_by, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+        except UnicodeDecodeError:
+            raise KeyedError(named_by, f"{path}: not a UTF-8 text file") from None
+        self.sources[f"{key}{path.suffix}"] = content
+        self.read_from[key], self.texts[key] = path, text
+        return text
+
+    def toml(self, key: str, named_by: str, path: Path) -> dict[str, Any]:
+        """The tables of a TOML file; arguments and errors as of `text`, SceneError where it is not TOML."""
+        return parse_toml(self.text(key, named_by, path), path)
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """The tables of a TOML text; SceneError with the file where it is none."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError("", f"not valid TOML: {error}", source=Source(path)) from None
+
+
+def laid_over(content: dict[str, Any], given: Any) -> Any:
+    """The tables of a file with those that the scene itself gives laid over them, key by key."""
+    if not isinstance(given, dict):
+        return given
+    merged = dict(content)
+    for key, value in given.items():
+        below = content.get(key)
+        merged[key] = laid_over(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return merged

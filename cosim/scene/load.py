@@ -1,0 +1,133 @@
+"""From a file, its overrides and the files that it names to a scene; or from a recorded tree."""
+
+import copy
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from cosim.scene.errors import SceneError, Source
+from cosim.scene.files import Files, parse_toml
+from cosim.scene.locate import source_of
+from cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
+from cosim.scene.scene import Scene, Section, Vocabulary
+from dynamics.errors import KeyedError
+from dynamics.validation import fault
+
+
+def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shipped: Path) -> Scene:
+    """Read a scene and every file that it names, override, and validate.
+
+    Args:
+        scene: path of its TOML file, or the name of one that ships.
+        overrides: of any key that the scene resolves to, those of the files that it names among them.
+        vocabulary: the tables that there are.
+        shipped: folder of the scenes that ship.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+    """
+    path = _find(scene, shipped)
+    return parse(path, _read(path), overrides, vocabulary)
+
+
+def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
+    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    tree, files, given = parse_toml(text, path), Files(path.parent), parsed(overrides)
+    files.sources["scene.toml"] = text.encode()
+    try:
+        _resolve(tree, given, vocabulary, files)
+        tables = _tables(tree, vocabulary)
+        scene = Scene(path, tables, vocabulary, files.sources, tuple(o.text for o in given))
+        _check(scene, tables, vocabulary)
+    except SceneError:
+        raise
+    except KeyedError as error:
+        source = source_of(error.key, path, text, (o.key for o in given), files)
+        raise SceneError(error.key, error.message, error.expected, source) from None
+    return scene
+
+
+def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) -> Scene:
+    """The scene whose `resolved` is `tree`. Opens no file.
+
+    Raises:
+        SceneError: it is no longer a sound scene.
+    """
+    try:
+        tables = _tables(tree, vocabulary)
+        scene = Scene(Path(name), tables, vocabulary)
+        _check(scene, tables, vocabulary)
+    except KeyedError as error:
+        raise SceneError(error.key, error.message, error.expected, Source(Path(name))) from None
+    return scene
+
+
+def _find(scene: str | Path, shipped: Path) -> Path:
+    """The file of a scene; SceneError that names the nearest if there is none."""
+    path = Path(scene)
+    if path.exists() or path.suffix or len(path.parts) > 1:
+        return path
+    if not (shipped / f"{path}.toml").is_file():
+        choices = [p.stem for p in shipped.glob("*.toml")]
+        error = KeyedError.unknown("", "scene", str(path), choices)
+        raise SceneError("", error.message, f"{error.expected}, or the path of a .toml file")
+    return shipped / f"{path}.toml"
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except IsADirectoryError:
+        raise SceneError("", "is a folder", "a scene file (TOML)", Source(path)) from None
+    except UnicodeDecodeError:
+        raise SceneError("", "not valid TOML: not a UTF-8 text file", source=Source(path)) from None
+    except OSError as error:
+        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+        hint = f"did you mean {path.parent / near[0]}?" if near else "`lapwing scenes` lists those there are"
+        message = (error.strerror or "cannot be read").lower()
+        raise SceneError("", f"{message}; {hint}", source=Source(path)) from None
+
+
+def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary, files: Files) -> None:
+    """Put the content of all files into the tree, and the overrides: first those that may name a file."""
+    embedded = {name for name, section in vocabulary.sections.items() if section.FROM_FILE}
+    later = []
+    for override in given:
+        if override.key.partition(".")[0] in embedded or reaches_into_text(tree, override.key):
+            later.append(override)
+        else:
+            apply(tree, override)
+    for section in vocabulary.sections.values():
+        section.embed(tree, files)
+    for override in later:
+        apply(tree, override)
+
+
+def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[Section], Section]:
+    """Every table, validated by itself."""
+    known = vocabulary.sections
+    for name in tree:
+        if name not in known:
+            raise KeyedError.unknown(name, "table", name, known)
+    tables: dict[type[Section], Section] = {}
+    for name, section in known.items():
+        if section.OPTIONAL and name not in tree:
+            continue
+        raw = tree.get(name, {})
+        if not isinstance(raw, dict):
+            raise KeyedError(name, f"got {raw!r}", f"a table [{name}]")
+        try:
+            tables[section] = section.model_validate(copy.deepcopy(raw))
+        except ValidationError as error:
+            raise fault(error, section).under(name) from None
+    return tables
+
+
+def _check(scene: Scene, tables: Mapping[type[Section], Section], vocabulary: Vocabulary) -> None:
+    for check in vocabulary.checks:
+        check(scene)
+    for table in tables.values():
+        table.check(scene)

@@ -1,0 +1,133 @@
+"""A validated scene, the tables that it consists of, and the vocabulary of tables that there are."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, NamedTuple, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from cosim.scene.files import Files
+
+
+class Section(BaseModel):
+    """A table of the scene. Subclasses say `TABLE`, the table's name.
+
+    Strict: TOML has types, so a number in quotes or `true` for 1.0 is a slip of the pen.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    TABLE: ClassVar[str]
+    OPTIONAL: ClassVar[bool] = False  # whether a scene may do without it; `scene.has` says if it does
+    FROM_FILE: ClassVar[bool] = False  # whether its content is that of a file which another table names
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """Put the content of every file that this table names into the scene's data, not yet validated.
+
+        Raises:
+            KeyedError: no such file, or its content is not of the right form.
+        """
+
+    def resolved(self) -> dict[str, Any]:
+        """All its keys, also those left at their defaults, as plain data that validates to the same table."""
+        return self.model_dump(exclude_none=True)
+
+    def lookup(self, keys: list[str]) -> Any:
+        """The value of a key of this table, or of a table within it."""
+        value: Any = self
+        for key in keys:
+            value = getattr(value, key)
+        return value
+
+    def check(self, scene: "Scene") -> None:
+        """Check what only the whole scene shows.
+
+        Raises:
+            KeyedError: with the key's path in the scene.
+        """
+
+
+class Vocabulary(NamedTuple):
+    """What a scene may say: its tables by name, and checks beyond those of single tables."""
+
+    sections: Mapping[str, type[Section]]
+    checks: tuple[Callable[["Scene"], None], ...] = ()
+
+    @classmethod
+    def of(cls, modules: Iterable[ModuleType], *checks: Callable[["Scene"], None]) -> "Vocabulary":
+        """The tables that some modules declare or import."""
+        found = [value for module in modules for value in vars(module).values()]
+        sections = [v for v in found if isinstance(v, type) and issubclass(v, Section) and hasattr(v, "TABLE")]
+        return cls({section.TABLE: section for section in sections}, checks)
+
+
+S = TypeVar("S", bound=Section)
+
+
+class Scene:
+    """A validated scene. `scene[Run]` is the table that the class `Run` declares. It opens no file."""
+
+    def __init__(
+        self,
+        path: Path,
+        tables: Mapping[type[Section], Section],
+        vocabulary: Vocabulary,
+        sources: Mapping[str, bytes] | None = None,
+        overrides: tuple[str, ...] = (),
+    ):
+        self.path = path  # where it was read from
+        self.sources = dict(sources or {})  # every file that was read, by what it says: airframe.toml
+        self.overrides = overrides  # KEY=VALUE, as given
+        self._tables = dict(tables)
+        self._vocabulary = vocabulary
+
+    def __getitem__(self, section: type[S]) -> S:
+        return self._tables[section]  # type: ignore[return-value]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and (self.name, self._tables) == (other.name, other._tables)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def has(self, section: type[Section] | str) -> bool:
+        """Whether there is this table, by its class or name: always, unless it is optional."""
+        known = self._vocabulary.sections.get(section) if isinstance(section, str) else section
+        return known in self._tables
+
+    def replaced(self, section: Section) -> "Scene":
+        """The same scene with this table in the place of its own; not checked against the others."""
+        tables = {**self._tables, type(section): section}
+        return Scene(self.path, tables, self._vocabulary, self.sources, self.overrides)
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self.path.stem
+
+    @property
+    def resolved(self) -> dict[str, Any]:
+        """All that the scene says and names, as dicts, lists, texts and numbers; `from_resolved` gives it back."""
+        tables = {section.TABLE: table.resolved() for section, table in self._tables.items()}
+        return _plain({name: tables[name] for name in sorted(tables)})
+
+    def section(self, name: str) -> Any:
+        """A table by its name; for those who do not know its class."""
+        return self._tables[self._vocabulary.sections[name]]
+
+    def tables(self, name: str) -> Mapping[str, Any]:
+        """The tables inside a table whose keys are names, for example each sensor's of "sensors"."""
+        return self.section(name).tables
+
+    def lookup(self, dotted: str) -> Any:
+        """The value of a dotted key, for example "sensors.imu.rate"."""
+        table, *rest = dotted.split(".")
+        return self.section(table).lookup(rest)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value

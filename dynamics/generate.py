@@ -1,0 +1,72 @@
+"""Functions whose source is written for the types of their arguments: straight-line code instead of loops over tuples.
+
+A kernel can neither index a tuple of unlike members by a variable nor choose a function by a class; such calls are
+written out as text when it is compiled, and cost nothing when it runs. All text that `dynamics` runs as code is here.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numba
+from numba.extending import overload
+
+INLINE = {"forceinline": True}
+
+
+def define(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
+    """A function from source text.
+
+    Args:
+        signature: "name(arguments)".
+        names: what the body may refer to.
+        lines: of the body.
+    """
+    scope = dict(names)
+    exec("\n    ".join([f"def {signature}:", *lines]), scope)
+    return scope[signature.partition("(")[0]]
+
+
+def generated(signature: str, generate: Callable[..., Callable], doc: str, *, inline: bool = False) -> Callable:
+    """A function for compiled code that `generate` makes anew for every combination of argument types.
+
+    Called from Python, the same generated code runs uncompiled: slow, for tests and set-up.
+
+    Args:
+        signature: "name(arguments)".
+        generate: takes the numba types of the arguments, returns a function of that signature.
+        doc: its docstring.
+        inline: always into its caller.
+    """
+    name, _, arguments = signature.rstrip(")").partition("(")
+
+    def function(*values: Any) -> Any:
+        return generate(*map(numba.typeof, values))(*values)
+
+    function.__name__, function.__qualname__, function.__doc__ = name, name, doc
+    function.__module__ = generate.__module__
+    chosen = define(f"chosen({arguments})", {"generate": generate}, f"return generate({arguments})")
+    overload(function, jit_options=INLINE if inline else {})(chosen)
+    return function
+
+
+def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
+    """(function(common, a[0], b[0]), function(common, a[1], b[1]), ...) for tuples of equal length."""
+    return tuple(function(common, x, y) for x, y in zip(a, b, strict=True))
+
+
+@overload(each, jit_options=INLINE)
+def _each(function, common, a, b):
+    calls = "".join(f"function(common, a[{i}], b[{i}]), " for i in range(len(a)))
+    return define("each(function, common, a, b)", {}, f"return ({calls})")
+
+
+def each_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
+    """(function(*arguments, 0), function(*arguments, 1), ...), one for each entry of the tuple `count`."""
+    return tuple(function(*arguments, i) for i in range(len(count)))
+
+
+@overload(each_index)
+def _each_index(function, count, *arguments):
+    given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
+    calls = "".join(f"function({given}{i}), " for i in range(len(count)))
+    return define("each_index(function, count, *arguments)", {}, f"return ({calls})")

@@ -1,0 +1,31 @@
+"""The decorator of every compiled function, and where its machine code is kept.
+
+No fast-math flag is set: contraction would let the same source round differently where it is inlined differently, and
+the three speeds (processes, single, batch) must give the same bits.
+
+Machine code is kept in the folder `LAPWING_CACHE`, by default ~/.cache/lapwing, by a cache of this package's own; what
+numba keeps for other functions is left alone. It is found again while no source that can be in it has changed (see
+`_key`). Compiled anew in every process are kernels in a script or notebook itself (`__main__`), and versions for
+arguments that are functions or whose class cannot be imported by name: put kernels and classes into modules.
+"""
+
+from dynamics.kernel._began import BEGAN  # noqa: F401 (first of all)
+from dynamics.kernel._by_class import ByClass
+from dynamics.kernel._cache import Statistics, on_compile, statistics
+from dynamics.kernel._decorators import kernel, leaf, uncompiled
+from dynamics.kernel._files import root as cache_folder
+from dynamics.kernel._sources import digest as source_digest
+from dynamics.kernel._sources import forget as forget_sources
+
+__all__ = [
+    "ByClass",
+    "Statistics",
+    "cache_folder",
+    "forget_sources",
+    "kernel",
+    "leaf",
+    "on_compile",
+    "source_digest",
+    "statistics",
+    "uncompiled",
+]

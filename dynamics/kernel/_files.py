@@ -1,0 +1,78 @@
+"""Files of the cache: each carries a checksum and appears whole or not at all; none of it ever raises.
+
+Several processes may read and write at once: a file is written under a name of its own and then renamed.
+"""
+
+import contextlib
+import hashlib
+import os
+import uuid
+from functools import cache
+from pathlib import Path
+
+CHECKSUM = 32  # bytes, before the content
+KEPT = 4  # versions of one file, so that two checkouts do not take it from each other
+
+
+@cache
+def root() -> Path | None:
+    """The folder that all is kept in; None if there is nowhere (no home)."""
+    given = os.environ.get("LAPWING_CACHE")
+    try:
+        return Path(given) if given else Path.home() / ".cache" / "lapwing"
+    except RuntimeError:
+        return None
+
+
+def _checksum(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=CHECKSUM).digest()
+
+
+def read(folder: str, name: str, version: str) -> bytes | None:
+    """The content that `write` was given; None if there is none, or it has been damaged."""
+    base = root()
+    if base is None:
+        return None
+    try:
+        data = (base / folder / f"{name}-{version}").read_bytes()
+    except OSError:
+        return None
+    content = data[CHECKSUM:]
+    return content if data[:CHECKSUM] == _checksum(content) else None
+
+
+def write(folder: str, name: str, version: str, content: bytes) -> None:
+    """Keep `content`, and only the last few versions of `name`; nothing happens where one cannot write.
+
+    Args:
+        folder: relative to the root, such as "kernels/dynamics.cell".
+        name: of the file, without a version.
+        version: hexadecimal digits.
+        content: any.
+    """
+    base = root()
+    if base is None:
+        return
+    place = base / folder
+    temporary = place / f"{name}-{version}.{uuid.uuid4().hex}"
+    try:
+        for path in (base, *reversed([base / p for p in Path(folder).parents if p.name]), place):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
+        temporary.write_bytes(_checksum(content) + content)
+        temporary.replace(place / f"{name}-{version}")
+        versions = sorted(place.glob(f"{name}-*"), key=lambda path: path.stat().st_mtime_ns)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        return
+    for path in versions[:-KEPT]:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def remove(folder: str, name: str) -> None:
+    """Delete every version of every file whose name begins with `name-`."""
+    base = root()
+    with contextlib.suppress(OSError):
+        for path in (base / folder).glob(f"{name}-*") if base else ():
+            path.unlink(missing_ok=True)

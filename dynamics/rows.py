@@ -1,0 +1,131 @@
+"""Trees of numbers as rows of a float64 array: how compiled code hands NamedTuples to others.
+
+A tree is a tuple or NamedTuple of floats, integers, booleans and further trees. Every number takes one column, in
+order; booleans are 0 or 1, integers are exact up to 2^53. Functions are compiled from the type of the tree, so that a
+row costs as much as the numbers that are used of it.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+from typing import Any
+
+import numpy as np
+from numba.core import types
+from numba.core.errors import TypingError
+from numba.extending import overload
+
+
+def width(tree: Any) -> int:
+    """Columns that a tree takes."""
+    return sum(map(width, tree)) if isinstance(tree, tuple) else 1
+
+
+def to_row(tree: Any) -> np.ndarray:
+    """The numbers of a tree, shape (width,)."""
+    flat: list[float] = []
+
+    def walk(part: Any) -> None:
+        if isinstance(part, tuple):
+            for item in part:
+                walk(item)
+        else:
+            flat.append(float(part))
+
+    walk(tree)
+    return np.array(flat)
+
+
+def from_row(like: Any, row: np.ndarray) -> Any:
+    """The tree of the shape and types of `like` whose numbers stand in `row`."""
+    numbers = iter(row.tolist())
+
+    def walk(part: Any) -> Any:
+        if isinstance(part, tuple):
+            items = [walk(item) for item in part]
+            return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
+        return type(part)(next(numbers))
+
+    return walk(like)
+
+
+def columns(like: Any, rows: np.ndarray) -> Any:
+    """The tree of columns of `rows` (n, width): a number becomes (n,), a flat tuple of numbers (n, k)."""
+    first = 0
+
+    def walk(part: Any) -> Any:
+        nonlocal first
+        if not isinstance(part, tuple):
+            first += 1
+            return rows[:, first - 1]
+        if not any(isinstance(item, tuple) for item in part) and (not hasattr(part, "_fields") or _alike(part)):
+            first += len(part)
+            return rows[:, first - len(part) : first]
+        items = [walk(item) for item in part]
+        return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
+
+    return walk(like)
+
+
+def _alike(part: tuple) -> bool:
+    """Whether a NamedTuple stands for one quantity, such as a quaternion."""
+    return type(part).__name__ == "Quaternion"
+
+
+def _kind(tree: types.Type) -> str:
+    if isinstance(tree, types.Boolean):
+        return "{} != 0.0"
+    if isinstance(tree, types.Integer):
+        return "int({})"
+    if isinstance(tree, types.Float):
+        return "{}"
+    raise TypingError(f"a row holds numbers, tuples and NamedTuples only, not {tree}")
+
+
+def load(like, rows, i):
+    """The tree of the type of `like` in row i."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(load, jit_options={"forceinline": True})
+def _load(like, rows, i):
+    names: dict[str, Any] = {}
+    column = 0
+
+    def expression(tree: types.Type) -> str:
+        nonlocal column
+        if not isinstance(tree, types.BaseTuple):
+            column += 1
+            return _kind(tree).format(f"rows[i, {column - 1}]")
+        parts = [expression(part) for part in tree.types]
+        if isinstance(tree, types.BaseNamedTuple):
+            name = f"Node{len(names)}"
+            names[name] = tree.instance_class
+            return f"{name}({', '.join(parts)})"
+        return f"({', '.join(parts)}{',' if len(parts) == 1 else ''})"
+
+    exec(f"def load(like, rows, i):\n    return {expression(like)}\n", names)
+    return names["load"]
+
+
+def store(tree, rows, i):
+    """Put a tree into row i."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(store, jit_options={"forceinline": True})
+def _store(tree, rows, i):
+    lines: list[str] = []
+
+    def walk(part: types.Type, path: str) -> None:
+        if isinstance(part, types.BaseTuple):
+            for k, item in enumerate(part.types):
+                walk(item, f"{path}[{k}]")
+        else:
+            _kind(part)
+            lines.append(f"    rows[i, {len(lines)}] = {path}")
+
+    walk(tree, "tree")
+    names: dict[str, Any] = {}
+    exec("def store(tree, rows, i):\n" + "\n".join(lines or ["    pass"]) + "\n", names)
+    return names["store"]

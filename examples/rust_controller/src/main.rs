@@ -1,0 +1,119 @@
+//! An autopilot of one's own: the service `autopilot` of a scene whose `autopilot.estimator` is "truth".
+//!
+//!     lapwing protocol rust_mission.toml --json layout.json
+//!     rust_controller layout.json tcp/127.0.0.1:7450 [SPACE] &
+//!     lapwing run rust_mission.toml --external autopilot=tcp/127.0.0.1:7450
+
+mod bus;
+mod control;
+mod layout;
+
+use bus::Bus;
+use control::{Controller, Setpoint, Stage, State, Vehicle};
+use layout::{Layout, Port, Row};
+
+const NAME: &str = "autopilot";
+
+fn named<'a>(ports: &'a [Port], name: &str) -> &'a Port {
+    ports
+        .iter()
+        .find(|p| p.name == name)
+        .unwrap_or_else(|| panic!("the scene has no port {name}"))
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [path, listen, rest @ ..] = arguments.as_slice() else {
+        eprintln!("usage: rust_controller LAYOUT.json ENDPOINT [SPACE]");
+        std::process::exit(2);
+    };
+    let layout = Layout::read(path);
+    let bus = Bus::open(listen, rest.first().map_or("lapwing", String::as_str), NAME);
+    fly(&layout, &bus);
+    bus.close();
+}
+
+fn fly(layout: &Layout, bus: &Bus) {
+    let (plant, trajectory, own) = (
+        layout.ports("plant"),
+        layout.ports("trajectory"),
+        layout.ports(NAME),
+    );
+    let (truth, reference) = (named(&plant, "truth"), named(&trajectory, "trajectory"));
+    let (from_plant, from_trajectory) = (bus.source("plant"), bus.source("trajectory"));
+    let (mut bundles, mut waiting) = (bus.outlet("_step"), bus.outlet("_waiting"));
+    let mut others: Vec<String> = layout
+        .services
+        .iter()
+        .filter(|s| *s != NAME)
+        .cloned()
+        .collect();
+    others.extend(["recorder".to_string(), format!("{NAME}_messages")]);
+    let mut controller =
+        Controller::new(Vehicle::of(&layout.setup), 1e-9 * layout.interval_ns as f64);
+    let _token = bus.join(layout.setup_text.clone(), &others);
+    for tick in 0.. {
+        let time_ns = tick * layout.interval_ns;
+        let taken = from_plant.take(time_ns, bus, &mut waiting);
+        let Some((seen, asked)) = taken.zip(from_trajectory.take(time_ns, bus, &mut waiting))
+        else {
+            bundles.put(Vec::new(), time_ns); // an empty bundle: there will be no other
+            return;
+        };
+        let (seen, asked) = (
+            truth.find(&plant, &seen, tick),
+            reference.find(&trajectory, &asked, tick),
+        );
+        let state = State {
+            position: truth.three(&seen, "position_world"),
+            attitude: ["w", "x", "y", "z"].map(|c| truth.get(&seen, &format!("attitude.{c}"))),
+            velocity: truth.three(&seen, "velocity_world"),
+            omega: truth.three(&seen, "omega_body"),
+        };
+        let setpoint = Setpoint {
+            position: reference.three(&asked, "position_world"),
+            velocity: reference.three(&asked, "velocity_world"),
+            acceleration: reference.three(&asked, "acceleration_world"),
+            yaw: reference.get(&asked, "yaw"),
+            yaw_rate: reference.get(&asked, "yaw_rate"),
+        };
+        let command = controller.step(&state, &setpoint);
+        let flying = controller.stage == Stage::Flying;
+        let finished = controller.stage == Stage::Landed && reference.get(&asked, "final") != 0.0;
+        let mut bundle = Vec::new();
+        for port in own.iter().filter(|p| tick % p.period == 0) {
+            let mut row: Row = port.blank();
+            match port.name.as_str() {
+                "actuators" => {
+                    port.set_all(&mut row, "motor_voltage", &command.volts);
+                    port.set_all(&mut row, "thrust", &command.thrust);
+                    port.set_all(&mut row, "attitude_reference", &command.angles);
+                    port.set(&mut row, "armed", f64::from(flying));
+                }
+                "estimate" => {
+                    for column in [
+                        "position_world",
+                        "velocity_world",
+                        "omega_body",
+                        "acceleration_world",
+                    ] {
+                        port.set_all(&mut row, column, &truth.three(&seen, column));
+                    }
+                    for (column, value) in ["w", "x", "y", "z"].iter().zip(state.attitude) {
+                        port.set(&mut row, &format!("attitude.{column}"), value);
+                    }
+                }
+                "setpoint" => row.copy_from_slice(&asked),
+                "status" => {
+                    port.set(&mut row, "phase", reference.get(&asked, "phase"));
+                    port.set(&mut row, "armed", f64::from(flying));
+                    port.set(&mut row, "landed", f64::from(!flying));
+                    port.set(&mut row, "finished", f64::from(finished));
+                }
+                other => panic!("the scene wants a port {other}"),
+            }
+            bundle.extend(row.iter().flat_map(|x| x.to_le_bytes()));
+        }
+        bundles.put(bundle, time_ns);
+    }
+}

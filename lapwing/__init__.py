@@ -1,0 +1,69 @@
+"""Lapwing: co-simulation of multirotors.
+
+```python
+import lapwing
+
+scene = lapwing.load("delivery_mission", {"effects.wind_random.mean": (3.0, 1.0, 0.0)})
+flight = lapwing.fly(scene, seed=7)
+flight.rmse, flight.truth.position, flight.report("flight.html")
+```
+
+What is named here is the public interface; everything is imported when it is first asked for.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cosim.scene import Scene, SceneError
+    from cosim.schedule import LockStepError
+    from lapwing.api import campaign, fly, load, read
+    from lapwing.distributions import choice, normal, uniform
+    from lapwing.flight import Flight
+    from lapwing.simulator import Observation, Simulator
+    from services.common.ports import Reference
+
+_WHERE = {
+    "Flight": "lapwing.flight",
+    "LockStepError": "cosim.schedule",
+    "Observation": "lapwing.simulator",
+    "Reference": "services.common.ports",
+    "Scene": "cosim.scene",
+    "SceneError": "cosim.scene",
+    "Simulator": "lapwing.simulator",
+    "campaign": "lapwing.api",
+    "choice": "lapwing.distributions",
+    "fly": "lapwing.api",
+    "load": "lapwing.api",
+    "normal": "lapwing.distributions",
+    "read": "lapwing.api",
+    "uniform": "lapwing.distributions",
+}
+
+__all__ = [
+    "Flight",
+    "LockStepError",
+    "Observation",
+    "Reference",
+    "Scene",
+    "SceneError",
+    "Simulator",
+    "campaign",
+    "choice",
+    "fly",
+    "load",
+    "normal",
+    "read",
+    "uniform",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """The public names, imported when they are first asked for: `lapwing --help` needs none of them."""
+    if name not in _WHERE:
+        raise AttributeError(f"module 'lapwing' has no attribute {name!r}")
+    return getattr(importlib.import_module(_WHERE[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

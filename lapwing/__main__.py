@@ -1,0 +1,6 @@
+"""`python -m lapwing` is the command `lapwing`."""
+
+from lapwing.cli.main import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,32 @@
+"""A scene with everything decided: integrator and step where it asks for an accuracy."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from cosim.scene import Scene
+
+
+def decided(path: Path, overrides: list[str]) -> "Scene":
+    """The scene, with integrator and step chosen where it asks for an accuracy instead."""
+    from services.plant.config import Solver
+    from services.table import load
+
+    scene = load(path, overrides)
+    if not scene[Solver].undecided:
+        return scene
+    from studies.accuracy import choice
+
+    chosen = choice.overrides(scene, typer.echo)
+    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: chosen {', '.join(chosen)}")
+    return load(path, [*overrides, *chosen])
+
+
+def warn_of_gains(scene: "Scene") -> None:
+    """Say which of the autopilot's loops are unstable, a line each; the scene may be flown all the same."""
+    from services.autopilot.unstable import unstable_loops
+
+    for line in unstable_loops(scene):
+        typer.echo(f"lapwing: warning: {line}", err=True)

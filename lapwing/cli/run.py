@@ -1,0 +1,149 @@
+"""`lapwing run`: fly a scene, record it, and report."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lapwing.cli.app import app
+from lapwing.cli.choice import decided, warn_of_gains
+from lapwing.cli.errors import user_errors
+from lapwing.cli.files import check_distinct, check_writable, left_as_it_was, log_path
+from lapwing.cli.links import check_links
+from lapwing.cli.options import (
+    Insecure,
+    MavlinkKey,
+    MavlinkUrls,
+    Overrides,
+    Peers,
+    PlanFile,
+    SceneFile,
+    Space,
+    Speed,
+    parse_speed,
+)
+
+if TYPE_CHECKING:
+    from cosim.scene import Scene
+    from lapwing.runs.observer import Elapsed
+    from services.participant import Participation
+
+
+@app.command()
+def run(
+    scene: SceneFile,
+    set_: Overrides = None,
+    speed: Speed = None,
+    mode: Annotated[
+        str, typer.Option(metavar="processes|single", help="one process a service, or one for all")
+    ] = "processes",
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures of the run as JSON")] = None,
+    log: Annotated[Path | None, typer.Option(metavar="FILE", help="the MCAP log [recordings/SCENE_TIME.mcap]")] = None,
+    space: Space = "lapwing",
+    peers: Peers = None,
+    open_: Annotated[
+        str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
+    ] = None,
+    mavlink: MavlinkUrls = None,
+    mavlink_key: MavlinkKey = None,
+    insecure: Insecure = False,
+    plan: PlanFile = None,
+    external: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=ENDPOINT", help="a service that is a program of your own, listening there"),
+    ] = None,
+) -> None:
+    """Fly a scene, record it, and report."""
+    from cosim.launcher import WATCHER
+    from lapwing.runs.joined import check_endpoint, parse_external, parse_peers
+    from services.common.plan import OPERATED
+    from services.common.plan import read as read_plan
+    from services.common.sections import Run
+    from services.participant import Participation
+    from services.processes import needed
+    from services.table import resolve
+
+    with user_errors():
+        if mode not in ("processes", "single"):
+            raise ValueError(f"--mode {mode}: expected processes or single")
+        if mode == "single" and (peers is not None or open_ is not None):
+            raise ValueError("--mode single: has no network; leave out --peers and --open")
+        if mavlink and (mode == "single" or peers is not None):
+            raise ValueError("--mavlink: belongs to a run in processes; with --peers start the service mavlink instead")
+        if external and (mode == "single" or peers is not None):
+            raise ValueError("--external: belongs to a run in processes; with --peers leave that service out")
+        if open_ is not None:
+            check_endpoint("--open", open_)
+        check_links(mavlink, mavlink_key, insecure)
+        set_ = [*(set_ or []), *(OPERATED if plan else ["autopilot.operator=true"] if mavlink else [])]
+        commands = tuple(read_plan(plan)) if plan else ()
+        loaded = decided(scene, set_)
+        warn_of_gains(loaded)
+        setup = resolve(loaded, commands)
+        speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if mavlink else None)
+        table = None if peers is None else parse_peers(peers, [*needed(setup), WATCHER])
+        check_distinct({"SCENE": scene, "--log": log, "--json": json})
+        path = log_path(loaded, log, exists=table is not None)
+        check_writable(json)
+        given = Participation(
+            name=WATCHER,
+            setup=setup,
+            peers=table or {},
+            space=space,
+            speed=parse_speed(speed),
+            log=str(path.absolute()),
+            sources={name: content.decode() for name, content in loaded.sources.items()},
+            mode=mode,
+            open=(open_,) if open_ else (),
+            mavlink=tuple(mavlink or ()),
+            mavlink_key=str(mavlink_key.absolute()) if mavlink_key else "",
+            insecure=insecure,
+            external=parse_external(external or [], setup),
+        )
+        _conclude(loaded, given, path, _fly(given, path), json)
+
+
+def _fly(given: "Participation", log: Path) -> "Elapsed":
+    from rich.console import Console
+
+    from lapwing.cli.progress import Display
+    from services.processes import MAVLINK
+
+    setup = given.setup
+    with left_as_it_was(log), Display(Console(), setup.duration) as display:
+        if given.mode == "single":
+            from lapwing.runs.single import fly_single
+
+            return fly_single(setup, log, given.sources, given.speed, display)
+        if given.peers:
+            from lapwing.runs.joined import fly_joined
+
+            return fly_joined(setup, given.peers, given.space, display)
+        from lapwing.runs.processes import fly_processes
+
+        return fly_processes(given, display, [MAVLINK] if given.mavlink else [])
+
+
+def _conclude(scene: "Scene", given: "Participation", log: Path, elapsed: "Elapsed", json: Path | None) -> None:
+    from rich.console import Console
+
+    from lapwing.cli import summary
+    from lapwing.flight import Flight
+
+    flown = Flight.read(log)
+    result = {
+        "scene": scene.name,
+        "seed": given.setup.seed,
+        "mode": given.mode,
+        "digest": flown.digest,
+        "sim_time_s": elapsed.simulated,
+        "wall_time_s": elapsed.wall,
+        "real_time_factor": elapsed.simulated / elapsed.wall if elapsed.wall else 0.0,
+        "rmse": flown.rmse,
+        "landed": flown.landed,
+        "log": str(log),
+        "report": str(flown.report()),
+    }
+    if json:
+        summary.write_json(json, result)
+    summary.show(Console(), scene, result)

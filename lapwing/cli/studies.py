@@ -1,0 +1,166 @@
+"""The studies: performance, effects, accuracy, campaign, tune."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lapwing.cli.app import app
+from lapwing.cli.errors import user_errors
+from lapwing.cli.files import check_distinct, check_plot, check_writable
+from lapwing.cli.options import (
+    Overrides,
+    SceneFile,
+)
+from studies.tune.bandwidths import Bandwidths
+
+
+@app.command()
+def performance(
+    subject: Annotated[Path, typer.Argument(metavar="SCENE|VEHICLE", help="a scene, or an airframe's TOML file")],
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures as JSON")] = None,
+) -> None:
+    """Hover time, payload, range, ceiling, tilt and speed from the models, beside published figures."""
+    from studies.performance import card, show, write_json
+
+    with user_errors():
+        check_writable(json)
+        figures = card(subject)
+        show(figures)
+        if json:
+            write_json(json, figures)
+
+
+@app.command()
+def effects(
+    scene: SceneFile,
+    set_: Overrides = None,
+    within: Annotated[float, typer.Option(metavar="M", help="how far the trajectory may change")] = 0.01,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the study as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
+) -> None:
+    """What each effect of a scene costs and changes, and which of them it could do without."""
+    from rich.console import Console
+
+    from services.table import load
+    from studies.effects import show
+    from studies.effects.study import study
+
+    with user_errors():
+        if not within > 0.0:
+            raise ValueError(f"--within {within:g}: expected a distance above 0 m")
+        check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+        check_writable(json)
+        check_plot(plot)
+        console = Console()
+        found = study(load(scene, set_ or []), within, lambda text: console.print(text, highlight=False))
+        show.show(console, found)
+        if json:
+            show.write_json(json, found)
+        if plot:
+            show.plot(plot, found)
+
+
+@app.command()
+def accuracy(
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (TOML)")],
+    set_: Overrides = None,
+    goal: Annotated[
+        float | None, typer.Option("--target", metavar="ERROR", help="name the cheapest choice that meets it: 1e-6")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all points as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw error over time (PNG, SVG or PDF)")] = None,
+) -> None:
+    """Error against wall time of every integrator, on a system whose answer is known, or on a scene's plant."""
+    with user_errors():
+        from studies.accuracy import command
+
+        check_writable(json)
+        check_plot(plot)
+        command.run(target, set_ or [], goal, json, plot)
+
+
+@app.command()
+def campaign(
+    scene: SceneFile,
+    set_: Overrides = None,
+    seeds: Annotated[int, typer.Option(metavar="N", help="fly seeds 1 to N")] = 100,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write every flight's figures as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the distribution (PNG, SVG or PDF)")] = None,
+) -> None:
+    """Fly a scene with many seeds, in one compiled closed loop: errors as a distribution, and crashes."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from services.table import load
+    from studies.campaign import show, study
+
+    with user_errors():
+        if seeds < 1:
+            raise ValueError(f"--seeds {seeds}: expected at least 1")
+        check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+        check_writable(json)
+        check_plot(plot)
+        console = Console()
+        loaded = load(scene, set_ or [])
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
+            found = study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
+        show.show(console, found)
+        if json:
+            show.write_json(json, found)
+        if plot:
+            show.plot(plot, found)
+
+
+@app.command()
+def tune(
+    scene: SceneFile,
+    set_: Overrides = None,
+    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = Bandwidths().lift,
+    yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = Bandwidths().yaw,
+    attitude: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the inner roll and pitch loops")
+    ] = Bandwidths().attitude,
+    position: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")
+    ] = Bandwidths().position,
+    log: Annotated[
+        Path | None, typer.Option("--from", metavar="LOG", help="identify the plant from this flight (MCAP)")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML), for a scene to name")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write Bode plots, steps and tables (HTML)")
+    ] = None,
+) -> None:
+    """Design gains about hover for bandwidth, 45 degrees and 6 dB in every loop, then polish them in flight."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from services.table import load
+    from studies.tune import polish, show, study
+    from studies.tune import report as page
+
+    with user_errors():
+        check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
+        for option, path, ending in (("--out", out, ".toml"), ("--report", report, ".html")):
+            if path and path.suffix != ending:
+                raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
+            check_writable(path)
+        wanted, console = Bandwidths(lift, yaw, attitude, position), Console()
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
+
+            def say(text: str) -> None:
+                progress.console.print(text, highlight=False, soft_wrap=True)
+
+            found = study.tune(load(scene, set_ or []), wanted, say, log, lambda: progress.advance(task))
+        show.show(console, found)
+        if out:
+            study.write(out, found.gains)
+            typer.echo(f'{out}: a scene beside it names it with [autopilot] gains = "{out.name}"')
+        if report:
+            page.write(report, found)
+            typer.echo(f"{report}: Bode plots, margins and steps")

@@ -1,0 +1,101 @@
+"""The keys of a table: what the class that declares it says of each, its comment included.
+
+The unit and the meaning of a key stand in the comment behind its field (`# [m] of one foot`), and nowhere else.
+"""
+
+import ast
+import inspect
+import io
+import re
+import sys
+import tokenize
+from functools import cache
+from types import ModuleType
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
+
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+REQUIRED = object()
+_UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
+
+
+class Key(NamedTuple):
+    """A key of a table."""
+
+    name: str
+    hint: Any  # annotation with its bounds
+    default: Any  # REQUIRED where there is none
+    unit: str  # "m/s"; of several values "s, m"; empty for texts and ratios
+    meaning: str
+
+
+def keys(cls: type) -> list[Key]:
+    """The keys of a table, which is a pydantic model or a NamedTuple, in their order."""
+    said = {name: split(comment) for name, comment in comments(cls).items()}
+    return [Key(name, hint, default, *said.get(name, ("", _purpose(hint)))) for name, hint, default in _fields(cls)]
+
+
+def _purpose(hint: Any) -> str:
+    """What a table is for, as its class says."""
+    members = [member for member in get_args(hint) or (hint,) if isinstance(member, type) and member is not type(None)]
+    return first_sentence(members[0]) if members and issubclass(members[0], BaseModel) else ""
+
+
+def first_sentence(thing: Any) -> str:
+    """The first sentence of a docstring on one line, without its full stop."""
+    text = " ".join((inspect.getdoc(thing) or "").split())
+    return re.split(r"(?<!eq)(?<!e\.g)\.(?:\s|$)", text)[0]
+
+
+def _fields(cls: type) -> list[tuple[str, Any, Any]]:
+    if issubclass(cls, BaseModel):
+        return [
+            (
+                name,
+                Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation,
+                default(field),
+            )
+            for name, field in cls.model_fields.items()
+        ]
+    hints = get_type_hints(cls, include_extras=True)
+    defaults = cls._field_defaults  # type: ignore[attr-defined]
+    return [(name, hints[name], defaults.get(name, REQUIRED)) for name in cls._fields]  # type: ignore[attr-defined]
+
+
+def default(field: Any) -> Any:
+    """The default of a field of a pydantic model, REQUIRED where it has none."""
+    if field.default_factory is not None:
+        return field.default_factory()
+    return REQUIRED if field.default is PydanticUndefined else field.default
+
+
+def comments(cls: type) -> dict[str, str]:
+    """The comment behind each field of a class, those of its bases included, without the #."""
+    found: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        if base.__module__ not in ("builtins", BaseModel.__module__):
+            found |= _in_module(sys.modules[base.__module__]).get(base.__name__, {})
+    return found
+
+
+@cache
+def _in_module(module: ModuleType) -> dict[str, dict[str, str]]:
+    """The comments of every class of a module by its name, by field."""
+    source = inspect.getsource(module)
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    lines = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
+    found: dict[str, dict[str, str]] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.ClassDef):
+            fields = [f for f in node.body if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)]
+            found[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore
+    return found
+
+
+def split(comment: str) -> tuple[str, str]:
+    """The unit and the meaning that a comment states; the unit comes first in it."""
+    first = _UNITS.match(comment)
+    if not first:
+        return "", comment
+    return ", ".join(re.findall(r"\[([^\]]+)\]", first[0])), comment[first.end() :].strip(" ,:;")

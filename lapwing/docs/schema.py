@@ -1,0 +1,110 @@
+"""JSON schemas of the TOML files that people write: scenes, airframes, gain sets."""
+
+from collections.abc import Callable
+from typing import Any
+
+from cosim.scene import Section
+from dynamics import integrators
+from dynamics.vehicles.airframe import Airframe
+from lapwing.docs.annotations import Schema, closed, required, table_schema
+from lapwing.docs.catalogue import effect_tables, flight_parameters, sensor_tables
+from services.autopilot.gains import GainSet
+from services.common.parameters import Parameter
+from services.plant import models
+from services.sensors.schedule import SLOTS, FaultTable
+from services.table import vocabulary
+from services.trajectory.mission import CHANNELS
+from services.trajectory.segments import KINDS
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+TEXT: Schema = {"type": "string"}
+
+
+def scene_schema() -> Schema:
+    """Of a scene as it is written, before the files that it names become part of it."""
+    known = vocabulary().sections
+    sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
+    tables = {name: _section(section) for name, section in sections.items()}
+    tables["effects"] |= closed({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
+    tables["sensors"] |= closed({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
+    tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
+    tables["vehicle"]["properties"]["model"]["enum"] = models.names()
+    tables["autopilot"]["properties"]["parameters"] = _parameters()
+    for name, section in sections.items():
+        if section.FROM_FILE:  # what a scene says of it is laid over the file's content
+            tables[name] = _optional(tables[name])
+    phase = tables["trajectory"]["properties"]["phase"]["items"]["properties"]
+    segment = {"$ref": "#/definitions/segment"}
+    for channel in CHANNELS:
+        unit = "rad" if channel == "yaw" else "m"
+        phase[channel] = {
+            "description": f"[{unit}] a segment, or a list of them",
+            "anyOf": [segment, {"type": "array", "items": segment}],
+        }
+    needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
+    found = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
+    return {**found, "definitions": {"segment": {"anyOf": [_segment(kind) for kind in KINDS]}}}
+
+
+def airframe_schema() -> Schema:
+    """Of an airframe's file."""
+    return {**_head("Lapwing airframe"), **table_schema(Airframe)}
+
+
+def gains_schema() -> Schema:
+    """Of a gain set's file."""
+    return {**_head("Lapwing gain set"), **table_schema(GainSet)}
+
+
+SCHEMAS: dict[str, Callable[[], Schema]] = {
+    "scene": scene_schema,
+    "airframe": airframe_schema,
+    "gains": gains_schema,
+}
+
+
+def _head(title: str) -> Schema:
+    return {"$schema": DRAFT, "title": title}
+
+
+def _section(section: type[Section]) -> Schema:
+    return {"description": " ".join((section.__doc__ or "").split()), **table_schema(section)}
+
+
+def _sensor(module: Any, cls: type) -> Schema:
+    """A preset, keys that differ from it, and faults."""
+    fault = table_schema(FaultTable)
+    fault["properties"]["channel"] = {"enum": ["all", *module.CHANNELS], "default": "all"}
+    faults = {"type": "array", "items": fault, "maxItems": SLOTS, "description": "by schedule"}
+    table = table_schema(cls, leave_out=["faults"])
+    preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
+    return closed({"preset": preset, **table["properties"], "faults": faults})
+
+
+def _parameters() -> Schema:
+    """Values of the autopilot's parameters, or the name of a file of them."""
+    fixed, by_gains = flight_parameters()
+    properties = {p.name: _parameter(p) for p in fixed} | {p.name: {"type": "number"} for p in by_gains}
+    return {"description": "values by name, or the name of a file of them", "anyOf": [closed(properties), TEXT]}
+
+
+def _parameter(p: Parameter) -> Schema:
+    kind = "integer" if p.whole else "number"
+    unit = f"[{p.unit}] " if p.unit else ""
+    return {"type": kind, "minimum": p.least, "maximum": p.most, "default": p.default, "description": unit + p.meaning}
+
+
+def _segment(kind: str) -> Schema:
+    """A segment of one kind; the points of a table may be in a file."""
+    table = table_schema(KINDS[kind])
+    table["description"] = " ".join((KINDS[kind].__doc__ or "").split())
+    table["properties"]["kind"] = {"enum": [kind]}
+    needed = [name for name in table.get("required", []) if name != "points"]
+    return {**table, "required": ["kind", *needed]}
+
+
+def _optional(schema: Any) -> Any:
+    """A schema none of whose keys is required."""
+    if isinstance(schema, dict):
+        return {key: _optional(value) for key, value in schema.items() if key != "required"}
+    return schema

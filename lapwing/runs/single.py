@@ -1,0 +1,62 @@
+"""A run with all services in this process."""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from cosim.graph import Graph
+from cosim.interrupt import Stop
+from cosim.log import LogWriter
+from cosim.provenance import attachments, metadata
+from cosim.recording import Recording
+from cosim.setup import Setup
+from cosim.single import PAGE, run_single
+from lapwing.runs.compiling import told
+from lapwing.runs.observer import Elapsed, Observer, Silent
+from messages.topics import POSE, STATUS
+from services.processes import create_all
+
+
+def fly_single(
+    setup: Setup,
+    log: Path,
+    sources: Mapping[str, str] | None = None,
+    speed: float | None = None,
+    observer: Observer | None = None,
+    operator: Callable[[int], Iterable[Any]] | None = None,
+    last: int | None = None,
+) -> Elapsed:
+    """Fly with all services in this process.
+
+    Args:
+        setup: what to fly.
+        log: where to record it.
+        sources: the files that were resolved, for the log.
+        speed: simulated seconds per second, None for as fast as it goes.
+        observer: is told how far the run is.
+        operator: gives the commands that have come until a tick.
+        last: the tick after which to stop, None for the end of the run.
+
+    Raises:
+        LockStepError: a state is not sound.
+        ValueError: the log cannot be written.
+        Interrupted: ended by a signal.
+    """
+    watcher = observer or Silent()
+    with told(watcher.say):
+        graph = Graph(setup, create_all(setup, operator), PAGE)
+    with Stop() as stop, LogWriter(log, metadata(setup, "single"), attachments(setup, sources or {})) as writer:
+        recording = Recording(writer, setup)
+
+        def observe(graph: Graph) -> bool:
+            newest = recording.newest
+            watcher.show((graph.tick - 1) * setup.interval_ns, newest.get(POSE), newest.get(STATUS))
+            return stop.number is not None
+
+        watcher.begin()
+        started = time.perf_counter()
+        run_single(graph, recording, speed, observe, last)
+        wall = time.perf_counter() - started
+        stop.check()
+    return Elapsed((graph.tick - 1) * setup.interval, wall)

@@ -1,0 +1,1 @@
+"""The scenes that ship, found by name; airframes in `vehicles/`, flight plans in `plans/`."""

@@ -1,0 +1,29 @@
+"""What calls the commander, as the compiled parts before it look at it."""
+
+from typing import Any, NamedTuple
+
+from dynamics.kernel import leaf
+from services.autopilot.commander.attention import needs_attention
+
+LOOK_EVERY = 5  # ticks between two looks of the commander at the estimate
+
+
+class Attention(NamedTuple):
+    """What does not change, and the battery's thresholds, which may."""
+
+    autonomous: bool  # nothing but a failsafe can end the flight along the scene's trajectory
+    thresholds: Any  # cell of `BatteryThresholds`
+
+
+@leaf
+def attention_due(p, tick, health, battery, flight):
+    """Whether the commander has a say at `tick`; battery and flight as they were received."""
+    charge = battery.value.charge if battery.due else 1.0
+    failed = flight.value.failed_motor if flight.due else 0
+    return needs_attention(p.autonomous, p.thresholds.value, health, charge, failed, tick % LOOK_EVERY == 0)
+
+
+@leaf
+def battery_warning(thresholds, charge):
+    """0: none, 1: low, 2: critical, 3: nearly empty; an unknown charge (NaN) is none."""
+    return int(charge < thresholds.low) + int(charge < thresholds.critical) + int(charge < thresholds.emergency)

@@ -1,0 +1,52 @@
+"""Flight without a position: an altitude, a heading, and tilts; what leans against the wind stays."""
+
+import math
+
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.smoothing import PositionSmoothing
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
+
+
+class AltitudeFlight:
+    """Moves altitude and heading; horizontally, the controller is told that it is where it wants to be."""
+
+    def __init__(self, guidance: Guidance):
+        s = guidance.smoothing
+        self._smoothing = PositionSmoothing((0.0, 0.0, s.position[2]), s.yaw, (0.0, 0.0, s.velocity[2]))
+
+    @property
+    def altitude(self) -> float:
+        """World z of the setpoint [m]."""
+        return self._smoothing.position[2]
+
+    def step(
+        self,
+        constants: Constants,
+        view: View,
+        guidance: Guidance,
+        climb_rate: float,
+        yaw_rate: float,
+        tilts: tuple[float, float],
+    ) -> Setpoint:
+        """One tick.
+
+        Args:
+            constants: of the vehicle.
+            view: of the tick, with the estimate of the same tick.
+            guidance: goes along, for the mode that follows.
+            climb_rate: vertical speed [m/s].
+            yaw_rate: [rad/s].
+            tilts: forward and to the left [rad].
+        """
+        s, limits, e = self._smoothing, guidance.limits, view.estimate
+        s.move_at((0.0, 0.0, climb_rate), limits, view.dt)
+        s.turn_at(yaw_rate, limits, view.dt)
+        forward, left = (constants.gravity * tilt for tilt in tilts)
+        sin, cos = math.sin(s.yaw), math.cos(s.yaw)
+        position = (*e.position_world[:2], s.position[2])
+        velocity = (*e.velocity_world[:2], s.velocity[2])
+        acceleration = (cos * forward - sin * left, sin * forward + cos * left, s.acceleration[2])
+        setpoint = Setpoint(position, velocity, acceleration, s.yaw, s.yaw_rate)
+        guidance.follow(setpoint)
+        return setpoint

@@ -1,0 +1,195 @@
+"""The operator's commands: what each kind does. A refusal is a ValueError (one line), acknowledged and spoken."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from messages import Answer
+from services.autopilot.commander import checks, transitions
+from services.autopilot.commander.fence import Fence, rally_points
+from services.autopilot.commander.flight_mode import value
+from services.autopilot.commander.mode_table import MODES
+from services.autopilot.commander.route import Route
+from services.autopilot.commander.state import PendingArm
+from services.autopilot.commander.transitions import Context
+
+Handler = Callable[[Context, Any], None]
+HANDLERS: dict[str, Handler] = {}
+"""What is done for each kind of command."""
+STREAMS = ("manual", "link", "offboard_position", "offboard_attitude")  # not acknowledged
+
+
+class Denied(ValueError):
+    """Refused for good: the command makes no sense, now or later."""
+
+
+def handles(*kinds: str) -> Callable[[Handler], Handler]:
+    """Declare what commands of these kinds do."""
+
+    def declare(function: Handler) -> Handler:
+        HANDLERS.update(dict.fromkeys(kinds, function))
+        return function
+
+    return declare
+
+
+def handle(context: Context, command: Any) -> None:
+    """Do what a command asks, and acknowledge it."""
+    outbox = context.outbox
+    handler = HANDLERS.get(command.kind)
+    if handler is None:
+        outbox.acknowledge(command, Answer.UNSUPPORTED, f"unknown command {command.kind} {command.text}".strip())
+        return
+    try:
+        handler(context, command)
+    except ValueError as error:
+        result = Answer.DENIED if isinstance(error, Denied) else Answer.TEMPORARILY_REJECTED
+        if command.kind not in STREAMS:
+            outbox.acknowledge(command, result, str(error), _present_value(context, command))
+            outbox.say(str(error))
+        return
+    pending = context.state.pending_arm
+    waits = pending is not None and pending.command is command
+    if command.kind not in STREAMS and not waits:
+        outbox.acknowledge(command, Answer.ACCEPTED, "", _present_value(context, command))
+
+
+def _present_value(context: Context, command: Any) -> float:
+    return context.state.guidance.parameters.get(command.text, math.nan) if command.kind == "parameter" else 0.0
+
+
+@handles("arm")
+def arm(context: Context, command: Any) -> None:
+    """Values: 1 to arm whatever the checks say; how long [s] to wait for them."""
+    if context.state.guidance.armed:
+        return
+    if reasons := checks.reasons(context.view, context.state):
+        time_left = value(command.values, 1)
+        if time_left > 0.0:
+            context.state.pending_arm = PendingArm(command, time_left)
+            context.outbox.acknowledge(command, Answer.IN_PROGRESS, reasons[0])
+            return
+        if value(command.values, 0) != 1.0:
+            raise ValueError(f"arming refused: {'; '.join(reasons)}")
+    transitions.arm(context)
+
+
+@handles("disarm")
+def disarm(context: Context, command: Any) -> None:
+    """Values: 1 to disarm also in the air."""
+    state = context.state
+    if not state.guidance.armed:
+        return
+    if state.guidance.flying and value(command.values, 0) != 1.0:
+        raise ValueError("disarming refused: the vehicle flies")
+    if state.on_trajectory:
+        transitions.enter(context.constants, state, "hold")
+    transitions.disarm(context, "as commanded")
+
+
+@handles(*MODES)
+def change_mode(context: Context, command: Any) -> None:
+    """Enter the flight mode of this name."""
+    state = context.state
+    if context.view.position_lost and state.guidance.flying and MODES[command.kind].needs_position:
+        raise ValueError(f"{command.kind}: the position is lost")
+    transitions.enter(context.constants, state, command.kind, *command.values)
+    state.failsafe = ""
+
+
+@handles("manual")
+def manual(context: Context, command: Any) -> None:
+    """Sticks, which the modes position_control and altitude_control listen to."""
+    sticks = [max(-1.0, min(1.0, value(command.values, k))) for k in range(4)]
+    inputs = context.state.guidance.inputs
+    inputs.sticks, inputs.sticks_age = tuple(0.0 if math.isnan(v) else v for v in sticks), 0.0
+
+
+@handles("offboard_position", "offboard_attitude")
+def offboard(context: Context, command: Any) -> None:
+    """A setpoint; the mode offboard is accepted only while they come."""
+    if any(math.isinf(v) for v in command.values):
+        raise Denied("offboard: expected finite setpoints")
+    inputs = context.state.guidance.inputs
+    inputs.offboard_kind, inputs.offboard, inputs.offboard_age = command.kind, command.values, 0.0
+
+
+@handles("link")
+def link(context: Context, command: Any) -> None:
+    """A ground station is there."""
+    inputs = context.state.guidance.inputs
+    inputs.linked, inputs.link_age = True, 0.0
+
+
+@handles("mission_upload")
+def mission_upload(context: Context, command: Any) -> None:
+    """A new mission, in place of the one there is."""
+    state = context.state
+    state.guidance.route = _denied_if_wrong(Route, command.items)
+    if state.mode_name == "mission" and not state.on_trajectory:
+        flies_on = state.guidance.route.items and state.guidance.flying
+        transitions.enter(context.constants, state, "mission" if flies_on else "hold")
+
+
+@handles("mission_clear")
+def mission_clear(context: Context, command: Any) -> None:
+    """No mission any more."""
+    state = context.state
+    state.guidance.route = Route()
+    if state.mode_name == "mission" and not state.on_trajectory:
+        transitions.enter(context.constants, state, "hold")
+
+
+@handles("mission_current")
+def mission_current(context: Context, command: Any) -> None:
+    """Go on with another item."""
+    number = value(command.values, 0)
+    _denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
+
+
+@handles("fence_upload")
+def fence_upload(context: Context, command: Any) -> None:
+    """A new fence; without items, none."""
+    context.state.guidance.fence = _denied_if_wrong(Fence, command.items)
+
+
+@handles("rally_upload")
+def rally_upload(context: Context, command: Any) -> None:
+    """New places to return to; without items, home."""
+    context.state.guidance.rally_points = _denied_if_wrong(rally_points, command.items)
+
+
+@handles("speed")
+def speed(context: Context, command: Any) -> None:
+    """Fly at another speed [m/s] until disarmed."""
+    asked = value(command.values, 0)
+    if not 0.0 < asked < math.inf:
+        raise Denied(f"speed: expected one above 0 m/s, got {asked:g}")
+    context.state.guidance.speed = asked
+
+
+@handles("parameter")
+def parameter(context: Context, command: Any) -> None:
+    """Change a parameter; the flying autopilot follows at once."""
+    known = context.constants.parameters.get(command.text)
+    if known is None:
+        raise Denied(f"unknown parameter {command.text}")
+    asked = value(command.values, 0)
+    _denied_if_wrong(known.check, asked)
+    parameters = context.state.guidance.parameters
+    parameters[known.name] = asked
+    context.outbox.parameters = dict(parameters)
+
+
+@handles("finish")
+def finish(context: Context, command: Any) -> None:
+    """The run is over once the vehicle has flown and is disarmed."""
+    context.state.finish_requested = True
+
+
+def _denied_if_wrong(function: Callable, argument: Any) -> Any:
+    """The function's value; what it refuses is refused for good."""
+    try:
+        return function(argument)
+    except ValueError as error:
+        raise Denied(str(error)) from None

@@ -1,0 +1,141 @@
+"""The state machine between the operator and the controller: armed or not, flying or not, and in which mode.
+
+Deterministic: it knows the views of its ticks and nothing else. Every time-out counts simulation time.
+"""
+
+import math
+
+from dynamics.vector import ZERO
+from messages import Answer
+from services.autopilot.commander import checks, failsafes
+from services.autopilot.commander.attention import battery_thresholds, needs_attention
+from services.autopilot.commander.command_handlers import handle
+from services.autopilot.commander.request import Outbox, Request, Status
+from services.autopilot.commander.state import State, initial
+from services.autopilot.commander.status import status
+from services.autopilot.commander.transitions import Context, arm, disarm, enter
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.estimate import EXACT
+from services.autopilot.interface import Setpoint
+
+BLOCKED_TIME = 1.0  # [s] of sinking in vain after which the vehicle is on the ground
+LOW_THRUST = 0.5  # of the hovering thrust, below which the vehicle does not carry itself
+STILL = 0.15  # [m/s]
+
+
+class Commander:
+    """What the vehicle is asked to do, from tick to tick."""
+
+    def __init__(self, constants: Constants, state: State | None = None):
+        """Begin on the ground, disarmed, or go on from a state."""
+        self.constants = constants
+        self.state = state if state is not None else initial(constants)
+
+    def initial_status(self) -> Status:
+        """What the vehicle is doing before the first tick."""
+        view = View(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
+        return status(self.constants, view, self.state)
+
+    def step(self, view: View) -> Request:
+        """What is asked for at this tick; after a quiet request it needs to be called only where attention is needed.
+
+        Between two calls after a quiet request all would be as in that request, and later requests do not depend on
+        whether it was called: `guidance` is made anew from the view before anything reads it.
+        """
+        constants, state = self.constants, self.state
+        context = Context(constants, view, state, Outbox())
+        if constants.has_operator:
+            checks.count_outages(view, state)
+        for command in view.commands:
+            handle(context, command)
+        state.guidance.inputs.age(view.dt)
+        _retry_arming(context)
+        setpoint, from_estimate = _setpoint(context)
+        return Request(
+            setpoint=setpoint,
+            parameters=context.outbox.parameters,
+            acknowledgements=tuple(context.outbox.acknowledgements),
+            texts=tuple(context.outbox.texts),
+            reset_controller=not state.on_trajectory and not state.guidance.flying,
+            estimate_every_tick=from_estimate,
+            status=status(constants, view, state),
+            quiet=_is_quiet(context),
+        )
+
+
+def _is_quiet(context: Context) -> bool:
+    """Whether the scene's trajectory is followed, and no failsafe condition holds or is being counted."""
+    constants, view, state, _ = context
+    if not constants.autonomous or not state.on_trajectory or state.failsafe_timers:
+        return False
+    thresholds = battery_thresholds(state.guidance.parameters)
+    return not needs_attention(True, thresholds, view.estimate.health, view.battery_charge, view.failed_motor, True)
+
+
+def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
+    """What is to be followed, None for the scene's trajectory; whether it was made from the estimate."""
+    constants, view, state, _ = context
+    guidance = state.guidance
+    if state.on_trajectory:
+        guidance.flying = guidance.armed = view.thrust > 0.0 and not view.motors_cut
+        if guidance.flying:
+            assert view.setpoint is not None
+            guidance.follow(view.setpoint)
+            failsafes.update(context)
+        if state.on_trajectory:
+            return None, False
+        guidance.has_flown = True
+    elif guidance.flying:
+        failsafes.update(context)
+    if guidance.flying:
+        _detect_landing(context)
+    _disarm_when_idle(context)
+    mode = state.mode
+    assert mode is not None
+    from_estimate = mode.step(constants, view, guidance)
+    if mode.next_mode:
+        enter(constants, state, mode.next_mode)
+    if from_estimate is not None:
+        return from_estimate, True
+    if guidance.flying:
+        return guidance.smoothing.setpoint, False
+    x, y, _ = guidance.smoothing.position
+    return Setpoint((x, y, constants.resting_height), ZERO, ZERO, guidance.smoothing.yaw, 0.0), False
+
+
+def _detect_landing(context: Context) -> None:
+    """Notice the ground: the controller did, or the vehicle does not sink although nothing carries it."""
+    view, state, guidance = context.view, context.state, context.state.guidance
+    still = abs(view.estimate.velocity_world[2]) < STILL
+    blocked = guidance.smoothing.velocity[2] < -0.2 and still and view.thrust < LOW_THRUST
+    state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
+    if view.motors_cut or state.blocked_time > BLOCKED_TIME:
+        guidance.flying, state.on_ground_time, state.blocked_time = False, 0.0, 0.0
+        context.outbox.say("landed")
+
+
+def _disarm_when_idle(context: Context) -> None:
+    """Disarm what has been armed on the ground for long."""
+    view, state, guidance = context.view, context.state, context.state.guidance
+    state.on_ground_time = state.on_ground_time + view.dt if guidance.armed and not guidance.flying else 0.0
+    time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
+    if 0.0 < time_limit < state.on_ground_time:
+        disarm(context, "landed" if guidance.has_flown else "nobody took off")
+
+
+def _retry_arming(context: Context) -> None:
+    """Arm once the checks allow it, as long as the command is to wait for them."""
+    view, state, outbox = context.view, context.state, context.outbox
+    if state.pending_arm is None:
+        return
+    command, time_left = state.pending_arm
+    reasons = checks.reasons(view, state)
+    if not reasons:
+        state.pending_arm = None
+        arm(context)
+        outbox.acknowledge(command, Answer.ACCEPTED)
+    elif time_left < view.dt:
+        state.pending_arm = None
+        outbox.acknowledge(command, Answer.TEMPORARILY_REJECTED, reasons[0])
+    else:
+        state.pending_arm = state.pending_arm._replace(time_left=time_left - view.dt)

@@ -1,0 +1,92 @@
+"""Guidance: what the flight modes see and change of what the commander remembers."""
+
+import math
+from dataclasses import dataclass, field
+
+from dynamics.lie.quaternion import to_roll_pitch_yaw
+from dynamics.vector import Vec3
+from services.autopilot.commander.fence import Fence
+from services.autopilot.commander.route import Route
+from services.autopilot.commander.smoothing import Limits, PositionSmoothing
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
+
+STICK_TIMEOUT = 1.0  # [s] older sticks are in the middle
+STICK_DEADZONE = 0.05  # sticks nearer to the middle ask for nothing
+
+
+@dataclass
+class OperatorInputs:
+    """The streams of an operator, and how old they are [s]."""
+
+    sticks: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # forward, left, up, yaw rate, each from -1 to 1
+    sticks_age: float = math.inf
+    offboard_kind: str = ""  # offboard_position or offboard_attitude
+    offboard: tuple[float, ...] = ()
+    offboard_age: float = math.inf
+    link_age: float = math.inf
+    linked: bool = False  # a ground station has been heard
+
+    def age(self, dt: float) -> None:
+        """Let dt [s] pass; what has never come stays infinitely old."""
+        self.offboard_age += dt
+        self.link_age += dt
+        self.sticks_age += dt
+
+    @property
+    def sticks_fresh(self) -> bool:
+        """Whether somebody holds a joystick."""
+        return self.sticks_age < STICK_TIMEOUT
+
+    def stick(self, index: int) -> float:
+        """Where a stick is, -1 to 1; in the middle where it is nearly there, or nobody holds it."""
+        deflection = self.sticks[index]
+        return deflection if self.sticks_fresh and abs(deflection) >= STICK_DEADZONE else 0.0
+
+
+@dataclass
+class Guidance:
+    """Where the setpoint is and what it is to do."""
+
+    parameters: dict[str, float]  # values by name
+    smoothing: PositionSmoothing
+    armed: bool = False
+    flying: bool = False
+    has_flown: bool = False  # since it was armed
+    speed: float = math.nan  # asked for in this flight; NaN: the parameter's [m/s]
+    home: tuple[float, float] = (0.0, 0.0)  # world x, y where it was armed [m]
+    route: Route = field(default_factory=Route)
+    fence: Fence = field(default_factory=Fence)
+    rally_points: tuple[Vec3, ...] = ()
+    inputs: OperatorInputs = field(default_factory=OperatorInputs)
+
+    @property
+    def limits(self) -> Limits:
+        """How the setpoint may move now."""
+        p = self.parameters
+        wanted = p["MPC_XY_CRUISE"] if math.isnan(self.speed) else self.speed
+        return Limits(
+            min(wanted, p["MPC_XY_VEL_MAX"]),
+            p["MPC_Z_VEL_MAX_UP"],
+            p["MPC_Z_VEL_MAX_DN"],
+            p["MPC_ACC_HOR"],
+            p["MPC_JERK_AUTO"],
+            p["MPC_YAW_RATE"],
+        )
+
+    @property
+    def offboard_fresh(self) -> bool:
+        """Whether setpoints from outside are coming."""
+        return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
+
+    def lift_off(self, constants: Constants, view: View) -> None:
+        """Let the setpoint leave the ground, from where the vehicle is by the estimate, if it is armed."""
+        if not self.flying and self.armed:
+            x, y, _ = view.estimate.position_world
+            yaw = to_roll_pitch_yaw(view.estimate.attitude)[2]
+            self.smoothing = PositionSmoothing((x, y, constants.resting_height), yaw)
+            self.flying = self.has_flown = True
+
+    def follow(self, setpoint: Setpoint) -> None:
+        """Go on from a setpoint that was not smoothed."""
+        self.smoothing = PositionSmoothing(setpoint.position_world, setpoint.yaw, setpoint.velocity_world)

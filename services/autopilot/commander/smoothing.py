@@ -1,0 +1,105 @@
+"""Position smoothing: a setpoint of limited jerk, acceleration and speed, moved to a position or at a velocity.
+
+It knows nothing of the real vehicle, so the setpoint is as smooth as its limits, and the same whatever the sensors say.
+"""
+
+import math
+from typing import NamedTuple
+
+from dynamics.vector import ZERO, Vec3, add, norm, scale, subtract
+from services.autopilot.interface import Setpoint
+
+_POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre
+_VELOCITY_GAIN = 3.0  # [1/s] acceleration over error of the velocity
+
+
+class Limits(NamedTuple):
+    """How the setpoint may move."""
+
+    horizontal: float  # [m/s]
+    up: float  # [m/s]
+    down: float  # [m/s]
+    acceleration: float  # [m/s^2]
+    jerk: float  # [m/s^3]
+    yaw_rate: float  # [rad/s]
+
+
+def clamp_norm(v: Vec3, maximum: float) -> Vec3:
+    """The vector, or one of the length `maximum` in its direction."""
+    length = norm(v)
+    return scale(maximum / length, v) if length > maximum else v
+
+
+def limit_velocity(velocity_world: Vec3, limits: Limits) -> Vec3:
+    """A velocity [m/s] in the same direction within the limits of speed."""
+    x, y, z = velocity_world
+    vertical = limits.up if z > 0.0 else limits.down
+    excess = max(1.0, math.hypot(x, y) / limits.horizontal, abs(z) / vertical)
+    return scale(1.0 / excess, velocity_world)
+
+
+def braking_speed(distance: float, acceleration: float) -> float:
+    """Speed [m/s] at a distance [m] from which the setpoint can stop there at half of its acceleration [m/s^2]."""
+    brake = 0.5 * acceleration
+    bend = brake / (_POSITION_GAIN * _POSITION_GAIN)
+    return _POSITION_GAIN * distance if distance < bend else math.sqrt(2.0 * brake * (distance - 0.5 * bend))
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in [-pi, pi] [rad]."""
+    return math.remainder(angle, 2.0 * math.pi)
+
+
+class PositionSmoothing:
+    """The setpoint that the controller follows."""
+
+    def __init__(self, position_world: Vec3, yaw: float, velocity_world: Vec3 = ZERO):
+        """At a position [m] and yaw [rad], with a velocity [m/s]."""
+        self.position, self.velocity, self.acceleration = position_world, velocity_world, ZERO
+        self.yaw, self.yaw_rate = yaw, 0.0
+
+    @property
+    def setpoint(self) -> Setpoint:
+        """As the controller takes it."""
+        return Setpoint(self.position, self.velocity, self.acceleration, self.yaw, self.yaw_rate)
+
+    def move_to(self, target_world: Vec3, limits: Limits, dt: float) -> None:
+        """Move it straight to a position [m] and stop there, for a tick of dt [s]."""
+        self.move_at(self.velocity_to(target_world, limits), limits, dt)
+
+    def velocity_to(self, target_world: Vec3, limits: Limits) -> Vec3:
+        """The velocity [m/s] of the way to a position [m]."""
+        way = subtract(target_world, self.position)
+        distance = norm(way)
+        if distance == 0.0:
+            return ZERO
+        return limit_velocity(scale(braking_speed(distance, limits.acceleration) / distance, way), limits)
+
+    def move_at(self, velocity_world: Vec3, limits: Limits, dt: float) -> None:
+        """Move it at a velocity [m/s] for a tick of dt [s]."""
+        error = subtract(limit_velocity(velocity_world, limits), self.velocity)
+        wanted = clamp_norm(scale(_VELOCITY_GAIN * self._gain_fraction(error, limits), error), limits.acceleration)
+        change = clamp_norm(subtract(wanted, self.acceleration), limits.jerk * dt)
+        acceleration = add(self.acceleration, change)
+        step = scale(0.5 * dt, add(self.acceleration, acceleration))
+        self.position = add(self.position, scale(dt, add(self.velocity, scale(0.5, step))))
+        self.velocity, self.acceleration = add(self.velocity, step), acceleration
+
+    @staticmethod
+    def _gain_fraction(error: Vec3, limits: Limits) -> float:
+        # The acceleration must fade to zero, within its jerk, when the velocity is reached: a^2 / 2j is still to come.
+        size = norm(error)
+        return min(1.0, math.sqrt(limits.jerk * size) / (_VELOCITY_GAIN * size)) if size > 0.0 else 1.0
+
+    def turn_to(self, yaw: float, limits: Limits, dt: float) -> None:
+        """Turn towards a yaw [rad] by the shorter way for a tick of dt [s]; NaN: stay."""
+        left = 0.0 if math.isnan(yaw) else wrap_angle(yaw - self.yaw)
+        rate = math.copysign(min(limits.yaw_rate, braking_speed(abs(left), limits.yaw_rate)), left)
+        self.turn_at(rate, limits, dt)
+
+    def turn_at(self, yaw_rate: float, limits: Limits, dt: float) -> None:
+        """Turn at a rate [rad/s] for a tick of dt [s]."""
+        rate = max(-limits.yaw_rate, min(limits.yaw_rate, yaw_rate))
+        maximum_change = 2.0 * limits.yaw_rate * dt
+        self.yaw_rate += max(-maximum_change, min(maximum_change, rate - self.yaw_rate))
+        self.yaw += dt * self.yaw_rate

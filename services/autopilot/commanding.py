@@ -1,0 +1,166 @@
+"""The commander as a part of the graph that stays in Python: acts when it is called, at every tick while it steers."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from cosim.graph import NEVER, Graph, Service
+from cosim.schedule import KEPT, Port
+from dynamics.cell import Cell, write
+from messages import Answers, header
+from messages import topics as topic
+from services.autopilot.attention import LOOK_EVERY
+from services.autopilot.commander.attention import battery_thresholds
+from services.autopilot.commander.commander import Commander
+from services.autopilot.commander.request import Request, Status
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
+from services.autopilot.interface import Setpoint
+from services.autopilot.law import build
+from services.autopilot.setup import AutopilotSetup
+from services.autopilot.stage import LANDED, STANDING
+from services.common import ports
+from services.common.operator import joined
+from services.common.parameters import with_gains
+from services.common.ports import Reference
+
+Operator = Callable[[int], Iterable[Any]]
+
+
+class Texts:
+    """Texts by number; a new one gets the next number."""
+
+    def __init__(self, known: Iterable[Any] = ()):
+        """With `known` texts from 0 on."""
+        self.table = list(known)
+        self._number = {text: i for i, text in enumerate(self.table)}
+
+    def number(self, text: Any) -> int:
+        """The number of a text."""
+        if text not in self._number:
+            self._number[text] = len(self.table)
+            self.table.append(text)
+        return self._number[text]
+
+
+class Commanding:
+    """Shows the commander what it is to see, and puts what it asks for into the port that the controller follows."""
+
+    name = "autopilot.commander"
+
+    def __init__(self, given: AutopilotSetup, law: Cell, thresholds: Cell, service: Service, operator: Operator):
+        """Parameters that change go into the cells; `operator` gives the commands that have come until a tick."""
+        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), KEPT),)
+        self.outputs = (Port(ORDER, Order(), KEPT), *unwritten)
+        a = given.airframe
+        self._given, self._law, self._thresholds, self._service, self._operator = (
+            given,
+            law,
+            thresholds,
+            service,
+            operator,
+        )
+        self._weight = a.mass * a.gravity
+        table = {p.name: p for p in given.parameters}
+        thrust_max = controller(given, {p.name: p.default for p in given.parameters}).thrust_max
+        self._commander = Commander(
+            Constants(
+                table,
+                a.resting_height,
+                a.gravity,
+                self._weight / (4.0 * thrust_max),
+                bool(given.phases),
+                given.operator,
+            )
+        )
+        self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
+        self._estimate: Any = None
+        self._estimate_every_tick = False
+        self._acknowledgements: list[Any] = []
+        self._texts: list[str] = []
+
+    def bind(self, graph: Graph) -> None:
+        """Before the first tick the trajectory is followed."""
+        self._graph = graph
+        self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
+
+    def act(self, tick: int) -> int:
+        """Ask the commander at `tick`."""
+        graph = self._graph
+        elapsed = 0.0
+        looked = tick - tick % LOOK_EVERY
+        if tick == looked or self._estimate_every_tick:
+            elapsed = self._interval * (1 if self._estimate_every_tick else LOOK_EVERY)
+            looked = tick
+        if elapsed or self._estimate is None:
+            self._estimate = graph.latest(ports.ESTIMATE, looked)
+        flight = graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
+        followed = _setpoint(graph.latest(ports.TRAJECTORY, tick)) if self._given.phases else None
+        request = self._commander.step(
+            View(
+                self._interval,
+                self._estimate,
+                elapsed,
+                graph.latest(ports.BATTERY, tick).charge if graph.has(ports.BATTERY) else math.nan,
+                flight.failed_motor,
+                followed,
+                self._thrust(tick),
+                flight.stage == LANDED,
+                self._commands(tick),
+            )
+        )
+        self._estimate_every_tick = request.estimate_every_tick
+        if request.parameters is not None:
+            write(self._law, controller(self._given, dict(request.parameters)))
+            write(self._thresholds, battery_thresholds(request.parameters))
+        graph.put(ORDER, tick, self._order(tick, request, flight))
+        self._answer(tick, request)
+        return NEVER if request.quiet else tick + 1
+
+    def _thrust(self, tick: int) -> float:
+        """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""
+        if not self._weight > 0.0:
+            return 1.0
+        return sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) / self._weight if tick > 0 else 0.0
+
+    def _commands(self, tick: int) -> tuple[Any, ...]:
+        given = self._given
+        if not given.operator or tick % given.answers_every:
+            return ()
+        message = joined(tick * self._interval_ns, self._operator(tick))
+        self._service.messages.append((topic.OPERATOR, tick, message.encode()))
+        return tuple(message.commands)
+
+    def _order(self, tick: int, request: Request, flight: Flight) -> Order:
+        status, wanted = request.status, request.setpoint
+        restart = tick if request.reset_controller and flight.stage != STANDING else -1
+        words = self.words.number(_words(status))
+        if wanted is None:
+            return Order(True, Reference(), words, False, False, restart)
+        reference = Reference(*wanted, self.phases.number(status.phase), False)
+        return Order(False, reference, words, status.armed, status.finished, restart)
+
+    def _answer(self, tick: int, request: Request) -> None:
+        self._acknowledgements += request.acknowledgements
+        self._texts += request.texts
+        if self._given.operator and tick % self._given.answers_every == 0:
+            message = Answers(
+                header(tick * self._interval_ns, "world"), tuple(self._acknowledgements), tuple(self._texts)
+            )
+            self._service.messages.append((topic.ANSWERS, tick, message.encode()))
+            self._acknowledgements.clear()
+            self._texts.clear()
+
+
+def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
+    """The controller's parameters under the commander's `values`."""
+    return build(with_gains(given.gains, values), given.airframe, given.geometric)
+
+
+def _words(status: Status) -> Status:
+    """What is left of a status without all that is numbers in the port."""
+    return status._replace(phase="", armed=False, finished=False, battery_warning=0)
+
+
+def _setpoint(r: Reference) -> Setpoint:
+    return Setpoint(r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate)

@@ -1,0 +1,73 @@
+"""A controller of the user's in Python, as a part of the graph: asked at its rate while the motors run."""
+
+import math
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+from cosim.schedule import KEPT, LockStepError, Port
+from cosim.user_module import blame
+from dynamics.kernel import uncompiled
+from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
+from services.autopilot.custom.demand import DEMAND, Demand, demand
+from services.autopilot.custom.periodic import PeriodicPart
+from services.autopilot.setup import CustomCode
+from services.autopilot.stage import FLYING, ON_GROUND, Stage, advance_stage
+from services.common import ports
+
+_advance_stage, _estimate_of = uncompiled(advance_stage), uncompiled(estimate_of)
+_setpoint_of = uncompiled(setpoint_of)
+
+
+class AskedController(PeriodicPart):
+    """Shows the controller estimate and setpoint, and puts what it asks for into the port `demand`."""
+
+    name = "autopilot.controller"
+    outputs = (Port(DEMAND, Demand(), KEPT),)
+
+    def __init__(
+        self,
+        code: CustomCode,
+        module: ModuleType,
+        construct: Callable[[], Any],
+        reference: str,
+        resting_height: float,
+    ):
+        """A controller that is constructed anew at every take-off.
+
+        Args:
+            code: what it is called, and its rate.
+            module: in which its class is.
+            construct: gives a new one.
+            reference: port of the trajectory, or `NO_TRAJECTORY`.
+            resting_height: world z of the standing vehicle [m].
+        """
+        self._code, self._module, self._construct = code, module, construct
+        self._reference, self._resting_height = reference, resting_height
+        self._controller: Any = None
+
+    def _ask(self, tick: int) -> None:
+        graph = self._graph
+        estimate, order = graph.latest(ports.ESTIMATE, tick), graph.latest(ORDER, tick)
+        follows = order.follow and self._reference != NO_TRAJECTORY
+        setpoint = graph.latest(self._reference, tick) if follows else order.reference
+        stage = Stage(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else ON_GROUND
+        if stage.name != FLYING or order.restart_at == tick:
+            self._controller = None
+            before = ON_GROUND if order.restart_at == tick else stage
+            asked = _estimate_of(estimate), _setpoint_of(setpoint)
+            stage = _advance_stage(before, self._resting_height, *asked, graph.setup.interval)
+        if stage.name != FLYING:
+            return
+        time = tick * graph.setup.interval
+        try:
+            self._controller = self._controller or self._construct()
+            found = demand(self._controller.step(time, estimate, setpoint))
+        except Exception as error:
+            raise LockStepError(f"{self._said(error)} at t = {time:.3f} s") from error
+        if not all(map(math.isfinite, (*found.numbers, *found.roll_pitch))):
+            raise LockStepError(f"controller {self._code.name}: a command that is not finite at t = {time:.3f} s")
+        graph.put(DEMAND, tick, found)
+
+    def _said(self, error: Exception) -> str:
+        return f"controller {self._code.name}: {blame(error, self._module)}"

@@ -1,0 +1,89 @@
+"""The autopilot's step with a controller of the user's: the stages of the flight, then that controller, then control
+allocation, motor model, motor watch and status as of the cascaded PID."""
+
+import sys
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+from dynamics.vector import Vec3
+from services.autopilot import motor_watch
+from services.autopilot.core import Controller, estimate_of, outcome, setpoint_of
+from services.autopilot.custom.demand import Demand, command, demand
+from services.autopilot.stage import FLYING, ON_GROUND, Stage, advance_stage
+
+OFF = Demand()
+
+
+class FromPort(NamedTuple):
+    """Stands for the parameters of a controller in Python, whose demand comes by a port."""
+
+    rate: float
+
+
+class CustomController(NamedTuple):
+    """A controller of the user's on its vehicle."""
+
+    common: Controller
+    own: Any  # parameters of a compiled controller, or `FromPort`
+    own_start: Any  # its state at take-off
+    every: int  # ticks between two of its steps
+    arms: Vec3  # (roll, pitch, yaw) moment of a rotor over its thrust [m]
+    voltage_max: float  # [V]
+
+
+class CustomState(NamedTuple):
+    """Memory of the part."""
+
+    stage: Stage
+    own: Any
+    held: Demand  # of the user's last step
+    watch: motor_watch.State
+    still_from: int  # [tick]
+    charge: float  # of the battery, fraction; NaN: not known
+
+
+def start(p: CustomController) -> CustomState:
+    """Before the first tick."""
+    return CustomState(ON_GROUND, p.own_start, OFF, motor_watch.START, 0, float("nan"))
+
+
+def _ask(p, s, time, estimate, setpoint, by_port):
+    """`step` of the user's module; or what has come by the port."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_ask, jit_options={"forceinline": True})
+def _ask_of(p, s, time, estimate, setpoint, by_port):
+    if p.instance_class is FromPort:
+        return lambda p, s, time, estimate, setpoint, by_port: (s, by_port[0].value)
+    found = sys.modules[p.instance_class.__module__].step
+
+    def ask(p, s, time, estimate, setpoint, by_port):
+        s, output = found(p, s, time, estimate, setpoint)
+        return s, demand(output)
+
+    return ask
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The command at `tick`."""
+    c = p.common
+    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
+    wanted = inputs[3].value if order.follow else order.reference
+    stage, watched, still_from = s.stage, s.watch, s.still_from
+    if order.restart_at == tick:
+        stage, watched, still_from = ON_GROUND, motor_watch.START, tick + c.bounce
+    charge = battery.value.charge if battery.due else s.charge
+    stage = advance_stage(stage, c.law.value.resting_height, estimate_of(e), setpoint_of(wanted), c.interval)
+    own, held = s.own, s.held
+    if stage.name != FLYING:
+        own, held = p.own_start, OFF
+    elif tick % p.every == 0:
+        own, held = _ask(p.own, own, tick * c.interval, e, wanted, inputs[4:])
+    given = command(c.law.value, p.arms, p.voltage_max, held, wanted.yaw, stage.name)
+    watched, outputs = outcome(c, watched, still_from, charge, order, e, wanted, stage.name, given)
+    return CustomState(stage, own, held, watched, still_from, charge), outputs, GO_ON

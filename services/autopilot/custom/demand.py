@@ -1,0 +1,84 @@
+"""What a controller of the user's asks for, and its way to the motors."""
+
+from typing import NamedTuple
+
+from numba.extending import overload
+
+from dynamics.kernel import leaf
+from services.autopilot.interface import Command
+from services.autopilot.mixer import Quotas, clamp, mix, saturate
+from services.autopilot.motor import thrust_at, voltage
+from services.autopilot.stage import FLYING, LANDED
+from services.common.controllers import Four, MotorVoltages, ThrustAndMoments
+
+DEMAND = "demand"  # port within the autopilot
+
+
+class Demand(NamedTuple):
+    """Either voltages, or thrust and moments, as numbers."""
+
+    to_motors: bool = True
+    numbers: Four = (0.0, 0.0, 0.0, 0.0)  # [V] of each motor; or thrust [N] and moments about body x, y, z [N m]
+    roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] that the controller steers to
+
+
+def demand(output):
+    """The demand of a `MotorVoltages` or `ThrustAndMoments`; TypeError of anything else."""
+    if isinstance(output, MotorVoltages):
+        a, b, c, d = map(float, output.volts)
+        return Demand(True, (a, b, c, d), _two(output.roll_pitch))
+    if isinstance(output, ThrustAndMoments):
+        x, y, z = map(float, output.moments_body)
+        return Demand(False, (float(output.thrust), x, y, z), _two(output.roll_pitch))
+    raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
+
+
+def _two(roll_pitch):
+    roll, pitch = map(float, roll_pitch)
+    return roll, pitch
+
+
+@overload(demand, jit_options={"forceinline": True})
+def _demand(output):
+    told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
+    motors = output.instance_class is MotorVoltages
+
+    def made(output):
+        roll_pitch = output[-1] if told else (0.0, 0.0)
+        if motors:
+            return Demand(True, output[0], roll_pitch)
+        return Demand(False, (output[0], output[1][0], output[1][1], output[1][2]), roll_pitch)
+
+    return made
+
+
+@leaf
+def command(law, arms, voltage_max, asked, yaw, stage):
+    """The motors' command.
+
+    Args:
+        law: control.Parameters, of which the control allocation and the motor model are used.
+        arms: (roll, pitch, yaw) moment of a rotor over its thrust [m].
+        voltage_max: [V].
+        asked: Demand.
+        yaw: of the setpoint [rad].
+        stage: STANDING, FLYING or LANDED.
+    """
+    off = (0.0, 0.0, 0.0, 0.0)
+    if stage != FLYING:
+        return Command(off, off, 0.0, 0.0, yaw, stage == LANDED)
+    n, m, top = asked.numbers, law.motor, law.thrust_max
+    if asked.to_motors:
+        volts = (
+            clamp(n[0], 0.0, voltage_max),
+            clamp(n[1], 0.0, voltage_max),
+            clamp(n[2], 0.0, voltage_max),
+            clamp(n[3], 0.0, voltage_max),
+        )
+        thrust = (thrust_at(m, volts[0]), thrust_at(m, volts[1]), thrust_at(m, volts[2]), thrust_at(m, volts[3]))
+    else:
+        quotas = Quotas(0.25 * n[0], 0.25 * n[1] / arms[0], 0.25 * n[2] / arms[1], 0.25 * n[3] / arms[2])
+        t = mix(law.signs, saturate(law.signs, quotas, top))
+        thrust = (clamp(t[0], 0.0, top), clamp(t[1], 0.0, top), clamp(t[2], 0.0, top), clamp(t[3], 0.0, top))
+        volts = (voltage(m, thrust[0]), voltage(m, thrust[1]), voltage(m, thrust[2]), voltage(m, thrust[3]))
+    return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)

@@ -1,0 +1,27 @@
+"""The estimate of the tick, and whether the commander has to look at it."""
+
+from typing import NamedTuple
+
+from cosim.part import GO_ON, LOOK
+from dynamics.kernel import leaf
+from services.autopilot import estimator
+from services.autopilot.attention import Attention, attention_due
+from services.autopilot.estimator import Estimator
+from services.common.ports import StateEstimate
+
+
+class FilterEstimate(NamedTuple):
+    """The filter, and what calls the commander."""
+
+    filter: Estimator
+    attention: Attention
+    before: StateEstimate  # the filter has begun
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """What the filter says at `tick`."""
+    battery, flight = inputs
+    e = estimator.estimate(p.filter, s.filter) if s.begun else p.before
+    due = attention_due(p.attention, tick, e.health, battery, flight)
+    return s, (e,), LOOK if due else GO_ON

@@ -1,0 +1,29 @@
+"""The readings of the satellite receiver: position, then velocity."""
+
+from typing import NamedTuple
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+from services.autopilot import estimator
+from services.autopilot.estimator import Estimator
+from services.autopilot.navigation.state import NavigationState
+
+
+class GpsFusion(NamedTuple):
+    """The filter, and how late the receiver is."""
+
+    filter: Estimator
+    age: int  # of a reading when it arrives, in IMU readings
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """Correct by the reading of the tick."""
+    r, x = inputs[0].value, s.filter
+    if s.begun:
+        x = estimator.update_gps(
+            p.filter, x, r.latitude_deg, r.longitude_deg, r.height, r.position_variance, p.age, r.valid
+        )
+        variance = r.velocity_variance if r.valid else -1.0
+        x = estimator.update_gps_velocity(p.filter, x, r.velocity_world, variance, p.age, variance >= 0.0)
+    return NavigationState(s.begun, x), (), GO_ON

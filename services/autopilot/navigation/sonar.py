@@ -1,0 +1,25 @@
+"""The readings of the sonar."""
+
+import math
+from typing import NamedTuple
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+from services.autopilot import estimator
+from services.autopilot.estimator import Estimator
+from services.autopilot.navigation.state import NavigationState
+
+
+class SonarFusion(NamedTuple):
+    """The filter."""
+
+    filter: Estimator
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """Correct by the reading of the tick."""
+    r, x = inputs[0].value, s.filter
+    if s.begun:
+        x = estimator.update_sonar(p.filter, x, r.range if r.valid else math.nan, r.variance, r.valid)
+    return NavigationState(s.begun, x), (), GO_ON

@@ -1,0 +1,28 @@
+"""The truth as an estimate without error and without bias."""
+
+from typing import NamedTuple
+
+from cosim.part import GO_ON, LOOK
+from dynamics.kernel import leaf
+from dynamics.vector import ZERO
+from services.autopilot.attention import Attention, attention_due
+from services.common.ports import StateEstimate
+
+
+class TrueEstimate(NamedTuple):
+    """What calls the commander."""
+
+    attention: Attention
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The true state at `tick`; it has no state of its own."""
+    truth, battery, flight = inputs
+    x = truth.value
+    e = StateEstimate(
+        x.position_world, x.attitude, x.velocity_world, x.omega_body, x.acceleration_world,
+        ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
+    )  # fmt: skip
+    due = attention_due(p.attention, tick, 0, battery, flight)
+    return s, (e,), LOOK if due else GO_ON

@@ -1,0 +1,1 @@
+"""What several services agree on: tables of a scene, parameters, flight plans."""

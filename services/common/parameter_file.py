@@ -1,0 +1,59 @@
+"""Parameters in files: written as QGroundControl saves them, read also as MAVProxy does.
+
+QGroundControl's rows are vehicle, component, name, value, type, joined by tabs; MAVProxy's are name and value. Lines
+that begin with # are comments. Source: QGroundControl developer guide, "Parameters file format".
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from cosim.scene import SceneError, Source
+from services.common.parameters import Parameter
+
+SUFFIX = ".params"
+_INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
+_HEADER = ("# Onboard parameters for Vehicle 1", "#", "# Vehicle-Id Component-Id Name Value Type")
+
+
+def read(path: Path) -> dict[str, float]:
+    """The values of a file by name.
+
+    Raises:
+        ValueError: (one line) it cannot be read, or a line is no parameter.
+    """
+    try:
+        return parse(path.read_text(encoding="utf-8"), path)
+    except OSError as error:
+        raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: not a UTF-8 text file; expected parameters, a line each") from None
+
+
+def parse(text: str, path: Path) -> dict[str, float]:
+    """The values of the text of a file; SceneError with the line that is no parameter."""
+    found = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        row = line.split()
+        if not row or row[0].startswith("#"):
+            continue
+        if len(row) not in (2, 5):
+            message = f"got {line.strip()!r}"
+            raise SceneError("", message, "name and value (or 5 columns)", Source(path, number))
+        name, value = row if len(row) == 2 else row[2:4]
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise SceneError(name, f"got {value!r}", "a number", Source(path, number)) from None
+    return found
+
+
+def write(path: Path, table: Iterable[Parameter], values: Mapping[str, float]) -> None:
+    """Write `values` of the parameters in `table`. Raises ValueError (one line) if that cannot be."""
+    rows = []
+    for p in sorted(table, key=lambda p: p.name):
+        value, kind = (f"{values[p.name]:.0f}", _INT32) if p.whole else (repr(values[p.name]), _REAL32)
+        rows.append(f"1\t1\t{p.name}\t{value}\t{kind}")
+    try:
+        path.write_text("\n".join([*_HEADER, *rows, ""]), encoding="utf-8")
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None

@@ -1,0 +1,159 @@
+"""The values that services hand to one another: plain NamedTuples of numbers, SI, world ENU, body FLU.
+
+Each is a port of the graph; a message of the same topic is made from it (the services' `wire.py`). Tuples with an entry
+for each rotor or body are as long as the vehicle has them.
+"""
+
+from typing import NamedTuple
+
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from dynamics.vector import ZERO, Vec3
+
+TRUTH, BATTERY, BODIES = "truth", "battery", "bodies"
+IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
+TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
+LIFT = "lift"
+
+PerRotor = tuple[float, ...]
+
+
+class TrueState(NamedTuple):
+    """What the plant tells of a vehicle at every tick."""
+
+    position_world: Vec3 = ZERO  # [m]
+    attitude: Quaternion = NO_ROTATION  # body to world
+    velocity_world: Vec3 = ZERO  # [m/s]
+    omega_body: Vec3 = ZERO  # [rad/s]
+    acceleration_world: Vec3 = ZERO  # [m/s^2] dv/dt
+    rotor_speed: PerRotor = ()  # [rad/s]
+    motor_voltage: PerRotor = ()  # [V]
+    motor_current: PerRotor = ()  # [A]
+    motor_power: PerRotor = ()  # [W] electrical
+    rotor_thrust: PerRotor = ()  # [N]
+    rotor_torque: PerRotor = ()  # [N m] about the shaft
+    wind_world: Vec3 = ZERO  # [m/s] velocity of the air
+    air_density: float = 0.0  # [kg/m^3]
+    ground_contact: bool = False  # any foot touches the ground
+
+
+class BatteryGauge(NamedTuple):
+    """State of the battery."""
+
+    charge: float = 0.0  # fraction; NaN where no effect counts it
+    voltage: float = 0.0  # [V]
+    current: float = 0.0  # [A] drawn
+
+
+class BodyMotions(NamedTuple):
+    """True state of each body of a vehicle that has several; every tuple has an entry for each."""
+
+    position_world: tuple[Vec3, ...]  # [m]
+    attitude: tuple[Quaternion, ...]
+    velocity_world: tuple[Vec3, ...]  # [m/s]
+    omega_body: tuple[Vec3, ...]  # [rad/s]
+    force_world: tuple[Vec3, ...]  # [N] of contacts or joints
+    torque_body: tuple[Vec3, ...]  # [N m] of contacts or joints
+
+
+class ImuReading(NamedTuple):
+    """One reading of an inertial measurement unit."""
+
+    omega_body: Vec3 = ZERO  # [rad/s]
+    specific_force_body: Vec3 = ZERO  # [m/s^2], R^T (a - g): +g along z at rest
+    omega_variance: float = 0.0  # [(rad/s)^2] per axis, of the white noise
+    specific_force_variance: float = 0.0  # [(m/s^2)^2]
+    valid: bool = False
+
+
+class MagnetometerReading(NamedTuple):
+    """One reading of a magnetometer."""
+
+    field_body: Vec3 = ZERO  # [T]
+    variance: float = 0.0  # [T^2] per axis, of the white noise
+    valid: bool = False
+
+
+class GpsReading(NamedTuple):
+    """One reading of a satellite receiver: where the antenna was `age` seconds ago."""
+
+    latitude_deg: float = 0.0
+    longitude_deg: float = 0.0
+    height: float = 0.0  # [m] over the ellipsoid
+    position_variance: Vec3 = ZERO  # [m^2] east, north, up: white and wandering error together
+    velocity_world: Vec3 = ZERO  # [m/s]
+    velocity_variance: float = 0.0  # [(m/s)^2] per axis
+    age: float = 0.0  # [s]
+    valid: bool = False
+
+
+class BarometerReading(NamedTuple):
+    """One reading of a barometer."""
+
+    pressure: float = 0.0  # [Pa]
+    variance: float = 0.0  # [Pa^2], of the white noise
+    valid: bool = False
+
+
+class SonarReading(NamedTuple):
+    """One reading of a sonar, as sensor_msgs/Range has it."""
+
+    range: float = 0.0  # [m], rounded to float32; +inf: no echo, -inf: nearer than range_min
+    variance: float = 0.0  # [m^2], of the white noise, rounded to float32
+    valid: bool = False
+
+
+class Reference(NamedTuple):
+    """Where the vehicle ought to be."""
+
+    position_world: Vec3 = ZERO  # [m]
+    velocity_world: Vec3 = ZERO  # [m/s]
+    acceleration_world: Vec3 = ZERO  # [m/s^2]
+    yaw: float = 0.0  # [rad]
+    yaw_rate: float = 0.0  # [rad/s]
+    phase: int = 0  # number of the text that names the present part of the mission
+    final: bool = False  # no later part of the mission ends in the air: the next landing is the last
+
+
+class MotorCommand(NamedTuple):
+    """What the autopilot commands."""
+
+    motor_voltage: PerRotor  # [V]
+    armed: bool
+    thrust: PerRotor  # [N] asked of each rotor
+    attitude_reference: Vec3  # [rad] roll, pitch, yaw that the inner loops follow
+
+
+class AutopilotStatus(NamedTuple):
+    """What the autopilot is doing, as far as it is numbers."""
+
+    phase: int = 0  # number of a text
+    words: int = 0  # number of the commander's words
+    armed: bool = False
+    landed: bool = True
+    finished: bool = False
+    battery_warning: int = 0  # 0 none or not known, 1 low, 2 critical, 3 nearly empty
+    failed_motor: int = 0  # from 1; 0: none
+
+
+class StateEstimate(NamedTuple):
+    """What the estimator tells. Standard deviations are those of its own error."""
+
+    position_world: Vec3 = ZERO  # [m]
+    attitude: Quaternion = NO_ROTATION
+    velocity_world: Vec3 = ZERO  # [m/s]
+    omega_body: Vec3 = ZERO  # [rad/s], bias taken off
+    acceleration_world: Vec3 = ZERO  # [m/s^2], dv/dt
+    gyro_bias: Vec3 = ZERO  # [rad/s]
+    accelerometer_bias: Vec3 = ZERO  # [m/s^2]
+    position_std: Vec3 = ZERO  # [m] world
+    velocity_std: Vec3 = ZERO  # [m/s] world
+    attitude_std: Vec3 = ZERO  # [rad] rotation vector, body
+    health: int = 0  # 0: good
+    rejected: int = 0  # bit i: the last reading of source i was refused
+
+
+class RotorWrenches(NamedTuple):
+    """What the rotors of each quadrotor of a formation do."""
+
+    thrust: tuple[float, ...]  # [N] along body z
+    moment_body: tuple[Vec3, ...]  # [N m]

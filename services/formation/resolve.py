@@ -1,0 +1,32 @@
+"""From a scene's `[formation]` to the control law."""
+
+from cosim.scene import Scene
+from cosim.schedule import Input, Port
+from cosim.setup import ServiceSetup
+from dynamics.vector import ZERO, norm, scale
+from dynamics.vehicles.cooperative_control import FormationControl
+from dynamics.vehicles.cooperative_load import CooperativeLoadParameters
+from services.common import ports
+from services.common.ports import RotorWrenches
+from services.common.sections import CooperativeLoad, Exchange
+from services.formation.config import Formation
+from services.formation.core import FormationLaw
+
+
+def resolve(scene: Scene) -> ServiceSetup | None:
+    """The control of the scene's `[formation]`; None where there is none."""
+    if not scene.has(Formation):
+        return None
+    c, wanted = scene[CooperativeLoad], scene[Formation]
+    law = FormationControl(
+        wanted.load_position, wanted.load_velocity, wanted.link, wanted.link_rate, wanted.attitude,
+        wanted.attitude_rate, wanted.epsilon, wanted.path,
+        tuple(scale(1.0 / norm(d), d) for d in wanted.link_direction),
+    )  # fmt: skip
+    p = CooperativeLoadParameters(c.quad_mass, c.quad_inertia, c.link_length, c.load_mass, c.gravity, law)
+    n = len(c.link_length)
+    return ServiceSetup(
+        FormationLaw(p, scene[Exchange].interval),
+        (Input(ports.BODIES),),
+        (Port(ports.LIFT, RotorWrenches((0.0,) * n, (ZERO,) * n)),),
+    )

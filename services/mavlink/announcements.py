@@ -1,0 +1,59 @@
+"""What is sent to every endpoint at once, rather than when it is due: another mode, the next item, texts."""
+
+from collections.abc import Callable
+from typing import Any
+
+from services.mavlink.dialect import id_of, mavlink
+from services.mavlink.telemetry import streams
+from services.mavlink.view import VehicleView
+
+TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
+NO_ITEM = 0xFFFF  # Status.mission_reached before the first
+
+
+class Announcements:
+    """Compares each status with the one before."""
+
+    def __init__(self, vehicle: VehicleView, broadcast: Callable[[Any], None]):
+        """`broadcast` sends a message to every endpoint."""
+        self._vehicle, self._broadcast = vehicle, broadcast
+        self._mode: tuple = ()
+        self._home = vehicle.home_world
+        self._item = (0, 0)
+        self._reached = NO_ITEM
+        self._texts = 0
+
+    def step(self) -> None:
+        """There is a new status."""
+        s = self._vehicle.status
+        if (mode := (s.mode, s.armed, s.failsafe)) != self._mode:
+            self._mode = mode
+            self._send("HEARTBEAT")
+            self._send("EXTENDED_SYS_STATE")
+        if (home := self._vehicle.home_world) != self._home:
+            self._home = home
+            self._send("HOME_POSITION")
+        if (item := (s.mission_current, s.mission_state)) != self._item:
+            self._item = item
+            self._send("MISSION_CURRENT")
+        if s.mission_reached != self._reached:
+            self._reached = s.mission_reached
+            if s.mission_count and s.mission_reached != NO_ITEM:
+                self._broadcast(mavlink.MAVLink_mission_item_reached_message(s.mission_reached))
+
+    def say(self, text: str) -> None:
+        """A text for the operators, in pieces where it is long."""
+        failsafe = self._vehicle.status.failsafe
+        severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
+        data = text.encode()
+        number = 0
+        if len(data) > TEXT_LENGTH:
+            self._texts = number = self._texts % 0xFFFF + 1
+        for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):
+            chunk = data[start : start + TEXT_LENGTH]
+            self._broadcast(mavlink.MAVLink_statustext_message(severity, chunk, number, piece))
+
+    def _send(self, name: str) -> None:
+        number = id_of(name)
+        if number is not None and (message := streams()[number].build(self._vehicle)) is not None:
+            self._broadcast(message)

@@ -1,0 +1,81 @@
+"""Commands to the autopilot, and its acknowledgements back to those who gave them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from messages import Answer, OperatorCommand
+from services.mavlink.clock import Clock, Instant
+from services.mavlink.dialect import mavlink
+
+TIMEOUT = 2.0  # [s] the autopilot gets to acknowledge
+MAX_WAITING = 256  # commands that may wait for their acknowledgement
+
+OnAcknowledgement = Callable[[Any], None]  # called with each Answer: some say only that it is in progress
+
+
+class CommandQueue:
+    """Numbers the commands and leads the acknowledgements back."""
+
+    def __init__(self, clock: Clock, put: Callable[[OperatorCommand], None] | None):
+        """`put` hands a command to the autopilot; None: there is none, this is a recorded flight."""
+        self._clock, self._put = clock, put
+        self._last = 0
+        self._waiting: dict[int, tuple[OnAcknowledgement, Instant]] = {}
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is an autopilot that takes commands."""
+        return self._put is not None
+
+    def put(
+        self,
+        kind: str,
+        source: str,
+        on_acknowledgement: OnAcknowledgement | None = None,
+        values: Sequence[float] = (),
+        text: str = "",
+        items: Sequence[Any] = (),
+    ) -> None:
+        """Give a command.
+
+        Args:
+            kind: of OperatorCommand.
+            source: who gives it, "system/component".
+            on_acknowledgement: called with every acknowledgement; with one of our own where none comes.
+            values: of OperatorCommand.
+            text: of OperatorCommand.
+            items: of OperatorCommand.
+        """
+        if self._put is None or len(self._waiting) >= MAX_WAITING:
+            if on_acknowledgement:
+                on_acknowledgement(
+                    _rejection("a recorded flight takes no commands" if self._put is None else "too many at once")
+                )
+            return
+        self._last = self._last % 0xFFFFFFFF + 1
+        if on_acknowledgement:
+            self._waiting[self._last] = on_acknowledgement, self._clock.now
+        self._put(OperatorCommand(kind, source, self._last, tuple(float(v) for v in values), text, tuple(items)))
+
+    def acknowledge(self, acknowledgements: Sequence[Any]) -> None:
+        """The autopilot has acknowledged commands."""
+        for acknowledgement in acknowledgements:
+            waiting = self._waiting.get(acknowledgement.id)
+            if waiting is None:
+                continue
+            if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
+                self._waiting[acknowledgement.id] = waiting[0], self._clock.now
+            else:
+                del self._waiting[acknowledgement.id]
+            waiting[0](acknowledgement)
+
+    def step(self) -> None:
+        """Reject what the autopilot leaves without an acknowledgement."""
+        late = [n for n, (_, given) in self._waiting.items() if self._clock.since(given) > TIMEOUT]
+        for number in late:
+            on_acknowledgement, _ = self._waiting.pop(number)
+            on_acknowledgement(_rejection("the autopilot does not acknowledge"))
+
+
+def _rejection(text: str) -> Any:
+    return Answer(result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text=text)

@@ -1,0 +1,37 @@
+"""An endpoint of a link: a ground station, a companion computer, a script."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from services.mavlink.channel import Channel
+from services.mavlink.clock import Instant
+
+
+class Endpoint:
+    """Who is at the other end, and the way there."""
+
+    def __init__(self, channel: Channel, local: bool, put: Callable[[bytes], None]):
+        """An endpoint that has sent nothing yet.
+
+        Args:
+            channel: its frames.
+            local: it is on this machine.
+            put: sends bytes to it.
+        """
+        self.local = local
+        self.system = self.component = 0  # who it says it is
+        self.last_heartbeat: Instant | None = None
+        self._channel, self._put = channel, put
+
+    @property
+    def name(self) -> str:
+        """ "system/component", as commands bear it."""
+        return f"{self.system}/{self.component}"
+
+    def decode(self, data: bytes) -> Iterator[Any]:
+        """The sound messages in bytes that have come from it."""
+        return self._channel.decode(data)
+
+    def send(self, message: Any) -> None:
+        """Send one message."""
+        self._put(self._channel.encode(message))

@@ -1,0 +1,182 @@
+"""The missions, fences and rally points that the vehicle holds, and uploads on their way."""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from services.mavlink.clock import Clock
+from services.mavlink.command_queue import CommandQueue
+from services.mavlink.coordinates import Datum
+from services.mavlink.dialect import mavlink
+from services.mavlink.endpoint import Endpoint
+from services.mavlink.mission_export import to_mavlink
+from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink
+
+RETRY, RETRIES = 0.25, 8  # [s] before an item is asked for again, and how often that is done
+KINDS = {  # what the autopilot is asked to take
+    mavlink.MAV_MISSION_TYPE_MISSION: "mission_upload",
+    mavlink.MAV_MISSION_TYPE_FENCE: "fence_upload",
+    mavlink.MAV_MISSION_TYPE_RALLY: "rally_upload",
+}
+_KIND_OF = {command: kind for kind, command in KINDS.items()} | {"mission_clear": mavlink.MAV_MISSION_TYPE_MISSION}
+_RECENT = 64  # uploads and acceptances that wait for one another
+_RESULTS = {
+    mavlink.MAV_RESULT_ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED: mavlink.MAV_MISSION_DENIED,
+    mavlink.MAV_RESULT_DENIED: mavlink.MAV_MISSION_DENIED,
+    mavlink.MAV_RESULT_UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
+}
+
+
+class _Upload:
+    """Items that an endpoint is about to hand over, one after the other."""
+
+    def __init__(self, endpoint: Endpoint, kind: int, count: int, clock: Clock):
+        self.endpoint, self.kind, self.count = endpoint, kind, count
+        self.items: list[Any] = []
+        self.asked, self.tries = clock.now, 0
+        self.complete = False
+
+
+class MissionStore:
+    """What is held of each kind, and who is uploading."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        commands: CommandQueue,
+        datum: Callable[[], Datum],
+        home_first: bool,
+        counts: Counter[str],
+    ):
+        """Nothing is held yet.
+
+        Args:
+            clock: of the link.
+            commands: to the autopilot.
+            datum: gives what places count from.
+            home_first: the first item of a mission is home, as ArduPilot has it.
+            counts: what was refused, by reason.
+        """
+        self._clock, self._commands, self._datum = clock, commands, datum
+        self._home_first, self._counts = home_first, counts
+        self.held: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as they came
+        self._uploads: dict[int, _Upload] = {}
+        self._finished: dict[int, tuple[Endpoint, int]] = {}  # whose the last upload was, and how it ended
+        self._observed: deque[Any] = deque(maxlen=_RECENT)  # uploads that did not come through us
+        self._accepted: deque[tuple[str, int]] = deque(maxlen=_RECENT)  # source and number of commands
+
+    def begin(self, endpoint: Endpoint, kind: int, count: int) -> None:
+        """An endpoint has that many items to hand over."""
+        upload = self._uploads.get(kind)
+        if upload and upload.endpoint is not endpoint:
+            self._counts["upload while another endpoint uploads"] += 1
+            self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_DENIED)
+        elif upload and upload.complete:
+            return  # said twice: the acknowledgement is on its way
+        elif kind not in KINDS:
+            self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_UNSUPPORTED)
+        elif count > MAX_ITEMS:
+            self._counts["too many items"] += 1
+            self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_NO_SPACE)
+        else:
+            upload = self._uploads[kind] = _Upload(endpoint, kind, count, self._clock)
+            self._go_on(upload)
+
+    def take(self, endpoint: Endpoint, m: Any) -> None:
+        """The next item has come, or another one, or one again."""
+        upload = self._uploads.get(m.mission_type)
+        if upload is None or upload.endpoint is not endpoint:
+            self._counts["item that nobody asked for"] += 1
+            whose, result = self._finished.get(m.mission_type, (None, 0))
+            if whose is endpoint:  # it has missed the acknowledgement
+                self._acknowledge(endpoint, m.mission_type, result)
+        elif upload.complete or m.seq < len(upload.items):
+            self._counts["item again"] += 1
+        elif m.seq > len(upload.items):
+            self._counts["item out of order"] += 1
+            self._ask(upload)
+        else:
+            upload.items.append(m)
+            upload.tries = 0
+            self._go_on(upload)
+
+    def cancel(self, endpoint: Endpoint, kind: int) -> None:
+        """An endpoint gives up its upload."""
+        upload = self._uploads.get(kind)
+        if upload and upload.endpoint is endpoint and not upload.complete:
+            del self._uploads[kind]
+
+    def clear(self, endpoint: Endpoint, kind: int) -> None:
+        """Forget what is held."""
+        if kind == mavlink.MAV_MISSION_TYPE_ALL:
+            for other in KINDS:
+                if other not in self._uploads:
+                    self._hand_over(_Upload(endpoint, other, 0, self._clock), told=kind)
+        else:
+            self.begin(endpoint, kind, 0)
+
+    def observe(self, commands: Iterable[Any], acknowledgements: Iterable[Any]) -> None:
+        """Commands of others to the autopilot, and its acknowledgements: uploads that it accepts are held too."""
+        self._observed += (c for c in commands if c.kind in _KIND_OF)
+        self._accepted += ((a.source, a.id) for a in acknowledgements if a.result == mavlink.MAV_RESULT_ACCEPTED)
+        for command in [c for c in self._observed if (c.source, c.id) in self._accepted]:
+            self._observed.remove(command)
+            self.hold(command)
+
+    def hold(self, command: Any) -> None:
+        """The autopilot has what this command brought, if it is an upload."""
+        if command.kind in _KIND_OF:
+            kind = _KIND_OF[command.kind]
+            self.held[kind] = to_mavlink(command.items, kind, self._datum())
+
+    def step(self) -> None:
+        """Ask again for what does not come; give up at last."""
+        for upload in list(self._uploads.values()):
+            if upload.complete or self._clock.since(upload.asked) < RETRY:
+                continue
+            upload.tries += 1
+            if upload.tries > RETRIES:
+                self._counts["upload that stopped"] += 1
+                self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
+            else:
+                self._ask(upload)
+
+    def _go_on(self, upload: _Upload) -> None:
+        if len(upload.items) < upload.count:
+            self._ask(upload)
+            return
+        self._hand_over(upload)
+
+    def _ask(self, upload: _Upload) -> None:
+        upload.asked = self._clock.now
+        to = upload.endpoint.system, upload.endpoint.component
+        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, len(upload.items), upload.kind))
+
+    def _hand_over(self, upload: _Upload, told: int | None = None) -> None:
+        """All items are there: the autopilot takes them, or they are refused."""
+        try:
+            items = from_mavlink(upload.items, self._home_first, self._datum())
+        except RefusedItemError as refused:
+            self._counts["item that cannot be flown"] += 1
+            self._end(upload, refused.result)
+            return
+        upload.complete = True
+
+        def acknowledged(acknowledgement: Any) -> None:
+            if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
+                return
+            if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
+                self.held[upload.kind] = upload.items
+            self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), told)
+
+        self._commands.put(KINDS[upload.kind], upload.endpoint.name, acknowledged, items=items)
+
+    def _end(self, upload: _Upload, result: int, told: int | None = None) -> None:
+        self._uploads.pop(upload.kind, None)
+        self._finished[upload.kind] = upload.endpoint, result
+        if told is None or upload.kind == max(KINDS):  # of a clearing of everything once, at its end
+            self._acknowledge(upload.endpoint, upload.kind if told is None else told, result)
+
+    def _acknowledge(self, endpoint: Endpoint, kind: int, result: int) -> None:
+        endpoint.send(mavlink.MAVLink_mission_ack_message(endpoint.system, endpoint.component, result, kind))

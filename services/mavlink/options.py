@@ -1,0 +1,12 @@
+"""How a run is linked to the outside."""
+
+from typing import NamedTuple
+
+
+class Options(NamedTuple):
+    """The links of a vehicle, and who may command it over them."""
+
+    urls: tuple[str, ...]
+    key: bytes | None = None  # signs what is sent, and refuses what is not signed with it
+    insecure: bool = False  # commands are taken from other machines without a key
+    speed: float | None = 1.0  # simulated seconds per second; None: as fast as it goes

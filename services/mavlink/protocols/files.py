@@ -1,0 +1,14 @@
+"""The file transfer protocol's message."""
+
+from typing import Any
+
+from services.mavlink.dialect import mavlink
+from services.mavlink.protocols.handler import handles
+from services.mavlink.session import Session
+
+
+@handles("FILE_TRANSFER_PROTOCOL")
+def file_transfer(session: Session, m: Any) -> None:
+    """Reading is free to everybody: there is nothing secret in the files."""
+    for payload in session.files.replies(bytes(m.payload)):
+        session.send(mavlink.MAVLink_file_transfer_protocol_message(0, *session.address, list(payload)))

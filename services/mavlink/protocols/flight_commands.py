@@ -1,0 +1,115 @@
+"""Commands that fly the vehicle: modes, arming, take-off and landing, places, missions, speed."""
+
+import math
+from typing import Any
+
+from services.mavlink.coordinates import to_world
+from services.mavlink.dialect import mavlink
+from services.mavlink.frames import swap_yaw
+from services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Request, rule
+from services.mavlink.protocols.handler import handles
+from services.mavlink.session import Session
+
+
+@handles("SET_MODE")
+def set_mode(session: Session, m: Any) -> None:
+    """The old way to change the mode, which is not acknowledged."""
+    kind = session.vehicle.flavour.mode_kind(m.custom_mode)
+    if kind and session.trusted:
+        session.command(kind)
+
+
+@rule(mavlink.MAV_CMD_DO_SET_MODE)
+def do_set_mode(session: Session, c: Command) -> Outcome:
+    """A flight mode by its numbers."""
+    flavour = session.vehicle.flavour
+    if not int(c.params[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        return UNSUPPORTED
+    kind = flavour.mode_kind(flavour.custom_mode(c.params[1], c.params[2]))
+    return Request(kind) if kind else UNSUPPORTED
+
+
+@rule(mavlink.MAV_CMD_DO_SET_STANDARD_MODE)
+def do_set_standard_mode(session: Session, c: Command) -> Outcome:
+    """A flight mode by what it is called on every autopilot."""
+    kinds = {mode.standard: mode.kind for mode in session.vehicle.flavour.MODES}
+    kinds.pop(mavlink.MAV_STANDARD_MODE_NON_STANDARD, None)
+    kind = kinds.get(int(c.params[0]))
+    return Request(kind) if kind else UNSUPPORTED
+
+
+FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the checks say
+
+
+@rule(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+def arm_disarm(session: Session, c: Command) -> Outcome:
+    """Motors ready or off."""
+    if c.params[0] not in (0.0, 1.0):
+        return DENIED
+    return Request("arm" if c.params[0] else "disarm", (float(c.params[1] in FORCED),))
+
+
+@rule(mavlink.MAV_CMD_NAV_TAKEOFF)
+def takeoff(session: Session, c: Command) -> Outcome:
+    """Up to an altitude, above the sea or home as the flavour has it; where none is given, to MIS_TAKEOFF_ALT."""
+    datum, altitude, frame = session.vehicle.datum, c.altitude, c.frame
+    if math.isnan(altitude):
+        altitude, frame = session.parameters.value("MIS_TAKEOFF_ALT"), mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    elif not session.vehicle.flavour.TAKEOFF_ABOVE_SEA:
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    _, _, height = to_world(datum, frame, math.nan, math.nan, altitude)
+    return Request("takeoff", (height, math.nan))
+
+
+@rule(mavlink.MAV_CMD_NAV_LAND)
+def land(session: Session, c: Command) -> Outcome:
+    """Down, where it is."""
+    return Request("land")
+
+
+@rule(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+def return_(session: Session, c: Command) -> Outcome:
+    """Home."""
+    return Request("return")
+
+
+@rule(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
+def loiter(session: Session, c: Command) -> Outcome:
+    """Stay here."""
+    return Request("hold")
+
+
+@rule(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
+def pause(session: Session, c: Command) -> Outcome:
+    """Stay here, or go on with the mission."""
+    return Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
+
+
+@rule(mavlink.MAV_CMD_DO_REPOSITION)
+def reposition(session: Session, c: Command) -> Outcome:
+    """Go there; what of the place is not given stays as it is. Yaw is a heading [rad]."""
+    estimate = session.vehicle.estimate
+    there = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    if estimate is None or all(map(math.isnan, there)):
+        return Request("hold")
+    place = [here if math.isnan(asked) else asked for here, asked in zip(estimate.position_world, there, strict=True)]
+    speed = c.params[0] if c.params[0] > 0.0 else math.nan
+    return Request("goto", (*place, swap_yaw(c.params[3]), speed))
+
+
+@rule(mavlink.MAV_CMD_MISSION_START)
+def mission_start(session: Session, c: Command) -> Outcome:
+    """Fly the mission from an item."""
+    return Request("mission", (c.params[0],))
+
+
+@rule(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
+def set_mission_current(session: Session, c: Command) -> Outcome:
+    """Go on with another item."""
+    return Request("mission_current", (c.params[0],)) if c.params[0] >= 0.0 else ACCEPTED
+
+
+@rule(mavlink.MAV_CMD_DO_CHANGE_SPEED)
+def change_speed(session: Session, c: Command) -> Outcome:
+    """Fly at another speed; one below 0 is none."""
+    return Request("speed", (c.params[1],)) if c.params[1] >= 0.0 else ACCEPTED

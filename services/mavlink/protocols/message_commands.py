@@ -1,0 +1,60 @@
+"""Commands about messages: how often one is sent, and a request for one."""
+
+import math
+
+from services.mavlink.dialect import mavlink, message_class
+from services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
+from services.mavlink.session import Session
+from services.mavlink.telemetry import requested, streams
+
+
+@rule(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, changes=False)
+def set_message_interval(session: Session, c: Command) -> Outcome:
+    """Another rate for one message, to this endpoint alone."""
+    number = int(c.params[0])
+    if number not in streams() or math.isnan(c.params[1]):
+        return UNSUPPORTED
+    session.schedule.set_interval(number, c.params[1])
+    return ACCEPTED
+
+
+@rule(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL, changes=False)
+def get_message_interval(session: Session, c: Command) -> Outcome:
+    """How often a message is sent."""
+    number = int(c.params[0])
+    if not 0 <= number <= 0xFFFF:
+        return DENIED
+    interval = session.schedule.interval_us(number) if number in streams() else 0
+    session.send(mavlink.MAVLink_message_interval_message(number, interval))
+    return ACCEPTED
+
+
+@rule(mavlink.MAV_CMD_REQUEST_MESSAGE, changes=False)
+def request_message(session: Session, c: Command) -> Outcome:
+    """One message, once."""
+    return _reply(session, int(c.params[0]), c.params[1])
+
+
+@rule(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, changes=False)
+def request_capabilities(session: Session, c: Command) -> Outcome:
+    """The older way to ask for AUTOPILOT_VERSION."""
+    return _reply(session, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+
+
+@rule(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION, changes=False)
+def request_protocol_version(session: Session, c: Command) -> Outcome:
+    """The older way to ask for PROTOCOL_VERSION."""
+    return _reply(session, message_class("PROTOCOL_VERSION").id)
+
+
+@rule(mavlink.MAV_CMD_GET_HOME_POSITION, changes=False)
+def get_home_position(session: Session, c: Command) -> Outcome:
+    """The older way to ask for HOME_POSITION."""
+    return _reply(session, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+
+
+def _reply(session: Session, number: int, parameter: float = 0.0) -> Outcome:
+    messages = requested(session.vehicle, number, parameter)
+    if messages is None:
+        return UNSUPPORTED
+    return Reply(messages) if messages else mavlink.MAV_RESULT_TEMPORARILY_REJECTED

@@ -1,0 +1,95 @@
+"""Parameters that QGroundControl's PX4 pages ask for and that nobody can change here: facts of the vehicle.
+
+Names and values are those of PX4's parameter reference; a part that is not fitted says so. Some follow from others:
+what PX4 has in one number, the autopilot has in several.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from services.mavlink.dialect import mavlink
+from services.mavlink.vehicle import Battery, VehicleDescription
+
+Values = Mapping[str, float]
+
+
+class Fact(NamedTuple):
+    """A parameter that can be read only."""
+
+    name: str
+    value: Callable[[Values], float]  # of the autopilot's parameters
+    whole: bool = True
+    unit: str = ""
+
+
+SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
+GENERIC_QUADROTOR = 4001  # SYS_AUTOSTART
+JOYSTICK_ONLY = 1  # COM_RC_IN_MODE: there is no receiver
+NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
+NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # what a failsafe of the autopilot does
+_WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
+_GEOFENCE = {NOTHING: 1, HOLD: 2, RETURN: 3, LAND: 5, DESCEND: 5}  # GF_ACTION
+_LINK_LOSS = {NOTHING: 0, HOLD: 1, RETURN: 2, LAND: 3, DESCEND: 3}  # NAV_RCL_ACT
+_NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
+
+
+def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
+    """The facts of a vehicle."""
+
+    def fitted(sensor: str) -> int:
+        return int(not d.sensors or sensor in d.sensors)  # where none is, the true state stands for all of them
+
+    whole = {
+        "MAV_SYS_ID": d.system,
+        "MAV_COMP_ID": mavlink.MAV_COMP_ID_AUTOPILOT1,
+        "MAV_TYPE": mavlink.MAV_TYPE_QUADROTOR,
+        "SYS_AUTOSTART": GENERIC_QUADROTOR,
+        "SYS_HITL": 0,
+        "SYS_HAS_MAG": fitted("magnetometer"),
+        "SYS_HAS_BARO": fitted("barometer"),
+        "SYS_HAS_GPS": fitted("gps"),
+        "SYS_HAS_NUM_ASPD": 0,
+        "SYS_HAS_NUM_DIST": int("sonar" in d.sensors),
+        "CAL_GYRO0_ID": SIM_IMU * fitted("imu"),
+        "CAL_ACC0_ID": SIM_IMU * fitted("imu"),
+        "CAL_MAG0_ID": SIM_MAG * fitted("magnetometer"),
+        "CAL_MAG1_ID": 0,
+        "CAL_MAG2_ID": 0,
+        "SENS_BOARD_ROT": 0,
+        "COM_RC_IN_MODE": JOYSTICK_ONLY,
+        "RC_CHAN_CNT": 0,
+        "GF_MAX_HOR_DIST": 0,
+        "GF_MAX_VER_DIST": 0,
+        "BAT1_SOURCE": _POWER_MODULE if d.battery else _NO_SOURCE,
+        "BAT1_N_CELLS": d.battery.cells if d.battery else 0,
+    }
+    whole |= {f"RC_MAP_{axis}": 0 for axis in ("ROLL", "PITCH", "YAW", "THROTTLE", "AUX1", "AUX2", *NO_SWITCHES)}
+    whole |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
+    return [
+        *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
+        *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
+        *(_battery(d.battery) if d.battery else ()),
+        Fact("RTL_LAND_DELAY", lambda _: 0.0, False, "s"),  # it lands at once
+        Fact("RTL_DESCEND_ALT", lambda v: v.get("RTL_RETURN_ALT", 0.0), False, "m"),  # without a stop on the way down
+        Fact("COM_LOW_BAT_ACT", _low_battery),
+        Fact("GF_ACTION", lambda v: _GEOFENCE[int(v.get("FS_FENCE_ACT", NOTHING))]),
+        Fact("NAV_RCL_ACT", lambda v: _LINK_LOSS[int(v.get("NAV_DLL_ACT", NOTHING))]),  # sticks come over the data link
+        Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s"),
+    ]
+
+
+def _battery(b: Battery) -> Sequence[Fact]:
+    return [
+        Fact("BAT1_V_CHARGED", lambda _: b.charged_voltage, False, "V"),
+        Fact("BAT1_V_EMPTY", lambda _: b.empty_voltage, False, "V"),
+        Fact("BAT1_CAPACITY", lambda _: b.capacity / 3.6, False, "mAh"),
+        Fact("BAT1_R_INTERNAL", lambda _: b.resistance, False, "Ohm"),
+    ]
+
+
+def _low_battery(values: Values) -> float:
+    """What PX4's number is nearest to what the autopilot does at the critical and at the emergency charge."""
+    critical = values.get("FS_BAT_CRIT_ACT", NOTHING)
+    if critical in (LAND, DESCEND):
+        return _LAND
+    return _RETURN_THEN_LAND if critical == RETURN else _WARN

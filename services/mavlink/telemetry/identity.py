@@ -1,0 +1,66 @@
+"""What the vehicle is and what it can do."""
+
+from typing import Any
+
+from services.mavlink import component_metadata
+from services.mavlink.dialect import mavlink, message_class
+from services.mavlink.file_server import crc32
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.view import VehicleView
+
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+)
+VERSION = (1 << 24) | (16 << 16) | (0 << 8) | 255  # of the PX4 that is emulated: 1.16.0, a release
+MAVLINK_1, MAVLINK_2 = 100, 200  # protocol versions
+CHANNELS, NO_CHANNEL, NO_SIGNAL_STRENGTH = 18, 0xFFFF, 255
+
+
+@stream("AUTOPILOT_VERSION")
+def autopilot_version(v: VehicleView) -> Any:
+    """What it can do, and how whole parameters travel."""
+    nobody = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        _CAPABILITIES | v.flavour.PARAMETER_ENCODING,
+        *(VERSION, VERSION, VERSION, 0),
+        *(nobody, nobody, nobody),
+        *(0, 0, v.description.system),
+    )
+
+
+@stream("PROTOCOL_VERSION")
+def protocol_version(v: VehicleView) -> Any:
+    """MAVLink 2, and 1 is understood."""
+    nobody = [0] * 8
+    return message_class("PROTOCOL_VERSION")(MAVLINK_2, MAVLINK_1, MAVLINK_2, nobody, nobody)
+
+
+@stream("COMPONENT_METADATA")
+def metadata(v: VehicleView) -> Any:
+    """Where the file is that names the other files about this vehicle."""
+    general = component_metadata.files(v.description)[component_metadata.GENERAL]
+    place = component_metadata.uri(component_metadata.GENERAL).encode()
+    return message_class("COMPONENT_METADATA")(v.boot_ms, crc32(general), place)
+
+
+@stream("RC_CHANNELS")
+def rc_channels(v: VehicleView) -> Any:
+    """No radio-control receiver is fitted."""
+    return mavlink.MAVLink_rc_channels_message(v.boot_ms, 0, *[NO_CHANNEL] * CHANNELS, NO_SIGNAL_STRENGTH)
+
+
+@stream("FLIGHT_INFORMATION")
+def flight_information(v: VehicleView) -> Any:
+    """When it was armed, took off and landed, since the start; the number of the flight."""
+    f = v.flight
+    return mavlink.MAVLink_flight_information_message(
+        v.boot_ms, f.armed_ns // 1000, f.takeoff_ns // 1000, f.number, f.landing_ns // 1_000_000
+    )

@@ -1,0 +1,37 @@
+"""Which flight modes there are, and which is flown (MAVLink guide, "Standard Modes Protocol")."""
+
+import math
+from typing import Any
+
+from services.mavlink.dialect import mavlink
+from services.mavlink.telemetry.stream import on_request, stream
+from services.mavlink.view import VehicleView
+
+
+@stream("CURRENT_MODE", 0.5)
+def current_mode(v: VehicleView) -> Any:
+    """The flight mode. The one that was asked for is not told apart from it."""
+    number = v.flavour.mode_number(v.status.mode)
+    standard = {mode.number: mode.standard for mode in v.flavour.MODES}
+    return mavlink.MAVLink_current_mode_message(
+        standard.get(number, mavlink.MAV_STANDARD_MODE_NON_STANDARD), number, number
+    )
+
+
+@on_request("AVAILABLE_MODES")
+def available_modes(v: VehicleView, index: float) -> list[Any]:
+    """The mode of an index from 1, or all of them for 0."""
+    modes = v.flavour.MODES
+    wanted = 0 if math.isnan(index) else round(index)
+    messages = []
+    for number, mode in enumerate(modes, start=1):
+        if wanted in (0, number):
+            named = mode.standard == mavlink.MAV_STANDARD_MODE_NON_STANDARD  # the others bear their standard's name
+            properties = mavlink.MAV_MODE_PROPERTY_ADVANCED if mode.advanced else 0
+            name = mode.name.encode() if named else b""
+            messages.append(
+                mavlink.MAVLink_available_modes_message(
+                    len(modes), number, mode.standard, mode.number, properties, name
+                )
+            )
+    return messages

@@ -1,0 +1,45 @@
+"""What the speed controllers (ESC) of the first four motors report."""
+
+import math
+from typing import Any
+
+from messages.topics import TRUTH
+from services.mavlink.dialect import message_class
+from services.mavlink.frames import saturated
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.view import VehicleView
+
+BATCH = 4  # motors of one message
+RPM = 60.0 / math.tau  # of 1 rad/s
+SERIAL = 1  # ESC_CONNECTION_TYPE_SERIAL
+UNKNOWN_TEMPERATURE = 0x7FFF
+
+
+def _padded(values: Any, nothing: Any) -> list[Any]:
+    return [*list(values)[:BATCH], *[nothing] * (BATCH - min(BATCH, len(values)))]
+
+
+@stream("ESC_STATUS", 1.0, 10.0)
+def esc_status(v: VehicleView) -> Any:
+    """Rotor speed, voltage and current of each motor."""
+    truth = v.get(TRUTH)
+    if truth is None or not truth.rotor_speed:
+        return None
+    rpm = [saturated(RPM * speed, 32, unknown=0) for speed in truth.rotor_speed]
+    return message_class("ESC_STATUS")(
+        0, v.boot_us, _padded(rpm, 0), _padded(truth.motor_voltage, 0.0), _padded(truth.motor_current, 0.0)
+    )
+
+
+@stream("ESC_INFO", 1.0, 1.0)
+def esc_info(v: VehicleView) -> Any:
+    """Which speed controllers are there, all without a fault."""
+    truth = v.get(TRUTH)
+    if truth is None or not truth.rotor_speed:
+        return None
+    count = len(truth.rotor_speed)
+    online = (1 << min(8, count)) - 1
+    counter = v.time_ns // 1_000_000_000 & 0xFFFF
+    return message_class("ESC_INFO")(
+        0, v.boot_us, counter, count, SERIAL, online, [0] * BATCH, [0] * BATCH, [UNKNOWN_TEMPERATURE] * BATCH
+    )

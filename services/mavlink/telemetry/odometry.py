@@ -1,0 +1,43 @@
+"""Pose and velocity in one message, with what the estimator thinks of its own error."""
+
+import math
+from typing import Any
+
+from messages.topics import ESTIMATE
+from services.mavlink.dialect import mavlink
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.view import VehicleView
+
+_DIAGONAL = (0, 6, 11, 15, 18, 20)  # of the upper triangle of a 6 x 6 matrix, row by row
+_GOOD, _BAD = 100, -1  # quality [%], -1: failed
+
+
+def _triangle(*variances: float) -> list[float]:
+    """A covariance of which only the first entries of the diagonal are known."""
+    found = [math.nan] * 21
+    for index, variance in zip(_DIAGONAL, variances, strict=False):
+        found[index] = variance
+    return found
+
+
+@stream("ODOMETRY", 0.0, 30.0)
+def odometry(v: VehicleView) -> Any:
+    """Pose from body FRD to NED; velocity along NED, as PX4 sends it."""
+    m, e = v.estimate, v.get(ESTIMATE)
+    if m is None:
+        return None
+    p, u, r = e.position_std, e.velocity_std, e.attitude_std
+    return mavlink.MAVLink_odometry_message(
+        m.time_ns // 1000,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        *m.position_ned,
+        list(m.attitude),
+        *m.velocity_ned,
+        *m.omega_frd,
+        _triangle(p.y**2, p.x**2, p.z**2, r.x**2, r.y**2, r.z**2),
+        _triangle(u.y**2, u.x**2, u.z**2),
+        0,
+        mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+        _BAD if e.health else _GOOD,
+    )

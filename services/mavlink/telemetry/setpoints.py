@@ -1,0 +1,74 @@
+"""What the controllers follow."""
+
+import math
+from typing import Any
+
+from dynamics.vector import Vec3
+from messages.topics import ACTUATORS, SETPOINT
+from services.mavlink.coordinates import from_world
+from services.mavlink.dialect import mavlink
+from services.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
+from services.mavlink.telemetry.power import motor_fractions
+from services.mavlink.telemetry.stream import stream
+from services.mavlink.view import VehicleView
+
+_RATES_IGNORED = (
+    mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+    | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+    | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+)
+_YAW_BIT = 10  # of the type mask, after three of position, three of velocity, three of acceleration and one of force
+
+
+def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
+    """Type mask, world position [m], and velocity, acceleration, yaw and yaw rate in NED."""
+    position = tuple(setpoint.position)
+    velocity, acceleration = swap_world(tuple(setpoint.velocity)), swap_world(tuple(setpoint.acceleration))
+    turn = swap_yaw(setpoint.yaw), -setpoint.yaw_rate
+    given = (*swap_world(position), *velocity, *acceleration)
+    mask = sum(1 << k for k, value in enumerate(given) if not math.isfinite(value))
+    mask |= sum(1 << _YAW_BIT + k for k, value in enumerate(turn) if not math.isfinite(value))
+    return mask, position, (*velocity, *acceleration, *turn)
+
+
+@stream("POSITION_TARGET_LOCAL_NED", 1.5, 10.0)
+def local_target(v: VehicleView) -> Any:
+    """Position, velocity and acceleration that are followed; nothing while the motors are off."""
+    setpoint = v.get(SETPOINT)
+    if setpoint is None or not v.status.armed:
+        return None
+    mask, position, rest = _kinematics(setpoint)
+    return mavlink.MAVLink_position_target_local_ned_message(
+        v.boot_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *swap_world(position), *rest
+    )
+
+
+@stream("POSITION_TARGET_GLOBAL_INT", 1.0, 10.0)
+def global_target(v: VehicleView) -> Any:
+    """The same with the position on the Earth; nothing where there is no position to follow."""
+    setpoint = v.get(SETPOINT)
+    if setpoint is None or not v.status.armed or not all(map(math.isfinite, setpoint.position)):
+        return None
+    mask, position, rest = _kinematics(setpoint)
+    latitude, longitude, altitude = from_world(v.datum, position)
+    return mavlink.MAVLink_position_target_global_int_message(
+        v.boot_ms,
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        mask,
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
+        altitude,
+        *rest,
+    )
+
+
+@stream("ATTITUDE_TARGET", 2.0, 10.0)
+def attitude_target(v: VehicleView) -> Any:
+    """Attitude that the inner loops follow, and collective thrust as a fraction; body rates are not told."""
+    actuators = v.get(ACTUATORS)
+    if actuators is None or not v.status.armed:
+        return None
+    attitude = swap_attitude(from_euler(*actuators.attitude_reference))
+    fractions = motor_fractions(v)
+    thrust = sum(f * f for f in fractions) / max(1, len(fractions))  # static thrust goes with the square of the voltage
+    return mavlink.MAVLink_attitude_target_message(v.boot_ms, _RATES_IGNORED, list(attitude), 0.0, 0.0, 0.0, thrust)

@@ -1,0 +1,45 @@
+"""A plant that nobody commands: a system of dynamics/vehicles that any integrator marches from tick to tick."""
+
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from dynamics.integrators import march
+from dynamics.kernel import ByClass, leaf
+from dynamics.tree import finite
+from services.plant.cores.ending import signal
+
+
+class AutonomousPlant(NamedTuple):
+    """The system and how it is integrated."""
+
+    system: Any  # parameters, a class of dynamics.integrators.RATES
+    method: Any  # `Method()` of an integrator
+    steps: int  # of a tick
+    step: float  # [s]
+    interval: float  # [s] a tick
+    last: int  # tick of the run
+
+
+def told(p, t, x):
+    """What is told of the state x at time t [s]: a tuple of port values, chosen by the class of the parameters p."""
+    raise NotImplementedError("compiled code only")
+
+
+TOLD = ByClass()
+"""The compiled function of `told` by the class of a system's parameters."""
+
+
+@overload(told, jit_options={"forceinline": True})
+def _told(p, t, x):
+    found = TOLD[p.instance_class]
+    return lambda p, t, x: found(p, t, x)
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """March to `tick`; at tick 0 leave the system where it is."""
+    x = s
+    if tick > 0:
+        x = march(p.method, p.system, (tick - 1) * p.interval, x, p.step, p.steps)
+    return x, told(p.system, tick * p.interval, x), signal(tick, p.last, finite(x))

@@ -1,0 +1,54 @@
+"""The single bodies of a multirotor of five, with the forces in their hinges."""
+
+from typing import NamedTuple
+
+from numba.extending import overload
+
+from cosim.part import GO_ON
+from dynamics.effects import _hooks as hooks
+from dynamics.kernel import leaf
+from dynamics.multibody.five_bodies import FiveBodies
+from dynamics.vehicles import multirotor_euler, multirotor_multibody
+from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters
+from services.common.ports import BodyMotions, PerRotor
+
+
+class FiveBodiesView(NamedTuple):
+    """The vehicle whose bodies are told."""
+
+    vehicle: MultirotorParameters
+    interval: float  # [s] a tick
+    off: PerRotor  # [V] before the first command
+
+
+def on_se3(x):
+    """The bodies' poses, in whichever coordinates they are."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(on_se3)
+def _on_se3(x):
+    if x.instance_class is FiveBodies:
+        return lambda x: x
+    return lambda x: multirotor_euler.five(x)
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
+    actuators = inputs[0]
+    command = actuators.value.motor_voltage if actuators.due else p.off
+    g, memory = p.vehicle, s.vehicle.memory
+    drive = MultirotorDrive(g, hooks.all_body(g.effects, memory, g.body), memory, command)
+    x = on_se3(s.vehicle.motion)
+    j = multirotor_multibody.joints(drive, tick * p.interval, x)
+    a, (b, c, d, e) = x.chassis, x.propellers
+    told = BodyMotions(
+        (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),
+        (a.attitude, b.attitude, c.attitude, d.attitude, e.attitude),
+        (a.velocity_world, b.velocity_world, c.velocity_world, d.velocity_world, e.velocity_world),
+        (a.omega_body, b.omega_body, c.omega_body, d.omega_body, e.omega_body),
+        (j[0][0], j[1][0], j[2][0], j[3][0], j[4][0]),
+        (j[0][1], j[1][1], j[2][1], j[3][1], j[4][1]),
+    )
+    return s, (told,), GO_ON

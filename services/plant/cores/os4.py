@@ -1,0 +1,26 @@
+"""What is told of the OS4 quadrotor: its motion and what its rotors do."""
+
+from dynamics.integrators import rate
+from dynamics.kernel import leaf
+from dynamics.vector import ZERO
+from dynamics.vehicles.quadrotor_os4 import Os4Parameters
+from services.common.ports import TrueState
+from services.plant.cores.autonomous import TOLD
+
+
+@leaf
+def told(p, t, x):
+    """The state, its acceleration, thrusts and torques of the rotors."""
+    a, b, c, d = x.rotor_speed
+    k, m = p.lift_constant, p.drag_constant
+    return (
+        TrueState(
+            x.position_world, x.attitude, x.velocity_world, x.omega_body, rate(p, t, x).velocity_world,
+            x.rotor_speed, (), (), (),
+            (k * a * a, k * b * b, k * c * c, k * d * d), (m * a * a, m * b * b, m * c * c, m * d * d),
+            ZERO, 0.0, False,
+        ),
+    )  # fmt: skip
+
+
+TOLD[Os4Parameters] = told

@@ -1,0 +1,107 @@
+"""From a scene to the plant's set-up: what the models of services/plant/models have in common."""
+
+import math
+from types import ModuleType
+from typing import Any
+
+from cosim.scene import Scene
+from cosim.schedule import Input, Port
+from cosim.setup import ServiceSetup
+from dynamics import integrators
+from dynamics.errors import KeyedError
+from dynamics.integrators import check_start
+from dynamics.lie.quaternion import NO_ROTATION
+from dynamics.noise import Key, stream_key
+from dynamics.vector import ZERO
+from services.common import ports
+from services.common.ports import BatteryGauge, BodyMotions, TrueState
+from services.common.sections import Exchange, Rates, Run, Vehicle, airframe, start_pose, ticks
+from services.plant.config import Solver, method
+from services.plant.cores.autonomous import AutonomousPlant
+from services.plant.cores.multirotor import MultirotorPlant, MultirotorPlantState
+from services.plant.setup import PlantSetup
+from services.plant.wire import PlantWiring
+
+
+def last_tick(scene: Scene) -> int:
+    """The tick at which the run ends at the latest."""
+    return round(scene[Run].duration * scene[Exchange].rate)
+
+
+def rate_ticks(scene: Scene, key: str) -> int:
+    """Ticks between messages of a rate of the table `rates`."""
+    return ticks(scene, min(getattr(scene[Rates], key), scene[Exchange].rate), f"rates.{key}")
+
+
+def wiring(scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()) -> PlantWiring:
+    """What the plant's messages say besides its state."""
+    cells, capacity = (battery.cells, battery.capacity) if battery else (0, math.nan)
+    return PlantWiring(rate_ticks(scene, "pose"), odometry, cells, capacity, bodies)
+
+
+def bodies_port(scene: Scene, n: int) -> Port:
+    """The port of n single bodies."""
+    zero = (ZERO,) * n
+    return Port(
+        ports.BODIES, BodyMotions(zero, (NO_ROTATION,) * n, zero, zero, zero, zero), rate_ticks(scene, "bodies")
+    )
+
+
+def autonomous(
+    scene: Scene, p: Any, start: Any, told: TrueState, bodies: Any = None, names: tuple[str, ...] = ()
+) -> ServiceSetup:
+    """A plant that nobody commands.
+
+    Args:
+        scene: what to fly.
+        p: parameters of the system.
+        start: its state at tick 0.
+        told: the shape of what is told of it.
+        bodies: parameters of the part that tells of single bodies, None without it.
+        names: the bodies.
+    """
+    core = AutonomousPlant(p, *method(scene), scene[Exchange].interval, last_tick(scene))
+    given = (Port(ports.TRUTH, told), *([bodies_port(scene, len(names))] if bodies else []))
+    return ServiceSetup(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
+
+
+def noise_key(seed: int, vehicle: str) -> Key:
+    """The key of the plant's random numbers."""
+    return stream_key(seed, vehicle, "plant")
+
+
+def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceSetup:
+    """A multirotor with parameters p whose states the module `form` makes."""
+    exchange, frame = scene[Exchange], airframe(scene)
+    n = (0.0,) * len(frame.rotors.position)
+    how, steps, step = method(scene)
+    key = noise_key(scene[Run].seed, scene[Vehicle].name)
+    settle = round(scene[Run].settle * exchange.rate)
+    core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
+    position, attitude = start_pose(scene)
+    start = MultirotorPlantState(form.initial_state(p, position, attitude), last_tick(scene))
+    told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
+    delay = exchange.loop_delay
+    return ServiceSetup(
+        PlantSetup("reduced", core, start, wiring(scene, odometry=True, battery=frame.battery)),
+        (Input(ports.ACTUATORS, delay), Input(ports.STATUS, delay)),
+        (Port(ports.TRUTH, told), Port(ports.BATTERY, BatteryGauge(), rate_ticks(scene, "battery"))),
+    )
+
+
+def check_system(scene: Scene, p: Any, start: Any) -> None:
+    """Refuse a start that is not sound, and an integrator that is not for such a state.
+
+    Raises:
+        KeyedError: of the model's table, or of `solver.integrator`.
+    """
+    model = scene[Vehicle].model
+    try:
+        check_start(p, start)
+    except ValueError as error:
+        raise KeyedError(model, str(error)) from None
+    name = scene[Solver].integrator
+    required = getattr(integrators.get(name), "REQUIRES", start._fields)
+    if tuple(required) != start._fields:
+        has = ", ".join(start._fields)
+        raise KeyedError("solver.integrator", f"{name} is for states of {', '.join(required)}; {model} has {has}")

@@ -1,0 +1,74 @@
+"""One instrument, compiled: the true state in, its reading out at its own rate."""
+
+import sys
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from cosim.part import GO_ON
+from dynamics.geodesy import Home
+from dynamics.kernel import leaf
+from dynamics.noise import Key
+from dynamics.vector import Vec3
+from services.sensors.truth import Truth
+
+
+class Surroundings(NamedTuple):
+    """What instruments measure apart from the motion."""
+
+    gravity: float  # [m/s^2]
+    home: Home
+    temperature_celsius: float  # [deg C] of the air at the ground
+    magnetic_field_world: Vec3  # [T]
+
+
+class Instrument(NamedTuple):
+    """A sensor that the vehicle carries."""
+
+    sensor: Any  # parameters: Imu, Gps, ...
+    key: Key  # of its random numbers
+    around: Surroundings
+
+
+def _sample(p, s, key, tick, truth):
+    """`sample` of the sensor whose parameters `p` are."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_sample, jit_options={"forceinline": True})
+def _sample_of(p, s, key, tick, truth):
+    found = sys.modules[p.instance_class.__module__].sample
+    return lambda p, s, key, tick, truth: found(p, s, key, tick, truth)
+
+
+def _initial(p, key, truth):
+    """`initial` of the sensor whose parameters `p` are."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_initial, jit_options={"forceinline": True})
+def _initial_of(p, key, truth):
+    found = sys.modules[p.instance_class.__module__].initial
+    return lambda p, key, truth: found(p, key, truth)
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The reading at `tick`; the instrument is switched on at tick 0."""
+    x, around = inputs[0].value, p.around
+    truth = Truth(
+        x.position_world,
+        x.attitude,
+        x.velocity_world,
+        x.omega_body,
+        x.acceleration_world,
+        x.position_world[2],
+        around.gravity,
+        around.home,
+        around.temperature_celsius,
+        around.magnetic_field_world,
+    )
+    if tick == 0:
+        s = _initial(p.sensor, p.key, truth)
+    s, reading = _sample(p.sensor, s, p.key, tick, truth)
+    return s, (reading,), GO_ON

@@ -1,0 +1,88 @@
+"""From the `[sensors]` of a scene to its instruments."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numba
+
+from cosim.scene import Scene
+from cosim.schedule import Input, Port
+from cosim.setup import ServiceSetup
+from dynamics.errors import KeyedError
+from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
+from dynamics.noise import stream_key
+from services.common import ports
+from services.common.sections import Exchange, Run, Vehicle, gravity, ticks
+from services.sensors.config import Sensors
+from services.sensors.core import Instrument, Surroundings
+from services.sensors.registry import module_of, parameters
+from services.sensors.service import SensorsSetup
+from services.sensors.truth import Truth
+from services.sensors.wire import SonarWiring
+
+TEMPERATURE = 15.0  # [deg C] of the air at the ground
+READINGS = {
+    ports.IMU: ports.ImuReading(),
+    ports.MAGNETOMETER: ports.MagnetometerReading(),
+    ports.GPS: ports.GpsReading(),
+    ports.BAROMETER: ports.BarometerReading(),
+    ports.SONAR: ports.SonarReading(),
+}
+
+
+def resolve(scene: Scene) -> ServiceSetup | None:
+    """The sensors that the scene names; None where it names none."""
+    tables = scene[Sensors].tables
+    if not tables:
+        return None
+    around = Surroundings(gravity(scene), Home(), TEMPERATURE, MAGNETIC_FIELD_WORLD)
+    instruments, given, sonar = [], [], None
+    for name, table in sorted(tables.items()):
+        p = parameters(name, table, scene[Exchange].interval)
+        key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
+        instruments.append(Instrument(p, key, around))
+        reading = READINGS[name] if name in READINGS else tried(name, table, p)
+        given.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
+        if name == ports.SONAR:
+            sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
+    return ServiceSetup(SensorsSetup(tuple(instruments), sonar), (Input(ports.TRUTH),), tuple(given))
+
+
+def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:
+    """The same instruments with another seed."""
+    setup: SensorsSetup = given.parameters
+    instruments = tuple(
+        instrument._replace(key=stream_key(seed, vehicle, port.name))
+        for instrument, port in zip(setup.instruments, given.ports, strict=True)
+    )
+    return given._replace(parameters=setup._replace(instruments=instruments))
+
+
+def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
+    """The reading of a sensor of the user's own, after one sample of it.
+
+    Args:
+        name: of the sensor.
+        table: of the scene.
+        p: its parameters.
+
+    Raises:
+        KeyedError: it cannot be sampled, or its types are not those that it declares.
+    """
+    module, where = module_of(name, table), f"sensors.{name}.module"
+    key = stream_key(0, "trial", name)
+    try:
+        state = module.initial(p, key, Truth())
+        after, reading = module.sample(p, state, key, 0, Truth())
+    except Exception as error:
+        said = str(error).strip().partition("\n")[0]
+        raise KeyedError(where, f"{type(error).__name__}: {said}") from error
+    for what, found, declared in (
+        ("initial", state, module.blank()),
+        ("sample's state", after, module.blank()),
+        ("sample's reading", reading, module.READING),
+    ):
+        if numba.typeof(found) != numba.typeof(declared):
+            raise KeyedError(where, f"{what} is of another type than `blank` or `READING` declares")
+    return module.READING

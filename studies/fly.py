@@ -1,0 +1,44 @@
+"""Flies a scene in this process, in memory and compiled, as fast as it goes."""
+
+from collections.abc import Collection
+from typing import TypeVar
+
+from cosim.graph import Graph
+from cosim.scene import Scene
+from cosim.schedule import LockStepError
+from cosim.setup import Setup
+from messages.topics import Topic
+from services.common.operator import Operator, nobody
+from services.processes import create_all
+from services.table import resolve
+from studies.flight import Flight
+
+F = TypeVar("F", bound=Flight)
+
+PAGE = 64  # ticks of ports that nobody asks for; the commander looks back less
+
+
+def fly(
+    run: Setup | Scene,
+    only: Collection[Topic] | None = None,
+    operator: Operator = nobody,
+    kind: type[F] = Flight,  # type: ignore[assignment]
+) -> F:
+    """Fly to the end, or until a state is not sound: `Flight.failure` then says why.
+
+    Args:
+        run: what to fly.
+        only: the topics wanted, None for all that are recorded; the fewer, the less memory and time.
+        operator: gives the commands that have come until a tick.
+        kind: the class of the flight, where more is to be had of it.
+    """
+    setup = run if isinstance(run, Setup) else resolve(run)
+    services = create_all(setup, operator)
+    wires = [wire for service in services for wire in service.wires]
+    wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else wire.topic in only)}
+    graph, failure = Graph(setup, services, PAGE, wanted), ""
+    try:
+        graph.advance(setup.last_tick + 1)
+    except LockStepError as error:
+        failure = str(error)
+    return kind.of(graph, only, failure)

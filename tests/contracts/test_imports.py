@@ -1,0 +1,54 @@
+"""No module imports itself by way of others: not at the top, not inside of functions, not for type checkers only."""
+
+import ast
+from pathlib import Path
+
+PACKAGES = ("cosim", "dynamics", "lapwing", "messages", "services", "studies")
+
+
+def imports():
+    """The modules of this project that each module imports, anywhere in its source."""
+    files = {
+        path: path.with_suffix("").as_posix().replace("/", ".") for top in PACKAGES for path in Path(top).rglob("*.py")
+    }
+    names = {name.removesuffix(".__init__"): path for path, name in files.items()}
+    found = {}
+    for name, path in names.items():
+        taken = set()
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                taken |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                inner = {f"{node.module}.{alias.name}" for alias in node.names}
+                taken |= inner & names.keys() or {node.module}
+                taken |= {node.module} if inner - names.keys() else set()
+        found[name] = (taken & names.keys()) - {name}
+    return found
+
+
+def cycle(graph):
+    """A way from a module back to itself, None if there is none."""
+    done = set()
+
+    def search(name, way):
+        if name in way:
+            return [*way[way.index(name) :], name]
+        if name in done:
+            return None
+        for other in sorted(graph[name]):
+            if found := search(other, [*way, name]):
+                return found
+        done.add(name)
+        return None
+
+    return next((found for name in sorted(graph) if (found := search(name, []))), None)
+
+
+def test_a_cycle_is_found():
+    assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+
+
+def test_there_is_no_import_cycle():
+    graph = imports()
+    assert len(graph) > 400
+    assert cycle(graph) is None

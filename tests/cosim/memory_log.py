@@ -1,0 +1,88 @@
+"""Flights in this process whose messages stay in memory."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from cosim.graph import Graph
+from cosim.scene import Scene
+from cosim.setup import Setup
+from cosim.single import PAGE, run_single
+from cosim.wire import Page
+from messages.digest import Digest
+from messages.topics import Topic
+from services.processes import create_all
+from services.table import resolve
+
+
+class MemoryLog:
+    """What a flight would record; messages are decoded when asked for, topics named without their vehicle."""
+
+    def __init__(self, setup: Setup):
+        self.setup = setup
+        self._pages: dict[str, list[Page]] = {}
+        self._topics: dict[str, Topic] = {}
+        self._decoded: dict[str, list[Any]] = {}
+
+    def write(self, pages: Iterable[Page], last: int) -> None:
+        """Take the pages of some ticks; called as `cosim.recording.Recording.write`."""
+        for page in pages:
+            name = page.topic.name.removeprefix("{vehicle}/")
+            self._topics[name] = page.topic
+            self._pages.setdefault(name, []).append(page)
+        self._decoded.clear()
+
+    @property
+    def topics(self) -> dict[str, Topic]:
+        """The topics that were spoken on, by name."""
+        return dict(self._topics)
+
+    def payloads(self, name: str) -> list[tuple[int, bytes]]:
+        """(tick, payload) of each message of a topic, in order."""
+        found = [
+            (int(tick), payload.tobytes())
+            for page in self._pages.get(name, ())
+            for tick, payload in zip(page.ticks, page.payloads, strict=True)
+        ]
+        return sorted(found, key=lambda message: message[0])  # stable: as they came within a tick
+
+    def messages(self, name: str) -> list[Any]:
+        """The messages of a topic."""
+        if name not in self._decoded:
+            decode = self._topics[name].message.decode
+            self._decoded[name] = [decode(payload) for _, payload in self.payloads(name)]
+        return self._decoded[name]
+
+    def times(self, name: str) -> np.ndarray:
+        """Simulation times of a topic's messages [s], shape (n,)."""
+        return np.array([tick for tick, _ in self.payloads(name)]) * self.setup.interval_ns * 1e-9
+
+    def column(self, name: str, value: Callable[[Any], Any]) -> np.ndarray:
+        """`value(message)` for each message of a topic, shape (n,) or (n, k)."""
+        return np.array([value(message) for message in self.messages(name)])
+
+    @property
+    def landed(self) -> bool:
+        """Whether the mission has ended on the ground with the motors off."""
+        last = self.messages("status")[-1]
+        return bool(last.finished and last.landed)
+
+    @property
+    def digest(self) -> str:
+        """What the log of this flight would state."""
+        digest = Digest()
+        for name, topic in self._topics.items():
+            for tick, payload in self.payloads(name):
+                digest.update(topic.key(self.setup.vehicle), tick * self.setup.interval_ns, payload)
+        return digest.hexdigest()
+
+
+def fly(
+    scene: Scene | Setup, operator: Callable[[int], Iterable[Any]] | None = None, last: int | None = None
+) -> MemoryLog:
+    """Fly a scene in this process, to the tick `last` or to its end; `operator` gives the commands until a tick."""
+    setup = scene if isinstance(scene, Setup) else resolve(scene)
+    log = MemoryLog(setup)
+    run_single(Graph(setup, create_all(setup, operator), PAGE), log, last=last)  # type: ignore[arg-type]
+    return log

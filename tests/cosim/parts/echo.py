@@ -1,0 +1,27 @@
+"""A part that gives what it has received, and whether that was due."""
+
+from typing import Any, NamedTuple
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+
+
+class Echo(NamedTuple):
+    """A part of one input."""
+
+    sign: float
+
+
+class Heard(NamedTuple):
+    """What was received at a tick."""
+
+    due: bool
+    value: Any
+    sign: float
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """Give the input's message on."""
+    r = inputs[0]
+    return s, (Heard(r.due, r.value, p.sign),), GO_ON

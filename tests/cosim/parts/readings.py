@@ -1,0 +1,57 @@
+"""A part that gives a tree of every kind of number, counted in its state, and signals at given ticks."""
+
+from typing import NamedTuple
+
+from cosim.part import END, FAILED, GO_ON, LOOK
+from dynamics.kernel import leaf
+from dynamics.vector import Vec3
+
+
+class Place(NamedTuple):
+    """A tree within a tree."""
+
+    position: Vec3
+    seen: bool
+
+
+class Reading(NamedTuple):
+    """Numbers of every kind."""
+
+    number: float
+    good: bool
+    count: int
+    places: tuple[Place, Place]
+    rest: tuple[int, ...]
+
+
+LIKE = Reading(0.0, False, 0, (Place((0.0,) * 3, False),) * 2, (0, 0))
+
+
+class Readings(NamedTuple):
+    """What is given, and when something is said besides."""
+
+    factor: float
+    look_every: int = 0  # ticks; 0: never
+    end: int = -1  # tick
+    failure: int = -1  # tick
+
+
+def expected(factor, tick, count):
+    """What the `count`th step at `tick` gives."""
+    t = float(tick)
+    near, far = Place((factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
+    return Reading(factor * t, tick % 5 == 0, -count, (near, far), (count, 3 - tick))
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """Count, and give what comes of the tick and the count."""
+    n, t = s + 1, float(tick)
+    near, far = Place((p.factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
+    given = Reading(p.factor * t, tick % 5 == 0, -n, (near, far), (n, 3 - tick))
+    signal = LOOK if p.look_every > 0 and tick % p.look_every == 0 else GO_ON
+    if tick == p.end:
+        signal = END
+    if tick == p.failure:
+        signal = FAILED
+    return n, (given,), signal

@@ -1,0 +1,25 @@
+"""A part that adds up a port of one number; parts of one state share it."""
+
+from typing import NamedTuple
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+
+
+class Number(NamedTuple):
+    """A port of one number."""
+
+    value: float
+
+
+class RunningSum(NamedTuple):
+    """The weight of what is added."""
+
+    weight: float
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """Add the message that is due."""
+    s += p.weight * inputs[0].value.value if inputs[0].due else 0.0
+    return s, (Number(s),), GO_ON

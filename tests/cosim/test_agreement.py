@@ -1,0 +1,94 @@
+"""A run in one graph and one in a graph for each service, which hand each other bundles tick by tick as processes do,
+record the same bytes."""
+
+import pytest
+from flights import OPERATED, command, scripted
+
+from cosim.bundle import Bundles, pack_batch, unpack_batch
+from cosim.graph import Graph
+from services.processes import TIME_OWNER, create_all
+from services.table import load, resolve
+from tests.cosim.memory_log import MemoryLog, fly
+
+SENSORS = [
+    "autopilot.estimator=sensors", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
+    "sensors.barometer={}", "sensors.sonar={}",
+]  # fmt: skip
+FAULTS = [
+    'sensors.gps.faults=[{kind="dropout", start=0.5, stop=0.9}]',
+    'sensors.imu.faults=[{kind="bias", channel="gyro", start=0.3, size=[0.05, 0.0, 0.0]}]',
+    'sensors.barometer.faults=[{kind="freeze", start=0.2}]',
+    'sensors.sonar.faults=[{kind="spikes", start=0.1, size=2.0}]',
+    'sensors.magnetometer.faults=[{kind="delay", start=0.4, samples=3}]',
+]
+BATTERY = ["effects.battery.charge=0.16", "effects.motor_electrics={}"]
+EVENT = 'multibody.event=[{time=0.3, propeller=2, becomes="locked"}, {time=0.31, propeller=4, becomes="torn_off"}]'
+SCRIPT = {0.04: [command("takeoff", 3.0), command("arm")], 0.6: [command("parameter", 5.0, text="MPC_Z_P")]}
+
+CASES = {
+    "sensors": ("hover", SENSORS, 1.2, None),
+    "sensors, another seed": ("hover", [*SENSORS, "run.seed=7"], 0.5, None),
+    "sensors that fail": ("hover", [*SENSORS, *FAULTS], 1.2, None),
+    "parallel coupling": ("hover", [*SENSORS, "exchange.coupling=parallel"], 0.5, None),
+    "a battery runs down": ("hover", BATTERY, 1.0, None),
+    "five bodies of which two break": ("delivery_mission", ["vehicle.model=multibody", EVENT], 0.5, None),
+    "an operator": ("hover", OPERATED, 1.2, SCRIPT),
+    "an operator, on sensors": ("hover", [*SENSORS, *OPERATED], 0.6, SCRIPT),
+    "a formation": ("cooperative_load", [], 0.3, None),
+    "nobody steers": ("os4_motors", [], 0.3, None),
+}
+
+
+def fly_apart(setup, operator):
+    """Every service with a graph of its own; what it records comes through batches of uneven lengths."""
+    services = create_all(setup, operator)
+    graphs = {service.name: Graph(setup, [service], 64) for service in services}
+    bundles = {name: Bundles(service.ports) for name, service in setup.services.items()}
+    log, handed = MemoryLog(setup), dict.fromkeys(graphs, 0)
+    ended = False
+    while not ended:
+        for name, graph in graphs.items():
+            tick = graph.tick
+            graph.advance(tick + 1)
+            if bundles[name].due(tick):
+                payload = bundles[name].pack(graph, tick)
+                for other in graphs.values():
+                    if other is not graph:
+                        bundles[name].unpack(payload, other, tick)
+        ended = graphs[TIME_OWNER].ended
+        for i, (name, graph) in enumerate(graphs.items()):
+            if ended or graph.tick - handed[name] >= 11 + 6 * i:
+                stop, pages = unpack_batch(pack_batch(graph.pages(handed[name], graph.tick), graph.tick))
+                log.write(pages, stop - 1)
+                handed[name] = stop
+    return log
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_together_and_apart_record_the_same(name):
+    scene, overrides, duration, script = CASES[name]
+    setup = resolve(load(scene, [*overrides, f"run.duration={duration}"]))
+    operator = scripted(script) if script else None
+    together, apart = fly(setup, operator), fly_apart(setup, operator)
+    assert apart.topics.keys() == together.topics.keys()
+    for topic in together.topics:
+        assert apart.payloads(topic) == together.payloads(topic), topic
+    assert apart.digest == together.digest
+
+
+def test_the_cases_do_what_they_are_named_after():
+    def flown(name):
+        scene, overrides, duration, script = CASES[name]
+        return fly(resolve(load(scene, [*overrides, f"run.duration={duration}"])), scripted(script) if script else None)
+
+    faults = flown("sensors that fail")
+    assert any(m.rejected for m in faults.messages("estimate"))
+    assert any(m.status.status < 0 for m in faults.messages("gps/fix"))
+    charge = flown("a battery runs down").column("battery", lambda m: m.percentage)
+    assert charge[-1] < charge[0]
+    operator = flown("an operator")
+    assert operator.messages("status")[-1].armed
+    assert [len(m.commands) for m in operator.messages("operator") if m.commands] == [2, 1]
+    bodies = flown("five bodies of which two break").messages("truth")
+    assert bodies[-1].rotor_speed[1] == pytest.approx(0.0, abs=1e-9)
+    assert bodies[-1].rotor_speed[3] == bodies[-1].rotor_thrust[3] == 0.0

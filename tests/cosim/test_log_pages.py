@@ -1,0 +1,256 @@
+"""Pages of columns give the log that single messages give."""
+
+import itertools
+import random
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Chunk, MessageIndex
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.writer import IndexType, Writer
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from cosim.log import LogReader, LogWriter
+from messages import Estimate, Imu, OperatorInput, Vector3, WallTime, header
+from messages.records import Record, stamp_columns
+
+TICK = 4_000_000  # [ns]
+
+
+def page(first, ticks=50):
+    """Parts of a page: the IMU at every tick; the estimate at every fifth, of varying size."""
+    rng = np.random.default_rng(first)
+    ticks = np.arange(first, first + ticks)
+    times = ticks * TICK
+    columns = {**stamp_columns(times), "linear_acceleration": rng.normal(size=(len(ticks), 3))}
+    imu = Record.of(Imu(header(0, "drone1/base_link"))).encode(len(ticks), columns)
+    parts = [("/drone1/imu", Imu, times, imu, ticks * 64 + 1)]
+    for rest, rejected in ((0, ()), (1, ("gps",)), (2, ("baro", "mag"))):
+        some = ticks[(ticks % 5 == 0) & (ticks % 3 == rest)]
+        sample = Estimate(header(0, "world"), rejected=rejected)
+        columns = {**stamp_columns(some * TICK), "velocity": rng.normal(size=(len(some), 3))}
+        parts.append(
+            ("/drone1/estimate", Estimate, some * TICK, Record.of(sample).encode(len(some), columns), some * 64)
+        )
+    return parts
+
+
+def single(parts):
+    """The messages of a page one by one, in their order: topic, class, payload, time."""
+    found = []
+    for topic, message, times, payloads, order in parts:
+        found += zip(order.tolist(), itertools.repeat((topic, message)), payloads, times.tolist(), strict=False)
+    return [(*names, payload.tobytes(), time) for _, names, payload, time in sorted(found, key=lambda item: item[0])]
+
+
+def write_pages(path, pages):
+    with LogWriter(path, {"seed": "7"}, {"scene.toml": b"a = 1\n"}) as log:
+        for parts in pages:
+            log.write_page(parts)
+    return log.metadata["digest"]
+
+
+def contents(path):
+    """What a reader of the mcap library finds: topic, type, time, sequence, payload in the file's order."""
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        return [
+            (channel.topic, schema.name, message.log_time, message.sequence, message.data)
+            for schema, channel, message in reader.iter_messages(log_time_order=False)
+        ]
+
+
+def test_pages_hold_what_single_messages_hold(tmp_path):
+    pages = [page(0), page(50), page(100, 7)]
+    digest = write_pages(tmp_path / "pages", pages)
+    with LogWriter(tmp_path / "single", {}, {}) as log:
+        for topic, message, payload, time_ns in itertools.chain(*map(single, pages)):
+            log.write(topic, message, payload, time_ns)
+    assert log.metadata["digest"] == digest
+    assert contents(tmp_path / "pages") == contents(tmp_path / "single")
+    with LogReader(tmp_path / "pages") as read, LogReader(tmp_path / "single") as other:
+        assert list(read.messages()) == list(other.messages())
+        assert read.digest() == digest
+
+
+def test_messages_of_a_page_stand_in_ascending_order_whatever_the_order_of_the_parts(tmp_path):
+    parts = page(0)
+    write_pages(tmp_path / "a", [parts])
+    random.Random(1).shuffle(parts)
+    shuffled = []
+    for topic, message, *columns in parts:
+        mixed = np.random.default_rng(2).permutation(len(columns[0]))
+        shuffled.append((topic, message, *[column[mixed] for column in columns]))
+    write_pages(tmp_path / "b", [shuffled])
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_pages_and_single_messages_stand_in_order_of_the_calls(tmp_path):
+    path = tmp_path / "mixed"
+    given = OperatorInput(header(50 * TICK, "")).encode()
+    with LogWriter(path, {}, {}) as log:
+        log.write("/drone1/operator", OperatorInput, given, 0)
+        log.write_page(page(0))
+        log.write("/drone1/operator", OperatorInput, given, 50 * TICK)
+        log.write("/drone1/imu", Imu, Imu().encode(), 50 * TICK)
+        log.write_page(page(51))
+    imu = [entry for entry in contents(path) if entry[0] == "/drone1/imu"]
+    assert [(time, sequence) for _, _, time, sequence, _ in imu] == [(k * TICK, k) for k in range(101)]
+    at = [k for k, entry in enumerate(contents(path)) if entry[0] == "/drone1/operator"]
+    assert at == [0, 1 + len(single(page(0)))]
+
+
+def test_every_page_is_a_chunk_whose_index_leads_to_each_message(tmp_path):
+    pages = [page(0), page(50)]
+    write_pages(tmp_path / "log", pages)
+    counts, current = [], b""
+    with open(tmp_path / "log", "rb") as file:
+        for record in StreamReader(file, emit_chunks=True).records:
+            if isinstance(record, Chunk):
+                stream, size = get_chunk_data_stream(record, validate_crc=True)
+                current = stream.read(size)
+                counts.append(0)
+            elif isinstance(record, MessageIndex):
+                counts[-1] += len(record.records)
+                for time_ns, offset in record.records:
+                    assert current[offset] == 5
+                    assert int.from_bytes(current[offset + 9 : offset + 11], "little") == record.channel_id
+                    assert int.from_bytes(current[offset + 15 : offset + 23], "little") == time_ns
+    assert counts == [len(single(parts)) for parts in pages]
+
+
+def test_other_tools_find_the_messages_of_a_page_by_time(tmp_path):
+    write_pages(tmp_path / "log.mcap", [page(0), page(50), page(100)])
+    expected = [entry[3] for parts in (page(0), page(50)) for entry in single(parts) if entry[0] == "/drone1/imu"][
+        40:70
+    ]
+    with open(tmp_path / "log.mcap", "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        found = list(reader.iter_decoded_messages(["/drone1/imu"], starting_at=40 * TICK, ending_before=70 * TICK))
+        assert [message.log_time for _, _, message, _ in found] == expected
+        stamps = [imu.header.stamp.sec * 10**9 + imu.header.stamp.nanosec for *_, imu in found]
+        assert stamps == expected
+    with AnyReader([tmp_path / "log.mcap"]) as reader:
+        wanted = [connection for connection in reader.connections if connection.topic == "/drone1/imu"]
+        found = list(reader.messages(wanted, start=40 * TICK, stop=70 * TICK))
+        assert [time_ns for _, time_ns, _ in found] == expected
+
+
+def test_the_same_pages_give_the_same_file_whatever_the_wall_clock_shows(tmp_path, monkeypatch):
+    files = []
+    for speed in (0.01, 3.0):
+        clock = itertools.count(0.0, speed)
+        monkeypatch.setattr("cosim.log.writer.time.monotonic", lambda clock=clock: next(clock))
+        write_pages(tmp_path / "log", [page(50 * k) for k in range(5)])
+        files.append((tmp_path / "log").read_bytes())
+    assert files[0] == files[1]
+
+
+def test_wall_time_messages_leave_the_chunks_of_pages_as_they_are(tmp_path):
+    def chunks(wall_times):
+        with LogWriter(tmp_path / "log", {}, {}) as log:
+            for k in range(4):
+                log.write_page(page(50 * k))
+                if k in wall_times:
+                    message = WallTime(header(0, ""), random.random())
+                    log.write("/wall_time", WallTime, message.encode(), 50 * k * TICK, deterministic=False)
+        with open(tmp_path / "log", "rb") as file:
+            found = StreamReader(file, emit_chunks=True).records
+            return [r.data for r in found if isinstance(r, Chunk) and r.message_end_time > r.message_start_time]
+
+    assert chunks([]) == chunks([0, 2]) == chunks([1, 3])
+
+
+def test_arrays_may_be_reused_after_the_call(tmp_path):
+    pages = [page(0), page(50)]
+    expected = write_pages(tmp_path / "a", pages)
+    with LogWriter(tmp_path / "b", {"seed": "7"}, {"scene.toml": b"a = 1\n"}) as log:
+        for parts in pages:
+            log.write_page(parts)
+            for _, _, times, payloads, order in parts:
+                times[:] = 0
+                payloads.view(np.uint8)[:] = 0
+                order[:] = 0
+    assert log.metadata["digest"] == expected
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_an_empty_page_is_no_chunk(tmp_path):
+    write_pages(tmp_path / "log", [[], page(0, 0)])
+    with LogReader(tmp_path / "log") as log:
+        assert list(log.messages()) == []
+        assert log.complete
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({2: -np.ones(50, np.int64)}, "/drone1/imu: time -1 ns is negative"),
+        ({2: np.zeros(49, np.int64)}, r"/drone1/imu: 50 payloads, times \(49,\), order \(50,\)"),
+        ({3: np.zeros((50, 8), np.uint8)}, "sensor_msgs/msg/Imu: payload starts with"),
+        ({3: np.concatenate([page(0)[0][3]] * 2)[:50]}, "sensor_msgs/msg/Imu: "),
+        ({3: np.zeros((50, 8))}, r"/drone1/imu: payloads are float64 \(50, 8\), expected uint8"),
+    ],
+)
+def test_pages_that_do_not_fit_are_refused(tmp_path, change, words):
+    part = [change.get(k, value) for k, value in enumerate(page(0)[0])]
+    with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match=words):
+        log.write_page([tuple(part)])
+
+
+def test_a_negative_time_of_a_single_message_is_refused(tmp_path):
+    with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match="/a: time -4 ns is negative"):
+        log.write("/a", Imu, Imu().encode(), -4)
+
+
+def test_a_full_disk_is_a_clear_error_for_pages():
+    with pytest.raises(ValueError, match="/dev/full: cannot write the log: No space left"):
+        write_pages("/dev/full", [page(0), page(50)])
+
+
+def test_history_of_a_topic(tmp_path):
+    pages = [page(0), page(50)]
+    write_pages(tmp_path / "log", pages)
+    with LogReader(tmp_path / "log") as log:
+        times, columns = log.history("/drone1/estimate")
+        estimates = [entry for parts in pages for entry in single(parts) if entry[1] is Estimate]
+        assert times.tolist() == [time_ns for *_, time_ns in estimates]
+        decoded = [Estimate.decode(payload) for _, _, payload, _ in estimates]
+        assert columns["velocity"].tolist() == [list(message.velocity) for message in decoded]
+        assert columns["rejected"] == [message.rejected for message in decoded]
+        both = log.histories()
+        assert both.keys() == {"/drone1/imu", "/drone1/estimate"}
+        assert both["/drone1/imu"][1]["linear_acceleration"].shape == (100, 3)
+        with pytest.raises(ValueError, match="has no topic /mag"):
+            log.history("/mag")
+
+
+def test_history_reads_only_the_chunks_of_its_topic(tmp_path):
+    path = tmp_path / "log"
+    with LogWriter(path, {}, {}) as log:
+        log.write_page([("/a", Vector3, np.zeros(1, int), Record.of(Vector3()).encode(1, {}), np.zeros(1, int))])
+        log.write_page(page(0))
+    data = bytearray(path.read_bytes())
+    at = data.index(b"\x28\xb5\x2f\xfd")  # of the first compressed chunk
+    data[at + 12] ^= 0xFF
+    path.write_bytes(data)
+    with LogReader(path) as log:
+        assert len(log.history("/drone1/imu")[0]) == 50
+        with pytest.raises(ValueError, match="damaged chunk"):
+            log.history("/a")
+
+
+def test_a_log_without_message_indexes_is_read_as_well(tmp_path):
+    path = tmp_path / "other.mcap"
+    with open(path, "wb") as file:
+        writer = Writer(file, index_types=IndexType.NONE)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", Imu.schema_text.encode())
+        channel = writer.register_channel("/imu", "cdr", schema)
+        for k in range(5):
+            writer.add_message(channel, k, Imu(header(k, "a")).encode(), k)
+        writer.finish()
+    with LogReader(path) as log:
+        assert log.history("/imu")[0].tolist() == [0, 1, 2, 3, 4]

@@ -1,0 +1,241 @@
+"""Whole runs: the same bits in every mode, and an orderly end whatever happens to the processes."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cosim.launcher import PARTICIPANT
+from cosim.log import LogReader
+from lapwing.runs.single import fly_single
+from messages import BodyStates
+from services.table import load, resolve
+
+SCENE = Path("scenes/hover.toml")
+SHORT = ["run.duration=2"]
+SERVICES = {"autopilot", "plant", "trajectory", "recorder"}  # of this scene
+END = 10.0  # [s] a generous bound on how long an end may take; the aim is 2 s
+STARTED = 120.0  # [s] a run gets to start, with kernels to compile
+
+
+def arguments(tmp_path, space, *more, overrides=()):
+    sets = [part for override in overrides for part in ("--set", override)]
+    command = [sys.executable, "-m", "lapwing", "run", str(SCENE), *sets, "--space", space]
+    return [*command, "--log", str(tmp_path / f"{space}.mcap"), *more]
+
+
+def single(tmp_path, *overrides):
+    """Digest of a flight in single mode."""
+    log = tmp_path / "single.mcap"
+    fly_single(resolve(load(SCENE, [*SHORT, *overrides])), log)
+    with LogReader(log) as read:
+        assert read.complete
+        assert read.digest() == read.metadata["digest"]
+        return read.digest()
+
+
+def processes(tmp_path, space, *overrides):
+    """Figures of a flight in processes, as `--json` gives them."""
+    result = tmp_path / f"{space}.json"
+    more = ["--json", str(result)]
+    subprocess.run(arguments(tmp_path, space, *more, overrides=[*SHORT, *overrides]), check=True, timeout=200)
+    return json.loads(result.read_text())
+
+
+class Running:
+    """A run in processes at real-time speed that has begun to fly; `children`: process ids by service."""
+
+    def __init__(self, tmp_path, space):
+        self.log = tmp_path / f"{space}.mcap"
+        self.launcher = subprocess.Popen(
+            arguments(tmp_path, space, "--speed", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        deadline = time.monotonic() + STARTED
+        while not self._recorded() > 100 and self.launcher.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert self.launcher.poll() is None, self.launcher.stderr.read()
+        pid = self.launcher.pid
+        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        commands = {int(child): Path(f"/proc/{child}/cmdline").read_text().split("\0") for child in found}
+        participants = {child: c for child, c in commands.items() if PARTICIPANT in c}
+        self.children = {c[c.index(PARTICIPANT) + 1]: child for child, c in participants.items()}
+        assert set(self.children) == SERVICES
+
+    def _recorded(self):
+        """How many messages the log holds; it is read while it grows."""
+        if not self.log.exists():
+            return 0
+        try:
+            with LogReader(self.log) as read:
+                return sum(1 for _ in read.messages())
+        except ValueError:
+            return 0
+
+    def end(self):
+        """Exit code and what was said on standard error; asserts that nothing is left but a readable log."""
+        _, said = self.launcher.communicate(timeout=STARTED)
+        self.assert_gone()
+        assert self._recorded() > 100
+        return self.launcher.returncode, said
+
+    def assert_gone(self):
+        deadline = time.monotonic() + END
+        while alive := [name for name, pid in self.children.items() if running(pid)]:
+            assert time.monotonic() < deadline, f"still there: {alive}"
+            time.sleep(0.05)
+
+    def whole(self):
+        """Whether the log has its end, and the digest in its metadata is right."""
+        with LogReader(self.log) as read:
+            return read.complete and read.digest() == read.metadata["digest"]
+
+    def kill(self):
+        for pid in [self.launcher.pid, *self.children.values()]:
+            if running(pid):
+                os.kill(pid, signal.SIGKILL)
+        self.launcher.communicate()
+
+
+def running(pid):
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"  # ended, and not collected by a parent that is gone
+
+
+@pytest.fixture
+def started(tmp_path):
+    if not Path("/proc/self/task").exists():
+        pytest.skip("finds processes in /proc")
+    runs = []
+
+    def start(space):
+        runs.append(Running(tmp_path, space))
+        return runs[-1]
+
+    yield start
+    for run in runs:
+        run.kill()
+
+
+def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
+    alone = single(tmp_path)  # first: it compiles what the processes then load
+    first, second = (processes(tmp_path, space) for space in ("test-first", "test-second"))
+    assert first["digest"] == second["digest"] == alone
+    assert first["sim_time_s"] == pytest.approx(2.0)
+    assert (first["scene"], first["seed"], first["mode"]) == ("hover", 1, "processes")
+    assert set(first["rmse"]) == {"x", "y", "z", "roll", "pitch", "yaw"}
+    with LogReader(tmp_path / "test-first.mcap") as log:
+        assert log.digest() == first["digest"]
+        assert log.attachments["scene.toml"] == SCENE.read_bytes()
+
+
+def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_path):
+    broken = ", ".join(
+        f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, becomes="{fate}"}}'
+        for k, fate in enumerate(("locked", "free", "torn_off"))
+    )
+    bodies = ["vehicle.model=multibody", f"multibody.event=[{broken}]"]
+    alone = single(tmp_path, *bodies)
+    assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
+    with LogReader(tmp_path / "test-broken.mcap") as log:
+        told = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/bodies"])]
+        assert b"torn_off" in log.attachments["setup.json"]
+    assert told[60].force[3].z != 0.0
+    assert told[-1].force[3].z == 0.0
+
+
+def test_another_seed_gives_other_bits(tmp_path):
+    wind = "effects.wind_random={mean=[1.0, 0.0, 0.0], sigma=0.5}"
+    assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
+    assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
+
+
+IDLE = [
+    "effects.payload={}",  # kept
+    "effects.rotor_damage={rotor=1,time=100.0}",  # after the end
+    "effects.wind_gust={peak=[9.0,0.0,0.0],start=100.0,duration=1.0}",
+]
+
+
+def test_effects_that_have_nothing_to_do_leave_every_recorded_bit(tmp_path):
+    """The same log as if they had never been named, the random wind of another effect included."""
+    windy = single(tmp_path, "effects.wind_random={}")
+    assert single(tmp_path, "effects.wind_random={}", *IDLE) == windy
+    assert single(tmp_path) != windy
+
+
+def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
+    parallel = single(tmp_path, "exchange.coupling=parallel")
+    assert processes(tmp_path, "test-parallel", "exchange.coupling=parallel")["digest"] == parallel
+    assert parallel != single(tmp_path)
+
+
+def assert_space_is_taken(run, tmp_path):
+    """A second run on the key space of one that flies is refused, and the first flies on."""
+    space, other = run.log.stem, tmp_path / "other.mcap"
+    command = arguments(tmp_path, space, "--log", str(other))
+    second = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
+    assert second.returncode == 2
+    assert second.stderr.startswith(f"lapwing: --space {space}: another run uses this key space")
+    assert not other.exists()
+    assert run.launcher.poll() is None
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_all_processes_and_completes_the_log(started, tmp_path, number, code):
+    run = started(f"test-{number.name}")
+    if number == signal.SIGINT:
+        assert_space_is_taken(run, tmp_path)
+    asked = time.monotonic()
+    run.launcher.send_signal(number)
+    assert run.end() == (code, f"lapwing: ended by {number.name}\n")
+    assert time.monotonic() - asked < END
+    assert run.whole()
+
+
+@pytest.mark.parametrize("victim", ["plant", "recorder"])
+def test_a_service_that_dies_is_named_and_ends_the_run(started, victim):
+    run = started(f"test-dead-{victim}")
+    os.kill(run.children[victim], signal.SIGKILL)
+    code, said = run.end()
+    assert code == 1
+    assert said.startswith(f"lapwing: {victim} ended unexpectedly (signal 9) at t = ")
+    assert said.count("\n") == 1
+    assert run.whole() == (victim != "recorder")
+
+
+def test_a_service_that_freezes_is_named_and_ends_the_run(started):
+    run = started("test-frozen")
+    os.kill(run.children["autopilot"], signal.SIGSTOP)
+    code, said = run.end()
+    assert code == 1
+    assert said.startswith("lapwing: autopilot: no answer since ")
+    assert said.count("\n") == 1
+    assert run.whole()
+
+
+def test_services_end_by_themselves_when_the_launcher_is_killed(started):
+    run = started("test-orphans")
+    run.launcher.kill()
+    run.assert_gone()
+    assert run.whole()
+
+
+def test_a_service_that_cannot_start_for_a_reason_that_the_user_can_mend(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        command = arguments(tmp_path, "test-door", "--open", door)
+        result = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
+    assert result.returncode == 2
+    assert result.stderr.startswith("lapwing: router: cannot listen on tcp/127.0.0.1:")
+    assert door in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "test-door.mcap").exists()

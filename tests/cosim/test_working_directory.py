@@ -1,0 +1,17 @@
+"""What lies in the working directory is not imported, whatever it is called."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+LAPWING = Path(sys.executable).with_name("lapwing")
+
+
+def test_folders_of_our_packages_names_in_the_working_directory_do_no_harm(tmp_path):
+    for name in ("messages", "services", "cosim", "dynamics", "numpy"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise SystemExit('imported from the working directory')\n")
+    command = [LAPWING, "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--space", "test-directory"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "digest" in result.stdout

@@ -1,0 +1,30 @@
+"""The pages that are made from the code are what the code gives, and links between pages lead somewhere."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from lapwing.docs.reference import reference
+from lapwing.docs.schema import SCHEMAS
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_scene_reference_is_current():
+    assert (DOCS / "reference.md").read_text() == reference(), "lapwing docs reference --out docs/reference.md"
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_schemas_are_current(kind):
+    path = DOCS / f"{kind}.schema.json"
+    assert json.loads(path.read_text()) == SCHEMAS[kind](), f"lapwing docs schema --of {kind} --out docs/{path.name}"
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    text = re.sub(r"```.*?```|`[^`\n]*`|\$[^$\n]*\$", "", page.read_text(), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not target.startswith(("http", "#")):
+            assert (page.parent / target.partition("#")[0]).exists(), target

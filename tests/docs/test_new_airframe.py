@@ -1,0 +1,42 @@
+"""The guide to a new airframe: its example is sound, and what it computes is what stands in the example."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from dynamics.vehicles import performance
+from dynamics.vehicles.airframe import Airframe, Propeller
+from dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.docs.schema import airframe_schema
+from services.table import load
+
+PAGE = (Path(__file__).parents[2] / "docs/new_airframe.md").read_text()
+EXAMPLE = tomllib.loads(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])
+
+
+def test_the_example_is_valid_and_a_scene_takes_it(tmp_path):
+    jsonschema.Draft7Validator(airframe_schema()).validate(EXAMPLE)
+    path = tmp_path / "my_quad.toml"
+    path.write_text(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])
+    assert load("hover", {"vehicle.airframe": str(path)}).lookup("airframe.mass.total") == 2.0
+
+
+def test_the_thrust_stand_gives_the_propeller_of_the_example():
+    names: dict = {}
+    exec(re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1], names)
+    assert names["lift_correction"] == pytest.approx(EXAMPLE["propeller"]["lift_correction"], abs=5e-5)
+    assert names["zero_lift_drag"] == pytest.approx(EXAMPLE["propeller"]["zero_lift_drag"], abs=5e-6)
+    met = Propeller(**EXAMPLE["propeller"])
+    assert thrust_coefficient(met) == pytest.approx(names["C_T"], rel=1e-3)
+    assert torque_coefficient(met) == pytest.approx(names["C_M"], rel=1e-3)
+
+
+def test_the_example_could_fly():
+    vehicle = Airframe.model_validate(EXAMPLE)
+    assert 1.8 < performance.highest_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
+    assert performance.trim(vehicle).thrust == pytest.approx(2.0 * 9.80665 / 4.0)
+    assert 10.0 < performance.hover_time(vehicle) / 60.0 < 30.0
+    assert performance.highest_speed(vehicle) > 8.0

@@ -1,0 +1,34 @@
+"""The tutorial's blocks run in order as they stand there, in an empty folder."""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+import lapwing
+
+PAGE = (Path(__file__).parents[2] / "docs/tutorial.md").read_text()
+BLOCKS = re.findall(r'```python(?: title="(.*?)")?\n(.*?)```', PAGE, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))  # as of a script that lies there
+    before = matplotlib.get_backend()
+    matplotlib.use("Agg")
+    yield tmp_path
+    matplotlib.use(before)
+
+
+def test_the_tutorial_runs(folder):
+    assert callable(lapwing.fly)
+    assert len(BLOCKS) > 10
+    names: dict = {}
+    for title, block in BLOCKS:
+        if title:
+            (folder / title).write_text(block)
+        else:
+            exec(compile(block, "docs/tutorial.md", "exec"), names)
+    assert {path.name for path in folder.iterdir()} >= {"flights.png", "windy.mcap", "windy.html"}

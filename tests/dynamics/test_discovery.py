@@ -1,0 +1,67 @@
+"""Discovery: the modules of a folder by name, and one error for every name that is not there."""
+
+import sys
+
+import pytest
+
+from dynamics import discovery
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    folder = tmp_path / "discovered"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "second.py").write_text("VALUE = 2")
+    (folder / "first.py").write_text("VALUE = 1")
+    (folder / "_private.py").write_text("raise RuntimeError")
+    (folder / "broken.py").write_text("import nothing_of_that_name")
+    monkeypatch.syspath_prepend(tmp_path)
+    discovery._names.cache_clear()
+    discovery._module.cache_clear()
+    yield "discovered"
+    for name in [n for n in sys.modules if n.partition(".")[0] == "discovered"]:
+        del sys.modules[name]
+    discovery._names.cache_clear()
+    discovery._module.cache_clear()
+
+
+def test_names_are_sorted_and_private_modules_left_out(package):
+    assert discovery.names(package) == ["broken", "first", "second"]
+
+
+def test_one_module_is_imported_without_the_others(package):
+    assert discovery.get(package, "first", "thing").VALUE == 1
+    assert "discovered.second" not in sys.modules
+
+
+def test_all_modules_come_by_name(package, tmp_path):
+    (tmp_path / package / "broken.py").write_text("VALUE = 0")
+    found = discovery.modules(package)
+    assert [(name, m.VALUE) for name, m in found.items()] == [("broken", 0), ("first", 1), ("second", 2)]
+    assert discovery.modules(sys.modules[package]) == found
+
+
+def test_a_module_that_cannot_be_imported_says_so(package):
+    with pytest.raises(ImportError, match="nothing_of_that_name"):
+        discovery.modules(package)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("frist", "unknown thing 'frist'; did you mean first? (things: broken, first, second)"),
+        ("zebra", "unknown thing 'zebra' (things: broken, first, second)"),
+        ("_private", "unknown thing '_private' (things: broken, first, second)"),
+    ],
+)
+def test_an_unknown_name_lists_the_choices(package, name, message):
+    with pytest.raises(ValueError) as raised:
+        discovery.get(package, name, "thing")
+    assert str(raised.value) == message
+
+
+def test_a_mapping_is_chosen_from_alike():
+    assert discovery.choose({"a": 1}, "a", "preset") == 1
+    with pytest.raises(ValueError, match=r"unknown preset 'b' \(presets: a\)"):
+        discovery.choose({"a": 1}, "b", "preset")

@@ -1,0 +1,38 @@
+"""Functions made from text: the same in Python as compiled, one for each combination of argument types."""
+
+from numba.core import types
+
+from dynamics.generate import define, each, each_index, generated
+from dynamics.kernel import kernel, leaf
+
+
+@leaf
+def weighted(k, x, y):
+    return k * x + y
+
+
+@leaf
+def taken(x, y, i):
+    return x[i] - y[i]
+
+
+def _first(x):
+    return define("first(x)", {}, "return x[0]" if isinstance(x, types.BaseTuple) else "return x")
+
+
+first = generated("first(x)", _first, "The first number.")
+
+
+@kernel
+def all_of(x, y):
+    return each(weighted, 2.0, x, y), each_index(taken, x, x, y), first(x), first(x[1])
+
+
+def test_defines_a_function_of_several_lines():
+    assert define("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
+
+
+def test_compiled_and_uncompiled_are_the_same():
+    x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
+    assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
+    assert (first.__name__, first.__doc__) == ("first", "The first number.")

@@ -1,0 +1,66 @@
+"""The autopilot in Rust takes part in the lock step: built and flown where cargo is there."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosim.launcher import loopback_endpoints
+from lapwing.flight import Flight
+from lapwing.runs.refly import refly
+
+CRATE = Path("examples/rust_controller")
+SCENE = "examples/rust_mission.toml"
+SHORT = ["--set", "run.duration=8.0"]
+
+
+@pytest.fixture(scope="module")
+def program():
+    """The built program."""
+    if shutil.which("cargo") is None:
+        pytest.skip("cargo is not there")
+    if subprocess.run(["cargo", "fetch", "--locked"], cwd=CRATE, check=False, capture_output=True).returncode:
+        pytest.skip("the crates cannot be fetched")
+    subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=CRATE, check=True)
+    return Path(os.environ.get("CARGO_TARGET_DIR", CRATE / "target")) / "release" / "rust_controller"
+
+
+def lapwing(*arguments):
+    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, timeout=300)
+
+
+def fly(program, tmp_path, log, *more):
+    layout, (endpoint,) = tmp_path / "layout.json", loopback_endpoints(["autopilot"]).values()
+    assert lapwing("protocol", SCENE, *SHORT, "--json", str(layout)).returncode == 0
+    own = subprocess.Popen([program, layout, endpoint, "test-rust"])
+    try:
+        where = ["--external", f"autopilot={endpoint}", "--space", "test-rust", "--log", str(log)]
+        return lapwing("run", SCENE, *SHORT, *where, "--json", str(log.with_suffix(".json")), *more), own.wait(10)
+    finally:
+        own.kill()
+
+
+def test_it_flies_to_the_same_digest_twice(program, tmp_path):
+    digests = []
+    for log in (tmp_path / "first.mcap", tmp_path / "second.mcap"):
+        run, ended = fly(program, tmp_path, log)
+        assert run.returncode == 0, run.stderr
+        assert ended == 0
+        digests.append(json.loads(log.with_suffix(".json").read_text())["digest"])
+    assert digests[0] == digests[1]
+    flight = Flight.read(tmp_path / "first.mcap")
+    assert flight.rmse["z"] < 0.2
+    assert flight.truth["pose.position"][-1, 2] > 4.0
+    assert flight.topic("status")["armed"][-1]
+    with pytest.raises(ValueError, match="cannot be flown again: autopilot was a program of somebody else's"):
+        refly(tmp_path / "first.mcap")
+
+
+def test_another_scene_than_the_others_is_refused(program, tmp_path):
+    run, _ = fly(program, tmp_path, tmp_path / "log.mcap", "--set", "run.seed=3")
+    assert run.returncode == 2
+    assert "seed is 3 here, 1 for autopilot: resolve the same scene" in run.stderr

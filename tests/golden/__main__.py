@@ -1,0 +1,68 @@
+"""Check the digests of all shipped scenes, or of those named; or write down what they are now."""
+
+import argparse
+import sys
+
+from cosim.graph import Graph
+from cosim.single import PAGE
+from services.processes import create_all
+from tests.cosim.memory_log import MemoryLog
+from tests.golden import digests, sample
+from tests.golden.cases import CASES
+from tests.golden.digests import BEGINNING, Golden
+
+
+def fly(name: str) -> tuple[MemoryLog, str]:
+    """The whole flight of a case, and the digest of its beginning."""
+    setup = CASES[name].resolve()
+    log, graph, beginning = MemoryLog(setup), Graph(setup, create_all(setup), PAGE), ""
+    stops = [round(BEGINNING * setup.rate) + 1, *range(PAGE, setup.last_tick + 1 + PAGE, PAGE)]
+    for stop in sorted(stops):
+        first = graph.tick
+        graph.advance(min(stop, setup.last_tick + 1))
+        log.write(graph.pages(first, graph.tick), graph.tick - 1)
+        if stop == stops[0]:
+            beginning = log.digest
+        if graph.ended:
+            break
+    return log, beginning
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m tests.golden", description=__doc__)
+    parser.add_argument("scenes", metavar="SCENE", nargs="*", help=f"one of {', '.join(CASES)}; all if none is named")
+    parser.add_argument("--update", action="store_true", help="write down what they are now")
+    parser.add_argument("--reason", default="", help="why they change, for the file")
+    given = parser.parse_args()
+    for name in given.scenes:
+        if name not in CASES:
+            parser.error(f"unknown scene {name}; expected one of {', '.join(CASES)}")
+    if given.update and not given.reason:
+        parser.error("--update needs a --reason")
+    changed = [name for name in given.scenes or CASES if not _check(name, given.update, given.reason)]
+    print(f"{len(changed)} changed" if changed else "all as they were")
+    return 1 if changed and not given.update else 0
+
+
+def _check(name: str, update: bool, reason: str) -> bool:
+    known = digests.read() if digests.FILE.exists() else {}
+    log, beginning = fly(name)
+    digest, path = log.digest, digests.sample_file(name)
+    if name in known and known[name][:2] == (digest, beginning) and path.exists():
+        print(f"{name}: {digest}", flush=True)
+        return True
+    print(f"{name}: {digest}, was {known[name].digest if name in known else 'not known'}")
+    if path.exists():
+        for line in sample.first_difference(sample.read(path), log):
+            print(f"  {line}")
+    sys.stdout.flush()
+    if update:
+        path.parent.mkdir(exist_ok=True)
+        sample.write(path, sample.take(log))
+        digests.write({**known, name: Golden(digest, beginning, reason)})
+    return False
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,28 @@
+"""The flights whose digests are kept: every shipped scene, and a plan."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from cosim.setup import Setup
+from services.common import plan
+from services.table import load, resolve
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+class Case(NamedTuple):
+    """One flight."""
+
+    scene: Path
+    overrides: tuple[str, ...] = ()
+    plan: Path | None = None
+
+    def resolve(self) -> Setup:
+        """The set-up of the flight."""
+        commands = tuple(plan.read(self.plan)) if self.plan else ()
+        return resolve(load(self.scene, list(self.overrides)), commands)
+
+
+OVERRIDES = {"groundstation": ("run.duration=5.0",)}  # of scenes that fly until they are stopped
+CASES = {path.stem: Case(path, OVERRIDES.get(path.stem, ())) for path in sorted(SCENES.glob("*.toml"))}
+CASES["delivery.plan"] = Case(SCENES / "groundstation.toml", tuple(plan.OPERATED), SCENES / "plans" / "delivery.plan")

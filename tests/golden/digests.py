@@ -1,0 +1,41 @@
+"""The digests that are kept, one file: of each case, of the whole flight and of its beginning."""
+
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+FOLDER = Path(__file__).parent
+FILE = FOLDER / "digests.toml"
+BEGINNING = 1.0  # [s]
+HEAD = "# Digests of the shipped scenes; `python -m tests.golden` checks them, `--update` writes this file.\n"
+
+
+class Golden(NamedTuple):
+    """What a case's flight must come to."""
+
+    digest: str  # of the whole flight
+    beginning: str  # of the first BEGINNING s
+    reason: str  # why it is what it is
+
+
+def read() -> dict[str, Golden]:
+    """All of the file."""
+    return {name: Golden(**table) for name, table in tomllib.loads(FILE.read_text(encoding="utf-8")).items()}
+
+
+def write(known: dict[str, Golden]) -> None:
+    """Put the file anew."""
+    tables = []
+    for name, golden in sorted(known.items()):
+        entries = [f"{key} = {_text(value)}" for key, value in golden._asdict().items()]
+        tables.append("\n".join([f'["{name}"]', *entries]) + "\n")
+    FILE.write_text("\n".join([HEAD, *tables]), encoding="utf-8")
+
+
+def sample_file(name: str) -> Path:
+    """Where the sample of a case's flight is."""
+    return FOLDER / "samples" / f"{name}.mcap"
+
+
+def _text(value: str) -> str:
+    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,0 +1,79 @@
+"""Shipped scenes fly to the digests that are kept: a few of them whole, all the others at their beginning."""
+
+import pytest
+
+from tests.cosim.memory_log import fly
+from tests.golden import digests, sample
+from tests.golden.cases import CASES
+
+WHOLE = {"gyrostat_blocked", "os4_motors", "cooperative_load", "hover"}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_scene_flies_to_its_digest(name):
+    golden, setup = digests.read()[name], CASES[name].resolve()
+    whole = name in WHOLE
+    log = fly(setup, last=None if whole else round(digests.BEGINNING * setup.rate))
+    if log.digest != (golden.digest if whole else golden.beginning):
+        found = sample.first_difference(sample.read(digests.sample_file(name)), log, whole)
+        pytest.fail("\n".join(["not the digest that is kept; `python -m tests.golden` tells more", *found]))
+
+
+def test_every_case_is_kept_and_says_why():
+    known = digests.read()
+    assert known.keys() == CASES.keys()
+    for name, golden in known.items():
+        assert golden.reason
+        assert digests.sample_file(name).stat().st_size < 100_000
+
+
+@pytest.fixture(scope="module")
+def flown():
+    return fly(CASES["os4_motors"].resolve(), last=300)
+
+
+class Changed:
+    """A flight with some of its payloads changed: {(topic, number): payload}."""
+
+    def __init__(self, flown, changes):
+        self.setup, self.topics, self._flown, self._changes = flown.setup, flown.topics, flown, changes
+
+    def payloads(self, name):
+        return [(t, self._changes.get((name, i), p)) for i, (t, p) in enumerate(self._flown.payloads(name))]
+
+
+def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
+    sample.write(tmp_path / "sample.mcap", sample.take(flown))
+    kept = sample.read(tmp_path / "sample.mcap")
+    assert sample.first_difference(kept, flown) == []
+    truth, number = flown.messages("truth"), 156  # one of those that are kept
+    speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
+    later = {("truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
+    began, field = sample.first_difference(kept, Changed(flown, later))
+    before, at = (t * flown.setup.interval for t in (number - 1, number + 1))
+    assert began.startswith(f"/{flown.setup.vehicle}/truth: differs first, after t = ")
+    after, until = (float(part.split(" s")[0]) for part in began.split("t = ")[1:])
+    assert after <= before < until <= at
+    old = truth[number].rotor_speed[0]
+    assert f"rotor_speed.0 was {old!r}, is {old + 0.25!r}, by 0.25" in field
+
+
+def test_a_flight_cut_short_differs_nowhere(flown):
+    kept = sample.take(flown)
+    short = fly(flown.setup, last=217)
+    assert sample.first_difference(kept, short, whole=False) == []
+    assert any("differs first" in line for line in sample.first_difference(kept, short))
+
+
+def test_a_single_message_between_those_kept_is_found_too(flown):
+    message = flown.messages("truth")[151]._replace(air_density=7.0).encode()
+    (began,) = sample.first_difference(sample.take(flown), Changed(flown, {("truth", 151): message}))
+    assert "truth: differs first" in began
+
+
+def test_topics_that_come_and_go_are_named(flown):
+    kept = sample.take(flown)
+    gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/truth"], **kept}
+    assert sample.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
+    del kept["/tf"]
+    assert sample.first_difference(kept, flown) == ["/tf: this topic is new"]

@@ -1,0 +1,33 @@
+"""`lapwing` called as its command, in this process."""
+
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from lapwing.cli import main as cli
+
+ROOT = Path.cwd()
+
+
+@pytest.fixture
+def lapwing(monkeypatch, tmp_path, capfd):
+    """Calls `lapwing` in an empty folder with the scenes in it: exit code, standard output, standard error."""
+    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    monkeypatch.chdir(tmp_path)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["lapwing", *map(str, arguments)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as end:
+            code = end.code
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    yield call
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

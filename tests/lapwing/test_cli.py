@@ -1,0 +1,176 @@
+"""The command line: one line for every mistake, exit code 2, and nothing left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosim.launcher import key_space
+from dynamics.kernel import kernel
+from lapwing.runs import single
+from lapwing.runs.compiling import NOTICE, told
+
+ROOT = Path.cwd()
+HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
+PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
+
+
+BAD = {
+    "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
+    "unknown table": ([HOVER, "--set", "runn.seed=1"], "unknown table 'runn'; did you mean run?"),
+    "wrong type": ([HOVER, "--set", "run.seed=x"], "--set run.seed: expected a whole number at least 0 and"),
+    "negative rate": ([HOVER, "--set", "exchange.rate=-250"], "exchange.rate: expected a whole number above 0 and"),
+    "rates": ([HOVER, "--set", "rates.pose=33"], "expected a rate that divides exchange.rate"),
+    "step": ([HOVER, "--set", "solver.step=0.003"], "expected a step that divides the exchange interval"),
+    "integrator": ([HOVER, "--set", "solver.integrator=rk5"], "unknown integrator 'rk5'; did you mean rk"),
+    "effect": ([HOVER, "--set", "effects.gravty={}"], "effects.gravty: unknown effect 'gravty'; did you"),
+    "effect's key": ([HOVER, "--set", "effects.gravity.g=3"], "effects.gravity.g"),
+    "vehicle": ([HOVER, "--set", "vehicle.airframe=x"], "vehicle.airframe: unknown airframe 'x'; expected one of"),
+    "gain set": ([HOVER, "--set", "autopilot.gains=x"], "unknown gain set 'x'; expected one of"),
+    "sensor": ([DELIVERY, "--set", "sensors.imuu={}"], "unknown sensor 'imuu'; did you mean imu? expected"),
+    "preset": ([DELIVERY, "--set", "sensors.imu.preset=x"], "unknown preset 'x'; expected one of"),
+    "no value": ([HOVER, "--set", "run.seed"], "--set run.seed: expected KEY=VALUE"),
+    "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
+    "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),
+    "missing file": (["scenes/hovr.toml"], "scenes/hovr.toml: no such file or directory; did you mean scenes/hover"),
+    "folder": (["scenes"], "scenes: is a folder; expected a scene file"),
+    "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: no such file or directory"),
+    "log is a folder": ([HOVER, "--log", "scenes"], "scenes: is a folder"),
+    "log is the scene": ([HOVER, "--log", HOVER], "is the same file as SCENE"),
+    "json": ([HOVER, "--json", "none/a.json"], "none/a.json: cannot be written: no such file or directory"),
+    "json is the log": ([HOVER, "--json", "a", "--log", "a"], "--json a: is the same file as --log"),
+    "speed 0": ([HOVER, "--speed", "0"], "--speed 0: expected a number above 0, or max"),
+    "speed nan": ([HOVER, "--speed", "nan"], "--speed nan: expected a number above 0, or max"),
+    "speed fast": ([HOVER, "--speed", "fast"], "--speed fast: expected a number above 0, or max"),
+    "mode": ([HOVER, "--mode", "both"], "--mode both: expected processes or single"),
+    "no network": ([HOVER, "--mode", "single", "--peers", PEERS], "--mode single: has no network"),
+    "empty peers": ([HOVER, "--peers", ""], "--peers : expected name=endpoint,..."),
+    "peers": ([HOVER, "--peers", "x"], "--peers x: expected name=endpoint,..."),
+    "peers' endpoint": ([HOVER, "--peers", "plant=x"], "--peers x: expected an endpoint protocol/address:port"),
+    "too few peers": ([HOVER, "--peers", PEERS], "no endpoint for trajectory, recorder, mission"),
+    "door": ([HOVER, "--open", "x"], "--open x: expected an endpoint protocol/address:port"),
+    "option": ([HOVER, "--lgo", "x"], "No such option: --lgo"),
+    "no scene": ([], "Missing argument 'SCENE'"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "expected"), BAD.values(), ids=BAD)
+def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
+    code, out, err = lapwing("run", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("lapwing: ")
+    assert err.count("\n") == 1
+    assert expected in err
+    assert os.listdir() == ["scenes"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["check", "scenes/none.toml"], "no such file"),
+        (["warm", "scenes/none.toml"], "no such file"),
+        (["scenes", "none"], "none: no scenes there"),
+        (["report", "none.mcap"], "none.mcap"),
+        (["replay", "none.mcap"], "none.mcap"),
+        (["service", "plnt", HOVER, "--peers", PEERS], "unknown service plnt; expected one of"),
+        (["service", "sensors", HOVER, "--peers", PEERS], "no endpoint for sensors itself"),
+        (["service", "plant", HOVER, "--peers", PEERS, "--space", "a b"], "--space a b: expected letters"),
+        (["fly"], "No such command 'fly'"),
+    ],
+)
+def test_other_commands_do_the_same(lapwing, arguments, expected):
+    code, out, err = lapwing(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("lapwing: ")
+    assert err.count("\n") == 1
+    assert expected in err
+    assert os.listdir() == ["scenes"]
+
+
+@pytest.mark.parametrize("space", ["", "a b", "a/*", "/a", "a/", "$x", "ä"])
+def test_what_cannot_be_part_of_a_zenoh_key_is_no_key_space(space):
+    with pytest.raises(ValueError, match="--space"), key_space(space):
+        pass
+
+
+def test_a_refused_run_takes_the_folder_of_recordings_away_again(lapwing):
+    with key_space("test-cli"):
+        code, _, err = lapwing("run", HOVER, "--space", "test-cli")
+    assert code == 2
+    assert err.startswith("lapwing: --space test-cli: another run uses this key space")
+    assert os.listdir() == ["scenes"]
+
+
+def test_a_signal_while_kernels_compile_ends_the_run_at_once(lapwing, monkeypatch):
+    monkeypatch.setattr(single, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
+    code, out, err = lapwing("run", HOVER, "--mode", "single")
+    assert (code, out, err) == (143, "", "lapwing: ended by SIGTERM\n")
+    assert os.listdir() == ["scenes"]
+
+
+def test_compiling_is_said_once_and_only_where_something_compiles():
+    said = []
+    with told(said.append):
+        pass
+    assert said == []
+
+    @kernel
+    def half(x):
+        return 0.5 * x
+
+    with told(said.append):
+        assert half(1.0) == 0.5
+        assert half(2) == 1.0
+    assert said == [NOTICE]
+
+
+def test_version(lapwing):
+    code, out, err = lapwing("--version")
+    assert (code, err) == (0, "")
+    assert out.startswith("lapwing ")
+
+
+def test_without_a_command_the_help_is_shown(lapwing):
+    code, out, _ = lapwing()
+    assert code == 0
+    for command in ("run", "scenes", "check", "warm", "report", "replay"):
+        assert f"\n  {command} " in out
+
+
+def test_scenes_are_listed_a_line_each_broken_ones_too(lapwing, tmp_path):
+    (tmp_path / "broken.toml").write_text("[run]\n")
+    code, out, _ = lapwing("scenes")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == sorted(p.stem for p in Path("scenes").glob("*.toml"))
+    assert "hover: up 1 m" in out
+    _, out, _ = lapwing("scenes", "scenes")
+    assert [line.split()[0] for line in out.splitlines()] == sorted(map(str, Path("scenes").glob("*.toml")))
+    _, out, _ = lapwing("scenes", ".")
+    assert (
+        out
+        == "broken.toml  (broken: broken.toml:1: run.duration: missing; expected a number above 0 and at most 1e+06)\n"
+    )
+
+
+def test_check_tells_what_flies(lapwing):
+    code, out, _ = lapwing("check", HOVER)
+    assert code == 0
+    assert out.splitlines() == [
+        f"{HOVER}: ok",
+        "  title     hover: up 1 m, hold 3 s, down; true state, no wind",
+        "  vehicle   drone1, delivery_drone",
+        "  effects   gravity, ground_contact, rotor_thrust",
+        "  sensors   none",
+        "  services  plant, trajectory, autopilot; 250 Hz, sequential",
+    ]
+
+
+def test_the_command_itself_shows_no_traceback():
+    command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 2
+    assert result.stderr.startswith("lapwing: scenes/none.toml: no such file")
+    assert result.stderr.count("\n") == 1

@@ -1,0 +1,37 @@
+"""Stepping a vehicle by hand: free fall, hovering thrust, setpoints, and the same bits after a reset."""
+
+import pytest
+
+from lapwing.simulator import Simulator
+from services.common.ports import Reference
+
+STILL = {"autopilot.estimator": "truth"}
+
+
+def test_without_voltage_in_the_air_it_falls_as_galileo_says():
+    sim = Simulator("hover", {"effects": {"gravity": {}, "rotor_thrust": {}}}, seed=1)
+    seen = sim.step(motor_voltages=(0.0,) * 4, ticks=251)
+    start = sim.setup.services["plant"].parameters.start.vehicle.motion.position_world[2]
+    assert seen.time == pytest.approx(1.0)
+    assert seen.truth.position_world[2] - start == pytest.approx(-0.5 * 9.80665, rel=1e-3)
+
+
+def test_a_setpoint_is_followed_and_a_reset_gives_the_same_bits():
+    sim = Simulator("hover", STILL)
+    up = Reference(position_world=(0.0, 0.0, 1.5))
+    first = sim.step(setpoint=up, ticks=1500)
+    assert first.truth.position_world[2] == pytest.approx(1.5, abs=0.1)
+    assert sim.reset().step(setpoint=up, ticks=1500) == first
+
+
+def test_what_cannot_be_is_refused():
+    sim = Simulator("hover")
+    with pytest.raises(ValueError, match="and not both"):
+        sim.step()
+    sim.step(motor_voltages=(0.0,) * 4)
+    with pytest.raises(ValueError, match="as before"):
+        sim.step(setpoint=Reference())
+    with pytest.raises(ValueError, match="expected 4 of them, got 3"):
+        sim.step(motor_voltages=(0.0,) * 3)
+    with pytest.raises(ValueError, match="nobody steers"):
+        Simulator("gyrostat_blocked")

@@ -1,0 +1,42 @@
+"""The parts of the commander import one way, and a mode is a module that the table names."""
+
+import ast
+from graphlib import TopologicalSorter
+from importlib import import_module
+from pathlib import Path
+
+from services.autopilot import commander
+from services.autopilot.commander.mode_table import MODES
+
+FOLDER, PACKAGE = Path(commander.__file__).parent, commander.__name__
+
+
+def modules():
+    """File by module name."""
+    names = {path: [PACKAGE, *path.relative_to(FOLDER).with_suffix("").parts] for path in FOLDER.rglob("*.py")}
+    return {".".join(parts).removesuffix(".__init__"): path for path, parts in names.items()}
+
+
+def imported(path, known):
+    """Modules of the package that a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield from {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)} & known
+        elif isinstance(node, ast.Import):
+            yield from {alias.name for alias in node.names} & known
+
+
+def test_no_import_cycle_and_nobody_below_knows_the_commander():
+    found = modules()
+    graph = {name: set(imported(path, set(found))) - {name} for name, path in found.items()}
+    order = list(TopologicalSorter(graph).static_order())  # CycleError names a cycle
+    assert len(order) == len(found) > 20
+    assert [name for name in graph if f"{PACKAGE}.commander" in graph[name]] == []
+    for name in graph:
+        if name.startswith(f"{PACKAGE}.modes"):
+            assert f"{PACKAGE}.state" not in graph[name]
+
+
+def test_every_module_of_a_mode_is_in_the_table():
+    found = [import_module(name) for name in modules() if name.startswith(f"{PACKAGE}.modes.")]
+    assert {m.NAME: m.Mode for m in found if hasattr(m, "NAME")} == MODES

@@ -1,0 +1,81 @@
+"""Parameters in files: saved from a scene or a run, read back, refused in a line."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosim.scene import SceneError
+from lapwing.runs.single import fly_single
+from messages import OperatorCommand
+from services.common.parameter_file import read, write
+from services.common.parameters import table
+from services.table import load, resolve
+
+HOVER = Path("scenes/hover.toml")
+OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false", "run.duration=1.0"]
+
+
+def lapwing(*arguments):
+    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_what_is_written_is_read_back_and_flown(tmp_path):
+    path = tmp_path / "mine.params"
+    known = table(load(HOVER))
+    values = {name: p.default for name, p in known.items()} | {"MC_ROLL_P": known["MC_ROLL_P"].default * 0.5}
+    write(path, known.values(), values)
+    assert read(path) == values
+    scene = load(HOVER, [f"autopilot.parameters={path}"])
+    assert table(scene)["MC_ROLL_P"].default == values["MC_ROLL_P"]
+    assert len(path.read_text().splitlines()[3].split("\t")) == 5  # as QGroundControl reads it
+
+
+def test_mavproxys_rows_are_read_too(tmp_path):
+    path = tmp_path / "mine.parm"
+    path.write_text("# saved\nMPC_XY_CRUISE    3.000000\nNAV_DLL_ACT 2\n")
+    assert read(path) == {"MPC_XY_CRUISE": 3.0, "NAV_DLL_ACT": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("MPC_XY_CRUISE fast", "bad.params:1: MPC_XY_CRUISE: expected a number, got 'fast'"),
+        ("one two three", "bad.params:1: expected name and value"),
+        ("MPC_XY_CRUISE 1e9", "MPC_XY_CRUISE: expected a number from 0.1 to 15, got 1e\\+09"),
+        ("MPC_XY_CRUISE nan", "MPC_XY_CRUISE: expected a finite number, got nan"),
+        ("NO_SUCH 1", "bad.params: autopilot.parameters.NO_SUCH: unknown parameter"),
+    ],
+)
+def test_a_scene_with_a_bad_file_is_refused_in_a_line(tmp_path, text, said):
+    path = tmp_path / "bad.params"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=said) as caught:
+        load(HOVER, [f"autopilot.parameters={path}"])
+    assert "\n" not in str(caught.value)
+
+
+def test_what_a_run_ended_with_is_saved_and_named_by_a_scene(tmp_path):
+    def set_(name, value):
+        return OperatorCommand("parameter", "test", 1, (value,), name)
+
+    given = {
+        5: [set_("MPC_XY_CRUISE", 3.5), set_("MPC_XY_CRUISE", 1e9), set_("NO_SUCH", 1.0)],
+        20: [set_("NAV_DLL_ACT", 3.0)],
+    }
+    log, saved = tmp_path / "run.mcap", tmp_path / "after.params"
+    fly_single(resolve(load(HOVER, OPERATED)), log, operator=lambda tick: given.get(tick, ()))
+    result = lapwing("parameters", log, "--save", saved)
+    assert result.returncode == 0, result.stderr
+    after = read(saved)
+    assert (after["MPC_XY_CRUISE"], after["NAV_DLL_ACT"]) == (3.5, 3.0)
+    assert "MPC_XY_CRUISE    3.5" in result.stdout
+    assert table(load(HOVER, [f"autopilot.parameters={saved}"]))["MPC_XY_CRUISE"].default == 3.5
+
+
+def test_a_file_that_is_neither_is_refused(tmp_path):
+    result = lapwing("parameters", "scenes/os4_motors.toml")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "nobody steers there" in result.stderr

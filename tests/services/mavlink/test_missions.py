@@ -1,0 +1,74 @@
+"""Missions that no client has uploaded: written as MAVLink they are the same missions."""
+
+import math
+
+import pytest
+from bench import Bench
+
+from messages import Answer, Answers, MissionItem, OperatorCommand, OperatorInput, Vector3, header
+from messages.topics import ANSWERS, OPERATOR
+from services.mavlink.coordinates import Datum
+from services.mavlink.mission_export import to_mavlink
+from services.mavlink.mission_import import from_mavlink
+
+NAN = math.nan
+
+
+def item(action, x=NAN, y=NAN, z=NAN, yaw=NAN, radius=NAN, hold=0.0, values=()):
+    return MissionItem(action, Vector3(x, y, z), yaw, radius, hold, values)
+
+
+ITEMS = [
+    item("takeoff", z=4.0, yaw=1.0),
+    item("waypoint", 120.0, -340.0, 25.0, yaw=-2.0, radius=1.5, hold=3.0),
+    item("waypoint", 0.5, 0.25, 3.0),
+    item("loiter_time", 10.0, 20.0, 5.0, hold=7.0),
+    item("delay", hold=2.0),
+    item("speed", values=(3.0,)),
+    item("yaw", yaw=0.5),
+    item("jump", values=(1.0, 2.0)),
+    item("return"),
+    item("land", 3.0, 4.0, 0.0, yaw=0.0),
+]
+FENCE = [item("fence_circle_in", 5.0, 5.0, 0.0, radius=50.0, values=(50.0,))]
+FENCE += [item("fence_exclusion", x, y, 0.0, values=(3.0,)) for x, y in ((1.0, 1.0), (2.0, 1.0), (2.0, 3.0))]
+RALLY = [item("rally", 30.0, 40.0, 10.0)]
+
+
+@pytest.mark.parametrize(
+    ("items", "kind"),
+    [(ITEMS, 0), (FENCE, 1), (RALLY, 2)],  # MAV_MISSION_TYPE
+)
+def test_there_and_back_is_the_same(items, kind):
+    places = ("takeoff", "waypoint", "loiter_time", "land", "rally", *[i.action for i in FENCE])
+    datum = Datum(home_z=0.35)
+    for before, after in zip(items, from_mavlink(to_mavlink(items, kind, datum), False, datum), strict=True):
+        assert after.action == before.action
+        if before.action in places:
+            assert tuple(after.position) == pytest.approx(tuple(before.position), abs=0.02, nan_ok=True)  # 1e-7 degrees
+        for name in ("yaw", "radius", "hold"):
+            assert getattr(after, name) == pytest.approx(getattr(before, name), abs=1e-6, nan_ok=True), before.action
+        assert after.values == before.values
+
+
+def given(bench, time_ns, command, result):
+    """Somebody else gives the autopilot a command, and it answers."""
+    bench.adapter.take(
+        ANSWERS, time_ns, Answers(header(time_ns, ""), (Answer(command.source, command.id, result),)).encode(), 0.0
+    )
+    bench.adapter.take(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
+
+
+def test_a_plans_mission_can_be_downloaded_and_a_refused_one_not():
+    bench = Bench()
+    station = bench.station()
+    bench.step(5)
+    given(bench, 0, OperatorCommand("mission_upload", "plan", 1, (), "", tuple(ITEMS)), Answer.ACCEPTED)
+    given(bench, 0, OperatorCommand("fence_upload", "plan", 2, (), "", tuple(FENCE)), Answer.DENIED)
+    for kind, count in ((0, len(ITEMS)), (1, 0)):
+        station.send("mission_request_list", 1, 1, kind)
+        assert station.last("MISSION_COUNT").count == count
+    station.send("mission_request_int", 1, 1, 1, 0)
+    found = station.last("MISSION_ITEM_INT")
+    assert (found.command, found.param1, found.frame) == (16, 3.0, 6)
+    assert found.z == pytest.approx(24.65, abs=0.02)  # above home, where it stands 0.35 m above the ground

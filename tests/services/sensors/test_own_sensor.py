@@ -1,0 +1,109 @@
+"""A sensor of the user's own: a module beside the scene."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics.errors import KeyedError
+from services.sensors.registry import module_of
+from services.table import load, resolve
+from studies.fly import fly
+
+AIRSPEED = """
+from typing import NamedTuple
+from dynamics.kernel import kernel
+from dynamics.noise import normal
+from dynamics.vector import norm
+
+class Airspeed(NamedTuple):
+    deviation: float = 0.0  # [m/s]
+    rate: float = 50.0  # [Hz]
+
+class AirspeedReading(NamedTuple):
+    speed: float = 0.0  # [m/s]
+    valid: bool = False
+
+class State(NamedTuple):
+    samples: float = 0.0
+
+PRESETS = {"ideal": Airspeed(), "pitot": Airspeed(0.1)}
+READING = AirspeedReading()
+
+def blank():
+    return State()
+
+@kernel
+def initial(p, key, truth):
+    return State(0.0)
+
+@kernel
+def sample(p, s, key, tick, truth):
+    speed = norm(truth.velocity_world) + p.deviation * normal(key, tick, 0)
+    return State(s.samples + 1.0), AirspeedReading(speed, True)
+"""
+ESTIMATOR = """
+from services.common.estimators import StateEstimate
+
+class Echo:
+    rate = 50.0
+    def __init__(self, vehicle):
+        pass
+    def step(self, time, readings):
+        return StateEstimate(velocity_world=(readings["airspeed"].speed if readings else 0.0, 0.0, 0.0))
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def made(*overrides, text=AIRSPEED):
+        (tmp_path / "own_airspeed.py").write_text(text)
+        (tmp_path / "own_echo.py").write_text(ESTIMATOR)
+        path = tmp_path / "hover.toml"
+        path.write_text(Path("scenes/hover.toml").read_text() + '[sensors.airspeed]\nmodule = "own_airspeed"\n')
+        return load(path, ["run.duration=3.0", *overrides])
+
+    return made
+
+
+def test_its_readings_are_logged_and_reach_an_estimator(scene):
+    flight = fly(scene())
+    readings = flight.topic("own_sensor")["values"]
+    true = np.linalg.norm(flight.truth["velocity"][::5], axis=1)
+    assert readings[:, 0] == pytest.approx(true)
+    assert (readings[:, 1] == 1.0).all()
+    told = fly(scene("autopilot.estimator=own_echo:Echo")).topic("estimate")["velocity"][:, 0]
+    assert told.max() > 0.0
+
+
+def test_a_preset_and_its_noise(scene):
+    noisy = fly(scene("sensors.airspeed.preset=pitot")).topic("own_sensor")["values"][:, 0]
+    ideal = fly(scene()).topic("own_sensor")["values"][:, 0]
+    assert np.std(noisy - ideal) == pytest.approx(0.1, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "text", "said"),
+    [
+        (("sensors.airspeed.deviatoin=1.0",), AIRSPEED, "sensors.airspeed.deviatoin: unknown key"),
+        (("sensors.airspeed.rate=60.0",), AIRSPEED, "sensors.airspeed.rate: expected a rate that divides"),
+        (("sensors.airspeed.faults=[{kind='bias'}]",), AIRSPEED, "sensors.airspeed.faults: airspeed knows none"),
+        ((), AIRSPEED.replace("READING =", "READ ="), "sensors.airspeed.module: own_airspeed has no READING"),
+        ((), AIRSPEED.replace("(speed, True)", "(speed, 1.0)"), "sample's reading is of another type"),
+        (
+            ("sensors.other.module=own_airspeed",),
+            AIRSPEED,
+            "sensors.other.module: sensors.airspeed is one of",
+        ),
+    ],
+)
+def test_what_is_wrong_is_one_line(scene, overrides, text, said):
+    with pytest.raises(KeyedError) as caught:
+        resolve(scene(*overrides, text=text))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_sensor_that_ships_keeps_its_name():
+    with pytest.raises(KeyedError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
+        module_of("gps", {"module": "own_airspeed"})

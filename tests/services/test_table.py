@@ -1,0 +1,14 @@
+"""From a scene to a set-up."""
+
+import pytest
+
+from cosim.serialise import first_difference
+from services.common.sections import SHIPPED
+from services.table import load, reseed, resolve
+
+
+@pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
+def test_another_seed_is_what_resolving_gives(scene):
+    setup = resolve(load(scene))
+    assert first_difference(reseed(setup, 4711), resolve(load(scene, ["run.seed=4711"]))) is None
+    assert first_difference(reseed(setup, setup.seed), setup) is None

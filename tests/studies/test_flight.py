@@ -1,0 +1,162 @@
+"""One type for a flight, whether it was recorded or flown in memory."""
+
+import pickle
+import sys
+from types import SimpleNamespace
+
+import made_up
+import numpy as np
+import pytest
+
+from cosim.graph import Graph
+from cosim.log import LogWriter
+from cosim.provenance import attachments, metadata
+from cosim.recording import Recording
+from cosim.serialise import digest
+from cosim.single import PAGE, run_single
+from messages.topics import SETPOINT, TRUTH
+from services.processes import create_all
+from services.table import load, resolve
+from studies.flight import Flight
+from studies.fly import fly
+from studies.topic_view import TopicView
+
+SCENE = "hover"
+TICKS = 500
+UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return resolve(load(SCENE, ["run.duration=2.0"]))
+
+
+@pytest.fixture(scope="module")
+def in_memory(run):
+    return fly(run)
+
+
+@pytest.fixture(scope="module")
+def recorded(run, tmp_path_factory):
+    path = tmp_path_factory.mktemp("flight") / "hover.mcap"
+    with LogWriter(path, metadata(run, "single"), attachments(run, {})) as writer:
+        run_single(Graph(run, create_all(run), PAGE), Recording(writer, run))
+    return Flight.read(path)
+
+
+def test_a_log_and_memory_say_the_same(recorded, in_memory):
+    assert set(in_memory.topics) == set(recorded.topics) - {"wall_time"}
+    assert made_up.differences(in_memory, recorded, in_memory.topics) == []
+    assert in_memory.digest == recorded.digest != ""
+    assert in_memory.rmse == recorded.rmse
+    assert in_memory.energy == recorded.energy
+    assert digest(recorded.setup) == digest(in_memory.setup)
+    assert recorded.origin.scene == in_memory.origin.scene
+    assert recorded.metadata["setup"] == in_memory.metadata["setup"]
+
+
+def test_only_what_is_wanted_is_kept(run):
+    found = fly(run, (TRUTH, SETPOINT))
+    assert found.topics == ["setpoint", "truth"]
+    with pytest.raises(ValueError, match="hover: has no topic status; it has setpoint, truth"):
+        found.status  # noqa: B018
+
+
+def test_only_the_ports_that_are_asked_for_are_deep(run):
+    graph = Graph(run, create_all(run), 64, {"truth"})
+    graph.advance(run.last_tick + 1)
+    deep, shallow = graph.all_rows("truth", 1), graph.rows("setpoint", np.arange(64))
+    assert len(deep) == TICKS + 1
+    assert len(np.unique(deep[:, 2])) > 100  # the height at every tick, from the first on
+    assert shallow.shape[0] == 64
+    assert graph.rows("setpoint", np.array([0]))[0].tolist() != deep[0].tolist()
+    assert graph.rows("setpoint", np.array([0])).tolist() == graph.rows("setpoint", np.array([128])).tolist()  # a ring
+
+
+def test_a_flight_goes_from_process_to_process(run):
+    found = fly(run, (TRUTH,))
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.truth.position, found.truth.position)
+    assert again.energy == found.energy
+
+
+def test_fields_are_attributes(in_memory):
+    truth, setpoint = in_memory.truth, in_memory.setpoint
+    n = TICKS + 1
+    assert (truth.position.shape, truth.orientation.shape, truth.attitude.shape) == ((n, 3), (n, 4), (n, 3))
+    assert np.array_equal(truth.position, in_memory.column("truth", "pose.position"))
+    assert np.array_equal(truth["pose.position.z"], truth.position[:, 2])
+    assert (setpoint.position.shape, setpoint.yaw.shape, truth.rotor_speed.shape) == ((n, 3), (n,), (n, 4))
+    assert setpoint.phase[0] == "climb"
+    assert {"velocity", "rotor_speed"} <= set(dir(truth))
+    assert truth.stamps == pytest.approx(truth.times)
+    with pytest.raises(AttributeError, match="no field speed"):
+        truth.speed  # noqa: B018
+    with pytest.raises(AttributeError, match="no field position"):
+        in_memory.status.position  # noqa: B018
+
+
+def test_poses_of_several_bodies():
+    pose = np.arange(2 * 3 * 7, dtype=float).reshape(2, 3, 7)
+    view = TopicView(np.arange(2), {"pose": pose})
+    assert np.array_equal(view.position, pose[:, :, :3])
+    assert np.array_equal(view.orientation, pose[:, :, 3:])
+
+
+def test_a_failure_is_told():
+    found = fly(load("gyrostat_feedback", ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]))
+    assert "not finite" in found.failure
+    assert np.isfinite(found.truth.position).all()
+
+
+def ended(**truth):
+    """A flight whose autopilot says that it has landed."""
+    columns = {
+        "pose.position": np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 2.0), 10),
+        "pose.orientation": made_up.LEVEL,
+        "velocity": (0.0, 0.0, 0.0),
+        "ground_contact": True,
+    }
+    return made_up.flight(10, truth=columns | truth, status={"finished": True, "landed": True})
+
+
+def test_landed_means_upright_slow_and_in_contact():
+    assert ended().landed
+    assert not ended(**{"pose.orientation": UPSIDE_DOWN}).landed
+    half = np.radians(40.0) / 2.0
+    assert not ended(**{"pose.orientation": (np.sin(half), 0.0, 0.0, np.cos(half))}).landed
+    assert not ended(velocity=(0.4, 0.4, 0.0)).landed
+    assert not ended(ground_contact=False).landed
+    stood = np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 0.36), 10)  # a plant that tells of no contact
+    assert ended(**{"ground_contact": False, "pose.position": stood}).landed
+
+
+def test_landed_needs_the_autopilots_word():
+    truth = {"pose.position": (0.0, 0.0, 0.0), "pose.orientation": made_up.LEVEL, "velocity": (0.0, 0.0, 0.0),
+             "ground_contact": True}  # fmt: skip
+    assert not made_up.flight(10, truth=truth).landed
+    assert not made_up.flight(10, truth=truth, status={"finished": False, "landed": True}).landed
+    assert not made_up.flight(10, truth=truth, status={"finished": True, "landed": False}).landed
+
+
+def test_a_flight_lands(in_memory):
+    assert not in_memory.landed  # two seconds are not enough
+    assert fly(load(SCENE)).landed
+
+
+def test_dataframe_without_pandas(in_memory, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pandas is not installed; pip install pandas"):
+        in_memory.to_dataframe()
+
+
+def test_dataframe_has_a_column_for_every_number(in_memory, monkeypatch):
+    stand_in = SimpleNamespace(DataFrame=lambda columns, index: (columns, index), Index=lambda values, name: values)
+    monkeypatch.setitem(sys.modules, "pandas", stand_in)
+    columns, index = in_memory.to_dataframe("truth")
+    assert len(index) == TICKS + 1
+    assert {column.shape for column in columns.values()} == {(TICKS + 1,)}
+    assert {"pose.position.x", "velocity.z", "rotor_speed.3", "ground_contact"} <= set(columns)
+    assert np.array_equal(columns["rotor_speed.3"], in_memory.truth.rotor_speed[:, 3])
+    assert "pose.position" not in columns
+    assert "phase" in in_memory.to_dataframe("setpoint")[0]
