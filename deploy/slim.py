@@ -1,4 +1,4 @@
-"""Make a folder of installed packages small: drop tests, headers, dialects nobody speaks here, and symbols.
+"""Make a folder of installed packages small: drop tests, headers, build tools, foreign dialects, and symbols.
 
 Used by the Dockerfile:  python3 slim.py SITE_PACKAGES...
 """
@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
+BUILD_TOOLS = ("lxml",)  # pymavlink needs it to make dialects, not to speak them
 DIALECTS = {"__init__", "minimal", "standard", "common", "ardupilotmega", "all"}
 ELF64_LITTLE = b"\x7fELF\x02\x01"
 PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr
@@ -40,13 +41,22 @@ def strip(path: Path) -> int:
     return len(elf) - end
 
 
+def remove(folder: Path) -> int:
+    """Remove a folder. Returns the bytes saved."""
+    saved = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+    shutil.rmtree(folder)
+    return saved
+
+
 def slim(packages: Path) -> int:
     """Slim one folder of packages. Returns the bytes saved."""
     saved = 0
     for folder in sorted(packages.rglob("tests"), reverse=True):
         if folder.is_dir():
-            saved += sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
-            shutil.rmtree(folder)
+            saved += remove(folder)
+    for folder in [packages / name for name in BUILD_TOOLS]:
+        if folder.is_dir():
+            saved += remove(folder)
     for path in [path for path in packages.rglob("*.*") if path.suffix in UNUSED]:
         saved += path.stat().st_size
         path.unlink()
