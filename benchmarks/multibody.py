@@ -168,10 +168,10 @@ def free_turn(drone, x):
 
 def main():
     best = times()
-    peer = best.get("MuJoCo RK4 step")
+    best_other = best.get("MuJoCo RK4 step")
     print(f"{'':36}{'us':>9}{'MuJoCo / this':>15}")
     for name, seconds in best.items():
-        ratio = f"{peer / seconds:15.1f}" if peer and "step" in name else ""
+        ratio = f"{best_other / seconds:15.1f}" if best_other and "step" in name else ""
         print(f"{name:36}{1e6 * seconds:9.3f}{ratio}")
     wrong = errors()
     print("\nattitude error after 2 s at a step of 1 ms, 300 rad/s:")

@@ -32,13 +32,18 @@ H, STEPS, REPETITIONS = 1e-3, 2000, 200  # runs short enough not to be interrupt
 HOVER = (31.6, 31.61, 31.62, 31.6)  # nearly: all four rotors and all axes take part
 
 BARE = {"gravity": {}, "rotor_thrust": {}}
-MISSION = BARE | {"air_density": {}, "rotor_gyro": {}, "wind_random": {"mean": [3.0, 1.0, 0.0]}, "ground_contact": {}}
+MISSION = BARE | {
+    "air_density": {},
+    "gyroscopic_torque": {},
+    "wind_random": {"mean": [3.0, 1.0, 0.0]},
+    "ground_contact": {},
+}
 ALL = {name: {} for name in effects.names() if name not in ("gravity", "rotor_quadratic")} | {
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 1.0, "duration": 1.0},
     "wind_dryden": {"wind_speed": 5.0, "airspeed": 5.0},
     "payload": {"release_time": 1.0},
-    "rotor_damage": {"rotor": 1, "time": 1.0, "thrust_left": 0.95, "torque_left": 0.95},
+    "rotor_damage": {"rotor": 1, "time": 1.0, "remaining_thrust": 0.95, "torque_left": 0.95},
 }
 
 
@@ -78,7 +83,7 @@ def bare_rate(drive, t, m):
     s = (speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3])
     f = (b * s[0], b * s[1], b * s[2], b * s[3])
     q = (d * s[0], d * s[1], d * s[2], d * s[3])
-    x, y, sign = layout.x_body, layout.y_body, layout.yaw_sign
+    x, y, sign = layout.x_body, layout.y_body, layout.reaction_sign
     torque = (
         (y[0] * f[0] + y[1] * f[1]) + (y[2] * f[2] + y[3] * f[3]),
         -((x[0] * f[0] + x[1] * f[1]) + (x[2] * f[2] + x[3] * f[3])),
@@ -114,14 +119,14 @@ def bare():
     return *times.min(axis=0), np.median(times[:, 0] / times[:, 1]), reached
 
 
-def peer():
-    """(ns per step of the C++ peer, position reached); None where there is no compiler."""
+def cpp_reference():
+    """(ns per step of the C++ reference, position reached); None where there is no compiler."""
     if not shutil.which("g++"):
         return None
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
     density, rotor = multirotor.STANDARD_DENSITY, p.effects[1]
     numbers = [
-        p.body.mass, *p.body.inertia, *p.layout.x_body, *p.layout.y_body, *p.layout.yaw_sign,
+        p.body.mass, *p.body.inertia, *p.layout.x_body, *p.layout.y_body, *p.layout.reaction_sign,
         rotor.thrust_constant * density, rotor.torque_constant * density, p.effects[0].acceleration, p.layout.lag_rate,
         *(p.layout.speed_per_volt * v for v in HOVER), H, 10.0, 330.0,
     ]  # fmt: skip
@@ -148,7 +153,7 @@ def main() -> None:
         (f"{len(ALL)} effects, airborne, exchange every 4 steps", measure(ALL, 2000.0, HOVER, 4)),
         (f"{len(ALL)} effects, standing", measure(ALL, 0.35, (0.0,) * 4, STEPS)),
     ]
-    other = peer()
+    other = cpp_reference()
     if other:
         rows.append(("bare, hand-written C++ (g++ -O3)", other[0]))
         error = max(abs(a - b) for a, b in zip(reached, other[1], strict=True))

@@ -5,10 +5,10 @@ from typing import Any
 
 from messages.types import (
     Actuators,
-    Answers,
     BatteryState,
     BodyStates,
     Clock,
+    CommandAcks,
     Estimate,
     FluidPressure,
     Imu,
@@ -70,7 +70,7 @@ LIFT = Topic("{vehicle}/lift", LiftCommand)
 ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
 OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
-ANSWERS = Topic("{vehicle}/answers", Answers, rate="rates.operator")
+COMMAND_ACKS = Topic("{vehicle}/answers", CommandAcks, rate="rates.operator")
 OWN_SENSOR = Topic("{vehicle}/own_sensor", Reading)  # at its own rate
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))

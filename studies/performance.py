@@ -29,11 +29,11 @@ class Row(NamedTuple):
 # name of the function and of the published figure: (unit shown, SI units in one of it)
 _SHOWN = {
     "hover_time": ("min", 60.0),
-    "highest_payload": ("kg", 1.0),
-    "longest_range": ("km", 1000.0),
+    "maximum_payload": ("kg", 1.0),
+    "maximum_range": ("km", 1000.0),
     "ceiling": ("km", 1000.0),
-    "highest_tilt": ("deg", math.pi / 180.0),
-    "highest_speed": ("m/s", 1.0),
+    "maximum_tilt": ("deg", math.pi / 180.0),
+    "maximum_speed": ("m/s", 1.0),
 }
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from benchmarks.accuracy import ten_hours
-from benchmarks.accuracy.peers import installed
+from benchmarks.accuracy.other_simulators import installed
 from studies.accuracy.measure import Point, measure
 from studies.accuracy.plot import COLOURS, MARKERS
 from studies.accuracy.systems import problems
@@ -13,8 +13,8 @@ from studies.report.style import DPI, styled
 
 CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
 LEVELS = [10.0**-k for k in range(2, 11)]
-LONGEST = 1.0  # [s] of a peer's run
-PICTURE = Path(__file__).parents[2] / "docs/pictures/accuracy_peers.png"
+LONGEST = 1.0  # [s] of another simulator's run
+PICTURE = Path(__file__).parents[2] / "docs/pictures/accuracy_other_simulators.png"
 
 
 def best(points: list[Point], level: float) -> Point | None:
@@ -22,24 +22,24 @@ def best(points: list[Point], level: float) -> Point | None:
     return min((p for p in points if p.error <= level), key=lambda p: p.time, default=None)
 
 
-def peer(point: Point) -> str:
-    """Whose a point is: ours, or the peer's name, with which its methods' names begin."""
+def simulator(point: Point) -> str:
+    """Whose a point is: ours, or the other simulator's name, with which its methods' names begin."""
     return point.way.split()[0] if " " in point.way else "Lapwing"
 
 
 def table(title: str, points: list[Point]) -> None:
-    others = [name for name in dict.fromkeys(map(peer, points)) if name != "Lapwing"]
+    others = [name for name in dict.fromkeys(map(simulator, points)) if name != "Lapwing"]
     print(
         f"\n{title}\n{'error':>6} {'Lapwing [ms]':>24} "
         + "".join(f"{name + ' [ms]':>30} {'ratio':>6}" for name in others)
     )
     for level in LEVELS:
-        ours = best([p for p in points if peer(p) == "Lapwing"], level)
+        ours = best([p for p in points if simulator(p) == "Lapwing"], level)
         if ours is None:
             continue
         line = f"{level:6.0e} {ours.way + f' {1e3 * ours.time:.3g}':>24} "
         for name in others:
-            other = best([p for p in points if peer(p) == name], level)
+            other = best([p for p in points if simulator(p) == name], level)
             if other is None:
                 line += f"{'not reached':>30} {'':>6}"
             else:
@@ -53,10 +53,10 @@ def draw(found: dict[str, list[Point]]) -> None:
     with styled():
         figure = Figure(figsize=(13.0, 4.6), layout="constrained")
         all_axes = figure.subplots(1, len(found), sharey=True)
-        names = list(dict.fromkeys(peer(p) for points in found.values() for p in points))
+        names = list(dict.fromkeys(simulator(p) for points in found.values() for p in points))
         for axes, (title, points) in zip(all_axes, found.items(), strict=True):
             for index, name in enumerate(names):
-                reached = [best([p for p in points if peer(p) == name], level) for level in LEVELS]
+                reached = [best([p for p in points if simulator(p) == name], level) for level in LEVELS]
                 kept = [(level, p) for level, p in zip(LEVELS, reached, strict=True) if p]
                 axes.plot(
                     [1e3 * p.time for _, p in kept], [level for level, _ in kept],
@@ -74,13 +74,13 @@ def draw(found: dict[str, list[Point]]) -> None:
 def main() -> None:
     from importlib.metadata import version
 
-    peers = installed()
-    print("versions: " + ", ".join(f"{p.NAME} {version(p.MODULE)}" for p in peers))
+    others = installed()
+    print("versions: " + ", ".join(f"{p.NAME} {version(p.MODULE)}" for p in others))
     found: dict[str, list[Point]] = {}
     for case in CASES:
         problem = problems()[case]
         points = measure(problem)
-        for module in peers:
+        for module in others:
             points += measure(problem._replace(ways=module.ways(case), invariants={}), LONGEST)
         found[problem.title] = points
         table(f"{problem.title}, {problem.duration:g} {problem.unit}", points)

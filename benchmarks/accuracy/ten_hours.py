@@ -20,7 +20,7 @@ CASES = {
 
 def problem(name: str) -> Problem:
     p = CASES[name]
-    # of all the counts of steps, one is the seed's
+    # of all the counts of steps, one is the paper's
     return Problem(
         f"gyrostat, {name}", "min", DURATION, ways(p, gyrostat.START, DURATION, SEED_STEPS // 32),
         lambda: dop853(lambda t, y: gyrostat.right_hand_side(p, t, y), of_state(gyrostat.START), DURATION),

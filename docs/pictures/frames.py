@@ -49,7 +49,7 @@ def frames(axes: Axes, title: str, world: dict[str, tuple], body: dict[str, tupl
         arrow(axes, origin, np.array(along, float), colour, name)
     R = np.array(rotation_matrix(ATTITUDE)).reshape(3, 3)
     frame = airframe(load("hover"))
-    for k, (position, sign) in enumerate(zip(frame.rotors.position, frame.rotors.yaw_sign, strict=True), 1):
+    for k, (position, sign) in enumerate(zip(frame.rotors.position, frame.rotors.reaction_sign, strict=True), 1):
         hub = PLACE + R @ (1.7 * np.array(position))
         axes.plot(*zip(seen(PLACE), seen(hub), strict=True), color=DARK, lw=2.5, zorder=3)
         turn = np.linspace(0.15, 1.75 * math.pi, 60) * -sign  # a rotor with sign +1 turns about -z

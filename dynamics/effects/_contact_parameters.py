@@ -27,7 +27,7 @@ class Settings(NamedTuple):
     friction_dynamic: Coefficient = 0.3  # coefficient of a foot that slides
     tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
     stick_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
-    critical_velocity: Slip = 1.0e-3  # [m/s] slip of the highest friction; friction "smooth"
+    critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "smooth"
     slope: tuple[float, float] = (0.0, 0.0)  # rise of the ground along world x and y, tangent of the angle
     bump_height: Annotated[float, Ge(0), Le(100)] = 0.0  # [m] amplitude of bumps A sin(k x) sin(k y)
     bump_length: Annotated[float, Ge(0.01), Le(1e4)] = 1.0  # [m] their wavelength 2 pi / k
@@ -105,7 +105,7 @@ class GroundContactSmooth(NamedTuple):
     dynamic: float
     inverse_critical: float  # [s/m]
     rate_bound: float  # [1/s]
-    mobility: float  # [1/kg] highest acceleration of a foot by a unit force on all feet
+    mobility: float  # [1/kg] maximum acceleration of a foot by a unit force on all feet
 
     def initial_memory(self):
         """Nothing to remember, foot by foot."""

@@ -41,7 +41,7 @@ def _spring(e, anchor, foot):
 
 @leaf
 def _trial(e, anchor, foot):
-    """(force if the foot sticks, highest friction) [N]."""
+    """(force if the foot sticks, maximum friction) [N]."""
     limit = (e.static if anchor[2] == STICKING else e.dynamic) * foot.press
     return subtract(_spring(e, anchor, foot), scale(e.damping, foot.slip)), limit
 
@@ -157,7 +157,7 @@ def split(e, memory, motion, h):
 
 @substeps(GroundContactSmooth)
 def split_smooth(e, memory, motion, h):
-    """As many as the friction needs under the highest normal force that the next step can bring."""
+    """As many as the friction needs under the maximum normal force that the next step can bring."""
     R_world_body = rotation_matrix(motion.attitude)
     press = 0.0
     for i in range(len(e.feet)):

@@ -26,7 +26,7 @@ class MotorElectrics(NamedTuple):
 
     motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, behind the belt
     inverse_resistance: float  # [1/ohm]
-    idle_current: float  # [A]
+    no_load_current: float  # [A]
     current_limit: float  # [A]
     inverse_inertia: float  # [1/(kg m^2)] of one rotor
 
@@ -38,7 +38,7 @@ class MotorElectrics(NamedTuple):
         return cls(
             engine.rotor_constant,
             1.0 / engine.resistance,
-            engine.idle_current,
+            engine.no_load_current,
             engine.esc_current,
             1.0 / airframe.rotors.inertia,
         )
@@ -53,7 +53,7 @@ def _current(e, speed, voltage):
 @leaf
 def _acceleration(e, torque, both):
     speed, current = both
-    friction = e.idle_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
+    friction = e.no_load_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
     return (e.motor_constant * e.inverse_inertia) * (current - friction) - torque * e.inverse_inertia
 
 

@@ -18,7 +18,7 @@ class Settings(NamedTuple):
 
     rotor: Annotated[int, Gt(0)]  # number of the rotor, from 1
     time: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
-    thrust_left: Annotated[float, Ge(0), Le(1)] = 0.0  # fraction
+    remaining_thrust: Annotated[float, Ge(0), Le(1)] = 0.0  # fraction
     torque_left: Annotated[float, Ge(0), Le(2)] = 0.0  # fraction; a torn blade may drag more
 
 
@@ -30,7 +30,7 @@ class RotorDamage(NamedTuple):
     """
 
     time: float  # [s]
-    thrust_left: tuple[float, ...]  # fraction of each rotor
+    remaining_thrust: tuple[float, ...]  # fraction of each rotor
     torque_left: tuple[float, ...]
 
     @classmethod
@@ -44,11 +44,11 @@ class RotorDamage(NamedTuple):
         def only_this(left):
             return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))
 
-        return cls(given.time, only_this(given.thrust_left), only_this(given.torque_left))
+        return cls(given.time, only_this(given.remaining_thrust), only_this(given.torque_left))
 
     def initial_memory(self):
         """Fractions of thrust and torque in force."""
-        return (1.0,) * len(self.thrust_left), (1.0,) * len(self.torque_left)
+        return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.torque_left)
 
 
 @leaf
@@ -59,7 +59,7 @@ def _product(_, a, b):
 @sample(RotorDamage)
 def strike(e, memory, s, rotors, key, tick, interval):
     """The fractions for the next interval."""
-    return (e.thrust_left, e.torque_left) if s.t >= e.time else memory
+    return (e.remaining_thrust, e.torque_left) if s.t >= e.time else memory
 
 
 @factors(RotorDamage)

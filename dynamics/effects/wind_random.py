@@ -1,4 +1,4 @@
-"""Random wind force."""
+"""Random gust force: the paper's wind, as a force of random size instead of a motion of the air."""
 
 import zlib
 from typing import Annotated, NamedTuple

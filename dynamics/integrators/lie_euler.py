@@ -1,6 +1,6 @@
 """Lie-Euler: forward Euler along the group exponential.
 
-This is also the seed's forward Euler on a manifold, fEulM: its retraction on SO(3) is the same exponential.
+This is also the gyrostat paper's forward Euler on a manifold, fEulM: its retraction on SO(3) is the same exponential.
 """
 
 from dynamics.integrators._march import token

@@ -3,7 +3,7 @@
 import math
 import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -46,17 +46,22 @@ class RotorPlacement(Section):
     """Where the rotors are and which way they turn."""
 
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
-    yaw_sign: tuple[float, ...]  # +1 or -1: sign of the torque on the body about z
+    spin_direction: tuple[Literal["cw", "ccw"], ...]  # of each rotor seen from above: clockwise or counter-clockwise
     inertia: Positive  # [kg m^2] of one rotor about its axis
     mass: Positive | None = None  # [kg] of one rotor, part of the total; for models that give it a body of its own
     blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
 
     @model_validator(mode="after")
-    def _one_sign_each(self) -> "RotorPlacement":
-        if len(self.yaw_sign) != len(self.position) or any(abs(s) != 1 for s in self.yaw_sign):
-            expected = f"+1 or -1 for each of the {len(self.position)} rotors"
-            raise KeyedError("yaw_sign", f"got {list(self.yaw_sign)}", expected)
+    def _one_direction_each(self) -> "RotorPlacement":
+        if len(self.spin_direction) != len(self.position):
+            expected = f'"cw" or "ccw" for each of the {len(self.position)} rotors'
+            raise KeyedError("spin_direction", f"got {len(self.spin_direction)} of them", expected)
         return self
+
+    @property
+    def reaction_sign(self) -> tuple[float, ...]:
+        """Sign of each rotor's reaction torque on the body about z, opposite to the rotor's own turning."""
+        return tuple(1.0 if spin == "cw" else -1.0 for spin in self.spin_direction)
 
 
 class Propeller(Section):
@@ -72,15 +77,15 @@ class Propeller(Section):
     oswald_factor: Annotated[float, Gt(0), Le(1)]  # e
     zero_lift_drag: NotNegative  # C_fD
     zero_lift_angle: float  # [rad] alpha_0
-    lift_slope: Positive  # [1/rad] K_0
+    lift_curve_slope: Positive  # [1/rad] K_0
 
 
 class Motor(Section):
     """Brushless motor, belt and speed controller."""
 
     speed_constant: Positive  # [rpm/V] KV of the motor shaft (deliberately not SI: how motors are sold)
-    belt_ratio: Positive  # propeller speed over motor speed
-    idle_current: NotNegative  # [A] I_0, without load
+    gear_ratio: Positive  # propeller speed over motor speed
+    no_load_current: NotNegative  # [A] I_0, without load
     resistance: Positive  # [ohm] of the winding
     time_constant: Positive  # [s] of rotor speed after a step of voltage
     max_voltage: Positive  # [V] that the controller can ask for
@@ -89,7 +94,7 @@ class Motor(Section):
     @property
     def rotor_constant(self) -> float:
         """[N m/A] = [V s/rad] of motor and belt, at the rotor (theory.md, eq. (1.12))."""
-        return 30.0 / (math.pi * self.speed_constant * self.belt_ratio)
+        return 30.0 / (math.pi * self.speed_constant * self.gear_ratio)
 
 
 class Battery(Section):
@@ -97,7 +102,7 @@ class Battery(Section):
 
     cells: Annotated[int, Gt(0)]  # in series
     capacity: Positive  # [A s]
-    discharge_rate: Positive  # [1/h] highest current over capacity in A h
+    c_rating: Positive  # [1/h] maximum current over capacity in A h
     cell_resistance: NotNegative  # [ohm] of one cell
 
 
@@ -126,11 +131,11 @@ class Published(Section):
 
     source: str  # where the figures are from
     hover_time: PublishedFigure | None = None  # [s]
-    highest_payload: PublishedFigure | None = None  # [kg]
-    longest_range: PublishedFigure | None = None  # [m]
+    maximum_payload: PublishedFigure | None = None  # [kg]
+    maximum_range: PublishedFigure | None = None  # [m]
     ceiling: PublishedFigure | None = None  # [m]
-    highest_tilt: PublishedFigure | None = None  # [rad]
-    highest_speed: PublishedFigure | None = None  # [m/s]
+    maximum_tilt: PublishedFigure | None = None  # [rad]
+    maximum_speed: PublishedFigure | None = None  # [m/s]
 
 
 class Airframe(Section):

@@ -30,13 +30,13 @@ class RotorLayout(NamedTuple):
     x_body: PerRotor  # [m]
     y_body: PerRotor  # [m]
     z_body: PerRotor  # [m]
-    yaw_sign: PerRotor  # sign of the torque on the body about z
+    reaction_sign: PerRotor  # sign of the torque on the body about z
     inertia: float  # [kg m^2] of one rotor about its axis
     volt_per_speed: float  # [V s/rad] at the rotor = [N m/A]: motor constant over belt ratio
     speed_per_volt: float  # [rad/(s V)]
     lag_rate: float  # [1/s]
     max_voltage: float  # [V]
-    idle_current: float  # [A]
+    no_load_current: float  # [A]
     bodies: Any = ()  # what a form with several bodies needs to know of them
 
 
@@ -102,7 +102,7 @@ def _lag(s, speed, voltage):
 @leaf
 def _static_current(s, torque, voltage):
     """Current that holds the air's torque (theory.md, eq. (1.14)); none when the controller is off."""
-    return torque / s.layout.volt_per_speed + s.layout.idle_current if voltage > 0.0 else 0.0
+    return torque / s.layout.volt_per_speed + s.layout.no_load_current if voltage > 0.0 else 0.0
 
 
 @leaf
@@ -136,7 +136,7 @@ def evaluate(drive, t, motion):
     torque = (
         total(each(_product, 0.0, layout.y_body, loads.thrust)),
         -total(each(_product, 0.0, layout.x_body, loads.thrust)),
-        total(each(_product, 0.0, layout.yaw_sign, loads.torque)),
+        total(each(_product, 0.0, layout.reaction_sign, loads.torque)),
     )
     torque = hooks.all_torques(p.effects, memory, s, rotors, torque)
     force, torque = hooks.all_body_wrenches(p.effects, memory, s, rotors, total(loads.thrust), torque)
@@ -303,9 +303,9 @@ def parameters(airframe: Airframe, effects: tuple = ()) -> MultirotorParameters:
     mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
     x_body, y_body, z_body = zip(*rotors.position, strict=True)
     layout = RotorLayout(
-        x_body, y_body, z_body, rotors.yaw_sign, rotors.inertia,
+        x_body, y_body, z_body, rotors.reaction_sign, rotors.inertia,
         engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
-        engine.max_voltage, engine.idle_current,
+        engine.max_voltage, engine.no_load_current,
     )  # fmt: skip
     return MultirotorParameters(body_of(mass.total, mass.inertia), layout, effects)
 

@@ -1,8 +1,8 @@
 """The multirotor as five bodies: chassis and four propellers that turn on hinges, under the effects of its scene.
 
 A form of `multirotor`'s state: each body has its own pose on SE(3), the arrow structure is eliminated (theory.md, eqs.
-(8.40)-(8.46)). What `rotor_gyro` and mass properties averaged over a turn stand for in the reduced model follows here
-from the bodies themselves.
+(8.40)-(8.46)). What `gyroscopic_torque` and mass properties averaged over a turn stand for in the reduced model
+follows here from the bodies themselves.
 """
 
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._rotors import total, total_wrench
 from dynamics.effects._types import Motion, PerRotor
-from dynamics.effects.rotor_gyro import RotorGyro
+from dynamics.effects.gyroscopic_torque import GyroscopicTorque
 from dynamics.generate import each
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate_back
@@ -67,7 +67,7 @@ def _product(_, a, b):
 def seen(layout, x):
     """The Motion of the chassis with the speeds of the rotors; of one that was torn off it is zero."""
     c = x.chassis
-    speed = each(_rotor_speed, c.omega_body[2], layout.yaw_sign, x.propellers)
+    speed = each(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
     speed = each(_product, 0.0, layout.bodies.drone.held, speed)
     return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
 
@@ -92,7 +92,7 @@ def acting(drive, t, motion):
     arms = (
         total(each(_product, 0.0, layout.y_body, rotors.thrust)),
         -total(each(_product, 0.0, layout.x_body, rotors.thrust)),
-        total(each(_product, 0.0, layout.yaw_sign, rotors.torque)),
+        total(each(_product, 0.0, layout.reaction_sign, rotors.torque)),
     )
     loads = each(_pair, 0.0, rotors.thrust, rotors.torque)
     parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
@@ -101,7 +101,7 @@ def acting(drive, t, motion):
 
 @leaf
 def _rotor(k, layout, R, motion, part):
-    d, sign, powered = layout.bodies.drone, -layout.yaw_sign[k], layout.bodies.powered[k]
+    d, sign, powered = layout.bodies.drone, -layout.reaction_sign[k], layout.bodies.powered[k]
     thrust, torque, acceleration = part
     spins, axial = d.spins[k], d.propeller_inertia[k][2]
     drive = powered * sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
@@ -129,7 +129,7 @@ def machine(drive, t, motion):
 @leaf
 def _still(k, layout, motion):
     d = layout.bodies.drone
-    speed = -layout.bodies.powered[k] * layout.yaw_sign[k] * motion.rotor_speed[k]
+    speed = -layout.bodies.powered[k] * layout.reaction_sign[k] * motion.rotor_speed[k]
     return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH, d.held[k])
 
 
@@ -237,7 +237,7 @@ def parameters(
 
     Args:
         airframe: with four rotors and what is to be known of one.
-        effects: from `dynamics.effects.from_scene`; the bodies need no `rotor_gyro`, it is left out.
+        effects: from `dynamics.effects.from_scene`; the bodies need no `gyroscopic_torque`, it is left out.
         drive: "torque" (the motors' torque turns the propellers) or "speed" (their acceleration is imposed).
         stabilisation: one of STABILISATIONS.
 
@@ -246,7 +246,7 @@ def parameters(
     """
     feedback = FEEDBACK if stabilisation == "baumgarte" else 0.0
     assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, (1.0,) * 4, ())
-    p = multirotor.parameters(airframe, tuple(e for e in effects if not isinstance(e, RotorGyro)))
+    p = multirotor.parameters(airframe, tuple(e for e in effects if not isinstance(e, GyroscopicTorque)))
     return p._replace(layout=p.layout._replace(bodies=assembly))
 
 
@@ -274,6 +274,6 @@ def initial_state(
     plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
     d = p.layout.bodies.drone
     chassis = BodyState(position_world, attitude, velocity_world, omega_body)
-    speeds = tuple(-sign * rotor_speed for sign in p.layout.yaw_sign)
+    speeds = tuple(-sign * rotor_speed for sign in p.layout.reaction_sign)
     x = hold.together(five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds)
     return plain._replace(motion=x)

@@ -57,13 +57,13 @@ def trim(airframe: Airframe, speed: float = 0.0, density: float = DENSITY, mass:
     omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
     torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
     motor = airframe.motor
-    current = torque / motor.rotor_constant + motor.idle_current
+    current = torque / motor.rotor_constant + motor.no_load_current
     voltage = motor.rotor_constant * omega + motor.resistance * current
     return Trim(tilt, thrust, omega, voltage, current, count * voltage * current)
 
 
-def highest_thrust(airframe: Airframe, density: float = DENSITY) -> float:
-    """Of all rotors at rest in the air [N], at the highest voltage, or at the highest current if that comes first."""
+def maximum_thrust(airframe: Airframe, density: float = DENSITY) -> float:
+    """Of all rotors at rest in the air [N], at the maximum voltage, or at the maximum current if that comes first."""
     propeller, motor = _propeller(airframe), airframe.motor
     square = (2.0 * math.pi) ** 2
     k_thrust = density * thrust_coefficient(propeller) * propeller.diameter**4 / square
@@ -71,10 +71,12 @@ def highest_thrust(airframe: Airframe, density: float = DENSITY) -> float:
     constant, resistance = motor.rotor_constant, motor.resistance
 
     def excess(omega: float) -> float:
-        return constant * omega + resistance * (k_torque * omega**2 / constant + motor.idle_current) - motor.max_voltage
+        return (
+            constant * omega + resistance * (k_torque * omega**2 / constant + motor.no_load_current) - motor.max_voltage
+        )
 
     by_voltage = brentq(excess, 0.0, motor.max_voltage / constant)
-    by_current = math.sqrt((motor.esc_current - motor.idle_current) * constant / k_torque)
+    by_current = math.sqrt((motor.esc_current - motor.no_load_current) * constant / k_torque)
     return len(airframe.rotors.position) * k_thrust * min(by_voltage, by_current) ** 2
 
 
@@ -90,28 +92,28 @@ def hover_time(airframe: Airframe, density: float = DENSITY) -> float:
     return battery_energy(airframe) / trim(airframe, 0.0, density).power
 
 
-def highest_payload(airframe: Airframe, density: float = DENSITY) -> float:
-    """[kg] that the highest thrust lifts beyond the empty vehicle, nothing kept for control."""
-    return highest_thrust(airframe, density) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
+def maximum_payload(airframe: Airframe, density: float = DENSITY) -> float:
+    """[kg] that the maximum thrust lifts beyond the empty vehicle, nothing kept for control."""
+    return maximum_thrust(airframe, density) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
 
 
-def highest_tilt(airframe: Airframe, density: float = DENSITY) -> float:
-    """[rad] at which the highest thrust still carries the weight."""
-    return math.acos(min(airframe.mass.total * GRAVITY / highest_thrust(airframe, density), 1.0))
+def maximum_tilt(airframe: Airframe, density: float = DENSITY) -> float:
+    """[rad] at which the maximum thrust still carries the weight."""
+    return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density), 1.0))
 
 
 def ceiling(airframe: Airframe, temperature: float = 15.0) -> float:
-    """Altitude [m] at which the highest thrust is the weight, by the density law of theory.md, eq. (2.3)."""
+    """Altitude [m] at which the maximum thrust is the weight, by the density law of theory.md, eq. (2.3)."""
     kelvin, weight = KELVIN + temperature, airframe.mass.total * GRAVITY
 
     def excess(altitude: float) -> float:
         density = SEA_LEVEL_DENSITY * KELVIN / kelvin * (1.0 - LAPSE_RATE * altitude / kelvin) ** EXPONENT
-        return highest_thrust(airframe, density) - weight
+        return maximum_thrust(airframe, density) - weight
 
     return brentq(excess, 0.0, 30_000.0) if excess(0.0) > 0.0 else 0.0
 
 
-def highest_speed(airframe: Airframe, density: float = DENSITY) -> float:
+def maximum_speed(airframe: Airframe, density: float = DENSITY) -> float:
     """[m/s] in level flight, where the voltage is all used."""
     highest = airframe.motor.max_voltage
 
@@ -121,12 +123,12 @@ def highest_speed(airframe: Airframe, density: float = DENSITY) -> float:
     return brentq(excess, 0.0, 200.0) if excess(0.0) < 0.0 else 0.0
 
 
-def longest_range(airframe: Airframe, density: float = DENSITY) -> tuple[float, float]:
+def maximum_range(airframe: Airframe, density: float = DENSITY) -> tuple[float, float]:
     """(distance [m], at the speed [m/s]) in still air."""
     energy = battery_energy(airframe)
     best = minimize_scalar(
         lambda speed: -speed / trim(airframe, speed, density).power,
-        bounds=(0.1, highest_speed(airframe, density)),
+        bounds=(0.1, maximum_speed(airframe, density)),
         method="bounded",
     )
     return -best.fun * energy, best.x

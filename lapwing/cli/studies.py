@@ -117,7 +117,9 @@ def campaign(
 def tune(
     scene: SceneFile,
     set_: Overrides = None,
-    lift: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the height loop")] = Bandwidths().lift,
+    altitude: Annotated[
+        float, typer.Option(metavar="RAD/S", help="bandwidth of the altitude loop")
+    ] = Bandwidths().altitude,
     yaw: Annotated[float, typer.Option(metavar="RAD/S", help="bandwidth of the yaw loop")] = Bandwidths().yaw,
     attitude: Annotated[
         float, typer.Option(metavar="RAD/S", help="bandwidth of the inner roll and pitch loops")
@@ -149,7 +151,7 @@ def tune(
             if path and path.suffix != ending:
                 raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
             check_writable(path)
-        wanted, console = Bandwidths(lift, yaw, attitude, position), Console()
+        wanted, console = Bandwidths(altitude, yaw, attitude, position), Console()
         with Progress(console=console, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
 

@@ -7,7 +7,7 @@ from typing import Any
 from cosim.graph import NEVER, Graph, Service
 from cosim.schedule import KEPT, Port
 from dynamics.cell import Cell, write
-from messages import Answers, header
+from messages import CommandAcks, header
 from messages import topics as topic
 from services.autopilot.attention import LOOK_EVERY
 from services.autopilot.commander.attention import battery_thresholds
@@ -18,7 +18,7 @@ from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
 from services.autopilot.interface import Setpoint
 from services.autopilot.law import build
 from services.autopilot.setup import AutopilotSetup
-from services.autopilot.stage import LANDED, STANDING
+from services.autopilot.stage import LANDED, ON_GROUND
 from services.common import ports
 from services.common.operator import joined
 from services.common.parameters import with_gains
@@ -133,7 +133,7 @@ class Commanding:
 
     def _order(self, tick: int, request: Request, flight: Flight) -> Order:
         status, wanted = request.status, request.setpoint
-        restart = tick if request.reset_controller and flight.stage != STANDING else -1
+        restart = tick if request.reset_controller and flight.stage != ON_GROUND else -1
         words = self.words.number(_words(status))
         if wanted is None:
             return Order(True, Reference(), words, False, False, restart)
@@ -144,10 +144,10 @@ class Commanding:
         self._acknowledgements += request.acknowledgements
         self._texts += request.texts
         if self._given.operator and tick % self._given.answers_every == 0:
-            message = Answers(
+            message = CommandAcks(
                 header(tick * self._interval_ns, "world"), tuple(self._acknowledgements), tuple(self._texts)
             )
-            self._service.messages.append((topic.ANSWERS, tick, message.encode()))
+            self._service.messages.append((topic.COMMAND_ACKS, tick, message.encode()))
             self._acknowledgements.clear()
             self._texts.clear()
 

@@ -9,17 +9,17 @@ from dynamics.lie.quaternion import to_roll_pitch_yaw
 from dynamics.vector import ZERO, Vec3, subtract
 from services.autopilot.attitude import error_by_angle, error_on_so3
 from services.autopilot.interface import Command
-from services.autopilot.mixer import Quotas, clamp, mix, saturate
+from services.autopilot.mixer import Demands, clamp, mix, saturate
 from services.autopilot.motor import Motor, voltage
 from services.autopilot.pid import Pid, integrate, output
 from services.autopilot.reference import AT_REST, Angle, Smoothing, advance
-from services.autopilot.stage import FLYING, LANDED, ON_GROUND, Stage, advance_stage
+from services.autopilot.stage import FLYING, INITIAL_STAGE, LANDED, Stage, advance_stage
 
 
 class Parameters(NamedTuple):
     """A gain set on an airframe; `gains.build` makes it."""
 
-    lift: Pid  # [N] of every rotor over [m]
+    altitude: Pid  # [N] of every rotor over [m]
     yaw: Pid  # [N] over [rad]
     roll_inner: Pid  # [N] over [rad] of the tilt to the left: negative gains
     pitch_inner: Pid  # [N] over [rad]
@@ -27,9 +27,9 @@ class Parameters(NamedTuple):
     pitch_outer: Pid  # [rad] over [m]
     smoothing: Smoothing  # of the tilt references
     tilt_limit: float  # [rad] about either axis
-    weight_quota: float  # [N] fed forward to every rotor; 0 where nothing is fed forward
+    hover_demand: float  # [N] fed forward to every rotor; 0 where nothing is fed forward
     gravity: float  # [m/s^2]
-    torque_quotas: Vec3  # (roll, pitch, yaw) quota of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
+    torque_demands: Vec3  # (roll, pitch, yaw) demand of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
     geometric: bool  # attitude error on SO(3) instead of angle by angle
     signs: tuple[Vec3, Vec3, Vec3, Vec3]  # (roll, pitch, yaw) share of every rotor, each +1 or -1
     thrust_max: float  # [N] of a rotor
@@ -45,11 +45,11 @@ class State(NamedTuple):
     integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
     tilt_x: Angle  # reference of the pitch
     tilt_y: Angle  # reference of the tilt to the left, -roll
-    cut: Quotas  # sign of what saturation cut off each quota at the last tick
+    cut: Demands  # sign of what saturation cut off each demand at the last tick
     tilt_cut: tuple[float, float]  # the same of the limited tilts, in world axes
 
 
-START = State(ON_GROUND, ZERO, ZERO, AT_REST, AT_REST, Quotas(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, Demands(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @leaf
@@ -72,7 +72,7 @@ def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
     vx, vy = to_heading(yaw, error_rate)
     ix, iy = to_heading(yaw, integral)
     tilt_x, tilt_y = output(p.pitch_outer, ix, x, vx), output(p.roll_outer, iy, y, vy)
-    if p.weight_quota > 0.0:
+    if p.hover_demand > 0.0:
         ax, ay = to_heading(yaw, acceleration_world)
         tilt_x, tilt_y = tilt_x + ax / p.gravity, tilt_y + ay / p.gravity
     return tilt_x, tilt_y
@@ -81,11 +81,11 @@ def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
 @leaf
 def lift_quota(p, integral, error, error_rate, acceleration, roll, pitch):
     """Lift [N] of every rotor; with feed-forward, the weight and the tilt are made up for (theory.md, eq. (4.13))."""
-    lift = output(p.lift, integral, error, error_rate)
-    if p.weight_quota > 0.0:
+    collective = output(p.altitude, integral, error, error_rate)
+    if p.hover_demand > 0.0:
         upright = max(math.cos(roll) * math.cos(pitch), 0.5)
-        lift = (lift + p.weight_quota * (1.0 + acceleration / p.gravity)) / upright
-    return lift
+        collective = (collective + p.hover_demand * (1.0 + acceleration / p.gravity)) / upright
+    return collective
 
 
 @kernel
@@ -114,7 +114,7 @@ def step(p, s, dt, estimate, setpoint):
     integral = (
         s.integral_world[0] if pushes else s.integral_world[0] + dt * error[0],
         s.integral_world[1] if pushes else s.integral_world[1] + dt * error[1],
-        integrate(p.lift, s.integral_world[2], error[2], s.cut.lift, dt),
+        integrate(p.altitude, s.integral_world[2], error[2], s.cut.collective, dt),
     )
     wanted_x, wanted_y = tilt_targets(p, yaw, integral, error, error_rate, setpoint.acceleration_world)
     limited_x, limited_y = clamp(wanted_x, -p.tilt_limit, p.tilt_limit), clamp(wanted_y, -p.tilt_limit, p.tilt_limit)
@@ -135,17 +135,17 @@ def step(p, s, dt, estimate, setpoint):
         integrate(p.pitch_inner, s.integral_angles[1], turn[1], s.cut.pitch, dt),
         integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
     )
-    wanted = Quotas(
+    wanted = Demands(
         lift_quota(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
         output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
-        - p.torque_quotas[0] * tilt_y.demand_acceleration,
+        - p.torque_demands[0] * tilt_y.demand_acceleration,
         output(p.pitch_inner, integral_angles[1], turn[1], turn_rate[1])
-        + p.torque_quotas[1] * tilt_x.demand_acceleration,
+        + p.torque_demands[1] * tilt_x.demand_acceleration,
         output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
     )
     given = saturate(p.signs, wanted, p.thrust_max)
-    cut = Quotas(
-        sign(wanted.lift - given.lift),
+    cut = Demands(
+        sign(wanted.collective - given.collective),
         sign(wanted.roll - given.roll),
         sign(wanted.pitch - given.pitch),
         sign(wanted.yaw - given.yaw),

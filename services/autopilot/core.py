@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 from cosim.part import GO_ON
 from dynamics.kernel import leaf
-from services.autopilot import control, interface, motor_watch
+from services.autopilot import control, interface, motor_failure
 from services.autopilot.attention import battery_warning
-from services.autopilot.stage import FLYING, STANDING
+from services.autopilot.stage import FLYING, ON_GROUND
 from services.common.ports import AutopilotStatus, MotorCommand, Reference
 
 ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
@@ -27,7 +27,7 @@ class Order(NamedTuple):
 class Flight(NamedTuple):
     """Where the flight is after a tick."""
 
-    stage: int = STANDING  # STANDING, FLYING or LANDED
+    stage: int = ON_GROUND  # ON_GROUND, FLYING or LANDED
     still_from: int = 0  # [tick] from which a vehicle that stands does not move
     failed_motor: int = 0  # number from 1; 0: none
 
@@ -36,7 +36,7 @@ class Controller(NamedTuple):
     """The control law on its vehicle."""
 
     law: Any  # cell of `control.Parameters`
-    watch: motor_watch.Parameters
+    watch: motor_failure.Parameters
     thresholds: Any  # cell of `BatteryThresholds`
     interval: float  # [s] a tick
     bounce: int  # ticks after a touch-down in which the vehicle may still move
@@ -46,12 +46,12 @@ class ControllerState(NamedTuple):
     """Memory of the controller."""
 
     control: control.State
-    watch: motor_watch.State
+    watch: motor_failure.State
     still_from: int  # [tick]
     charge: float  # of the battery, fraction; NaN: not known
 
 
-START = ControllerState(control.START, motor_watch.START, 0, float("nan"))
+START = ControllerState(control.START, motor_failure.START, 0, float("nan"))
 
 
 @leaf
@@ -70,21 +70,21 @@ def estimate_of(e):
 
 @leaf
 def outcome(p, watched, still_from, battery_charge, order, e, wanted, stage, c):
-    """The motor watch after a tick, and what the part gives: command, setpoint, status and flight.
+    """The motor failure detection after a tick, and what the part gives: command, setpoint, status and flight.
 
     Args:
         p: Controller.
-        watched: state of the motor watch.
+        watched: state of the motor failure detection.
         still_from: [tick].
         battery_charge: fraction.
         order: Order.
         e: StateEstimate.
         wanted: Reference that is followed.
-        stage: STANDING, FLYING or LANDED.
+        stage: ON_GROUND, FLYING or LANDED.
         c: Command of the control law.
     """
     height = e.position_world[2] - p.law.value.resting_height
-    watched = motor_watch.step(p.watch, watched, p.interval, e.omega_body, height, c.thrust)
+    watched = motor_failure.step(p.watch, watched, p.interval, e.omega_body, height, c.thrust)
     flying = stage == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and wanted.final) if order.follow else order.finished
@@ -105,7 +105,7 @@ def step(p, s, tick, inputs):
     wanted = inputs[3].value if order.follow else order.reference
     controlled, watched, still_from = s.control, s.watch, s.still_from
     if order.restart_at == tick:
-        controlled, watched, still_from = control.START, motor_watch.START, tick + p.bounce
+        controlled, watched, still_from = control.START, motor_failure.START, tick + p.bounce
     charge = battery.value.charge if battery.due else s.charge
     controlled, c = control.step(p.law.value, controlled, p.interval, estimate_of(e), setpoint_of(wanted))
     watched, outputs = outcome(p, watched, still_from, charge, order, e, wanted, controlled.stage.name, c)

@@ -19,8 +19,8 @@ Triple = tuple[Finite, Finite, Finite]  # P, I, D
 
 
 class GainSet(Section):
-    """A gain set as its file writes it: P, I, D of each loop; outputs of lift, yaw and the inner loops are the force
-    quota of every rotor [N], those of the outer loops are tilts [rad]."""
+    """A gain set as its file writes it: P, I, D of each loop; outputs of altitude, yaw and the inner loops are the
+    force demand of every rotor [N], those of the outer loops are tilts [rad]."""
 
     TABLE: ClassVar[str] = "gains"
     OPTIONAL: ClassVar[bool] = True
@@ -28,7 +28,7 @@ class GainSet(Section):
     model_config = ConfigDict(strict=False)
 
     description: str  # one line
-    lift: Triple  # [N/m], [N/(m s)], [N s/m] altitude
+    altitude: Triple  # [N/m], [N/(m s)], [N s/m] altitude
     yaw: Triple  # [N/rad], [N/(rad s)], [N s/rad] heading
     roll_inner: Triple  # [N/rad], [N/(rad s)], [N s/rad] of tilt to the left, minus the roll: negative
     pitch_inner: Triple  # [N/rad], [N/(rad s)], [N s/rad] pitch

@@ -14,10 +14,10 @@ Triple = tuple[float, float, float]  # P, I, D
 
 
 class Gains(NamedTuple):
-    """The numbers of a gain set; outputs of lift, yaw and the inner loops are the force quota of every rotor [N], those
-    of the outer loops are tilts [rad]."""
+    """The numbers of a gain set; outputs of altitude, yaw and the inner loops are the force demand of every rotor [N],
+    those of the outer loops are tilts [rad]."""
 
-    lift: Triple  # over [m]
+    altitude: Triple  # over [m]
     yaw: Triple  # over [rad]
     roll_inner: Triple  # over [rad] of tilt to the left, which is minus the roll: negative
     pitch_inner: Triple  # over [rad]
@@ -36,13 +36,13 @@ class Airframe(NamedTuple):
     inertia_body: Vec3  # principal [kg m^2]
     rotor_x: Four  # positions of the rotors in body axes [m]
     rotor_y: Four
-    yaw_sign: Four  # +1 where thrust turns the vehicle to the left
+    reaction_sign: Four  # +1 where thrust turns the vehicle to the left
     torque_per_thrust: float  # reaction torque of a rotor over its thrust [m]
     motor: Motor
     voltage_max: float  # [V]
     resting_height: float  # world z of the vehicle's origin when it stands [m]
     gravity: float = 9.80665  # [m/s^2]
-    yaw_lead: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
+    spin_up_zero: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
@@ -59,7 +59,7 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
     forward = 1.0 if gains.feed_forward else 0.0
     x, y, z = (forward * i / (4.0 * arm) for i, arm in zip(airframe.inertia_body, arms(airframe), strict=True))
     return Parameters(
-        lift=Pid(*gains.lift),
+        altitude=Pid(*gains.altitude),
         yaw=Pid(*gains.yaw),
         roll_inner=Pid(*gains.roll_inner),
         pitch_inner=Pid(*gains.pitch_inner),
@@ -67,9 +67,9 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         pitch_outer=Pid(*gains.pitch_outer),
         smoothing=Smoothing(gains.reference_bandwidth, gains.reference_damping, forward * airframe.motor.time_constant),
         tilt_limit=gains.tilt_limit,
-        weight_quota=forward * weight,
+        hover_demand=forward * weight,
         gravity=airframe.gravity,
-        torque_quotas=(x, y, z),
+        torque_demands=(x, y, z),
         geometric=geometric,
         signs=_signs(airframe),
         thrust_max=thrust_max,
@@ -91,6 +91,6 @@ def _signs(airframe: Airframe) -> tuple[Vec3, Vec3, Vec3, Vec3]:
     # Thrust at (x, y) turns the body by (y, -x) times the thrust: theory.md, eq. (4.20).
     a, b, c, d = (
         (math.copysign(1.0, y), -math.copysign(1.0, x), math.copysign(1.0, turn))
-        for x, y, turn in zip(airframe.rotor_x, airframe.rotor_y, airframe.yaw_sign, strict=True)
+        for x, y, turn in zip(airframe.rotor_x, airframe.rotor_y, airframe.reaction_sign, strict=True)
     )
     return a, b, c, d

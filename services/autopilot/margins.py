@@ -25,15 +25,15 @@ def open_loops(
 ) -> dict[str, np.ndarray]:
     """Open-loop responses at FREQUENCIES of every loop.
 
-    lift, yaw: their single loops; roll, pitch: the inner loops, the outer ones open; y, x: the outer loops, the inner
-    ones closed; y_motors, x_motors: both loops of an axis, cut where the torque leaves the motors.
+    altitude, yaw: their single loops; roll, pitch: the inner loops, the outer ones open; y, x: the outer loops, the
+    inner ones closed; y_plant_input, x_plant_input: both loops of an axis, broken at the plant input.
 
     Args:
         p: the controller.
         airframe: what it controls.
         tick: the controller's period [s]; the command is held over it, which delays by half of it.
         delay: whole ticks between a measurement and its command's effect.
-        gain: true over believed acceleration per thrust, as a lighter or stronger vehicle has it.
+        gain: true over assumed acceleration per thrust, as a lighter or stronger vehicle has it.
     """
     s = 1j * FREQUENCIES
     return loops(p, airframe, s, gain * np.exp(-(delay + 0.5) * tick * s))
@@ -50,8 +50,8 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
     arm_z = 4.0 * airframe.torque_per_thrust
     i_x, i_y, i_z = airframe.inertia_body
     found = {
-        "lift": _pid(p.lift, s) * 4.0 / airframe.mass * lag * late / s**2,
-        "yaw": _pid(p.yaw, s) * arm_z / i_z * (1.0 + airframe.yaw_lead * s) * lag * late / s**2,
+        "altitude": _pid(p.altitude, s) * 4.0 / airframe.mass * lag * late / s**2,
+        "yaw": _pid(p.yaw, s) * arm_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * late / s**2,
     }
     smooth = p.smoothing.bandwidth**2 / (
         s**2 + 2.0 * p.smoothing.damping * p.smoothing.bandwidth * s + p.smoothing.bandwidth**2
@@ -60,8 +60,8 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
         ("roll", "y", -_pid(p.roll_inner, s), p.roll_outer, arm_x / i_x),
         ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, arm_y / i_y),
     ):
-        turn = effect * lag * late / s**2  # tilt over quota
-        demand = feedback * smooth  # quota over tilt asked for
+        turn = effect * lag * late / s**2  # tilt over demand
+        demand = feedback * smooth  # demand over tilt asked for
         if p.smoothing.lag > 0.0:
             demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
         position = _pid(outer, s) * p.gravity / s**2  # tilt asked for over tilt

@@ -12,7 +12,7 @@ class Motor(NamedTuple):
     """What the autopilot knows of a motor with its belt and propeller."""
 
     thrust_coefficient: float  # thrust over the square of the propeller's speed [N/(rad/s)^2]
-    belt_ratio: float  # propeller speed / motor speed
+    gear_ratio: float  # propeller speed / motor speed
     speed_constant: float  # KV [rpm/V]
     time_constant: float  # of the first-order lag of the speed [s]
 
@@ -21,11 +21,11 @@ class Motor(NamedTuple):
 def voltage(motor, thrust):
     """The voltage [V] that holds the speed of a thrust [N] >= 0."""
     propeller = math.sqrt(thrust / motor.thrust_coefficient)
-    return RPM * propeller / (motor.belt_ratio * motor.speed_constant)
+    return RPM * propeller / (motor.gear_ratio * motor.speed_constant)
 
 
 @leaf
 def thrust_at(motor, volts):
     """The steady thrust [N] at a voltage [V]; inverse of `voltage`."""
-    propeller = motor.speed_constant * volts * motor.belt_ratio / RPM
+    propeller = motor.speed_constant * volts * motor.gear_ratio / RPM
     return motor.thrust_coefficient * propeller * propeller

@@ -112,9 +112,9 @@ def known_airframe(scene: Scene) -> Airframe:
     thrust_coefficient = STANDARD_DENSITY * propeller.thrust_constant
     weight = 0.25 * frame.mass.total * gravity(scene)
     slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
-    spins_up = "rotor_gyro" in scene[Effects].tables and slope > 0.0
+    spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0
     x, y, _ = zip(*frame.rotors.position, strict=True)
-    a, b, c, d = frame.rotors.yaw_sign
+    a, b, c, d = frame.rotors.reaction_sign
     engine = frame.motor
     return Airframe(
         frame.mass.total,
@@ -123,7 +123,7 @@ def known_airframe(scene: Scene) -> Airframe:
         y,
         (a, b, c, d),
         torque_per_thrust,
-        Motor(thrust_coefficient, engine.belt_ratio, engine.speed_constant, engine.time_constant),
+        Motor(thrust_coefficient, engine.gear_ratio, engine.speed_constant, engine.time_constant),
         engine.max_voltage,
         start_height(scene),
         gravity(scene),

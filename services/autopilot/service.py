@@ -8,7 +8,7 @@ from cosim.schedule import Input, Port
 from cosim.setup import Setup
 from dynamics.cell import Cell
 from messages import topics as topic
-from services.autopilot import core, motor_watch
+from services.autopilot import core, motor_failure
 from services.autopilot.attention import Attention
 from services.autopilot.commander.attention import battery_thresholds
 from services.autopilot.commanding import Commanding, Operator, controller
@@ -46,7 +46,7 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     commanding = Commanding(given, law, thresholds, service, speak)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
-        law, motor_watch.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
+        law, motor_failure.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
     )
     inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(ports.BATTERY), Input(reference))
     gives = (outputs[ports.ACTUATORS], outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
@@ -57,7 +57,7 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     service.parts = [*_navigation(setup, given, attention, outputs[ports.ESTIMATE]), commanding, *control]
     texts, words = commanding.phases.table, commanding.words.table
     service.wires = wires(setup, given.estimate_every, given.status_every, texts, words)
-    service.spoken = (topic.OPERATOR, topic.ANSWERS) if given.operator else ()
+    service.spoken = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
     return service
 
 

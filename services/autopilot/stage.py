@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from dynamics.kernel import leaf
 
-STANDING, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
+ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
 CUT_HEIGHT = (
     0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
 )
@@ -16,11 +16,11 @@ STILL = 0.1  # [m/s] vertical speed of a vehicle that stands, as estimated
 class Stage(NamedTuple):
     """Where the flight is."""
 
-    name: int  # STANDING, FLYING or LANDED
+    name: int  # ON_GROUND, FLYING or LANDED
     waiting: float  # [s] since the vehicle was asked to stand and seemed still
 
 
-ON_GROUND = Stage(STANDING, 0.0)
+INITIAL_STAGE = Stage(ON_GROUND, 0.0)
 
 
 @leaf
@@ -28,8 +28,8 @@ def advance_stage(stage, resting_height, estimate, setpoint, dt):
     """The stage one tick of dt [s] on; `resting_height` is world z of the standing vehicle [m]."""
     height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
     asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
-    if stage.name == STANDING:
-        return Stage(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else STANDING, 0.0)
+    if stage.name == ON_GROUND:
+        return Stage(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else ON_GROUND, 0.0)
     if asked_height >= CUT_HEIGHT or asked_speed > 0.0:
         return Stage(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
     if stage.name == LANDED:

@@ -42,12 +42,12 @@ _FLIGHT = (
     Parameter("MPC_TKO_SPEED", "m/s", 1.5, 0.1, 5.0, "speed of taking off"),
     Parameter("MPC_LAND_SPEED", "m/s", 0.7, 0.1, 2.0, "speed of the last metres of landing"),
     Parameter("MPC_XY_CRUISE", "m/s", 5.0, 0.1, 15.0, "horizontal speed where none is asked for"),
-    Parameter("MPC_XY_VEL_MAX", "m/s", 8.0, 0.1, 15.0, "highest horizontal speed"),
-    Parameter("MPC_Z_VEL_MAX_UP", "m/s", 3.0, 0.1, 8.0, "highest speed of climbing"),
-    Parameter("MPC_Z_VEL_MAX_DN", "m/s", 1.5, 0.1, 4.0, "highest speed of sinking"),
-    Parameter("MPC_ACC_HOR", "m/s^2", 2.0, 0.2, 5.0, "highest acceleration of the setpoint"),
-    Parameter("MPC_JERK_AUTO", "m/s^3", 8.0, 1.0, 50.0, "highest jerk of the setpoint"),
-    Parameter("MPC_YAW_RATE", "rad/s", 0.8, 0.05, 3.0, "highest yaw rate of the setpoint"),
+    Parameter("MPC_XY_VEL_MAX", "m/s", 8.0, 0.1, 15.0, "maximum horizontal speed"),
+    Parameter("MPC_Z_VEL_MAX_UP", "m/s", 3.0, 0.1, 8.0, "maximum speed of climbing"),
+    Parameter("MPC_Z_VEL_MAX_DN", "m/s", 1.5, 0.1, 4.0, "maximum speed of sinking"),
+    Parameter("MPC_ACC_HOR", "m/s^2", 2.0, 0.2, 5.0, "maximum acceleration of the setpoint"),
+    Parameter("MPC_JERK_AUTO", "m/s^3", 8.0, 1.0, 50.0, "maximum jerk of the setpoint"),
+    Parameter("MPC_YAW_RATE", "rad/s", 0.8, 0.05, 3.0, "maximum yaw rate of the setpoint"),
     Parameter("NAV_ACC_RAD", "m", 1.0, 0.05, 50.0, "a waypoint that names no radius is reached within this"),
     Parameter("RTL_RETURN_ALT", "m", 15.0, 1.0, 200.0, "height of the way home; higher vehicles stay where they are"),
     Parameter("COM_DISARM_LAND", "s", 2.0, -1.0, 60.0, "after landing the motors are disarmed; not above 0: never"),
@@ -70,7 +70,7 @@ _FAILSAFES = (
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"outside of the fence: {_ACTION}", True),
 )
 _LOOPS = {
-    "lift": "MPC_Z",
+    "altitude": "MPC_Z",
     "pitch_outer": "MPC_X",
     "roll_outer": "MPC_Y",
     "roll_inner": "MC_ROLL",
@@ -78,7 +78,7 @@ _LOOPS = {
     "yaw": "MC_YAW",
 }
 _TERMS = "PID"
-_UNITS = {"lift": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # of P; the other loops': N/rad
+_UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # of P; the other loops': N/rad
 
 
 def table(scene: Scene) -> dict[str, Parameter]:
@@ -111,7 +111,7 @@ def changed(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, f
 
 def of_gains(gains: Any) -> list[Parameter]:
     """Those that are gains, with the numbers of a gain set as defaults."""
-    tilt = Parameter("MPC_TILT_MAX", "rad", gains.tilt_limit, 0.1, 1.2, "highest tilt about either axis")
+    tilt = Parameter("MPC_TILT_MAX", "rad", gains.tilt_limit, 0.1, 1.2, "maximum tilt about either axis")
     return [tilt, *(_gain(loop, k, getattr(gains, loop)[k]) for loop in _LOOPS for k in range(3))]
 
 

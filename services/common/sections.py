@@ -36,7 +36,7 @@ class Run(Section):
 
 
 class Exchange(Section):
-    """How often the services exchange messages, and whether the command closes the loop at once."""
+    """The communication step: how often services exchange messages, and whether the command closes the loop at once."""
 
     TABLE: ClassVar[str] = "exchange"
     rate: int = Field(default=250, gt=0, le=10_000)  # [Hz] one tick is 1/rate

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from messages import OperatorInput, header
-from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS, Topic
+from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
 from services.mavlink.announcements import Announcements
 from services.mavlink.channel import Channel, Signature
 from services.mavlink.clock import Clock, Instant
@@ -131,8 +131,8 @@ class Adapter:
             self.vehicle.time_ns = time_ns
             self.clock.now = Instant(time_ns, wall)
             self._step()
-        elif topic is ANSWERS:
-            acknowledgements = self.vehicle.get(ANSWERS)
+        elif topic is COMMAND_ACKS:
+            acknowledgements = self.vehicle.get(COMMAND_ACKS)
             self.commands.acknowledge(acknowledgements.answers)
             self.missions.observe((), acknowledgements.answers)
             for text in acknowledgements.text:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from messages import Answer, OperatorCommand
+from messages import CommandAck, OperatorCommand
 from services.mavlink.clock import Clock, Instant
 from services.mavlink.dialect import mavlink
 
@@ -78,4 +78,4 @@ class CommandQueue:
 
 
 def _rejection(text: str) -> Any:
-    return Answer(result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text=text)
+    return CommandAck(result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text=text)

@@ -8,13 +8,13 @@ from typing import Any
 
 from cosim.bundle import unpack_batch
 from cosim.process import BATCH_KEY, Process
-from messages.topics import ANSWERS, ESTIMATE, OPERATOR, STATUS
+from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS
 from services.common.operator import OPERATOR_KEY
 from services.mavlink.channel import read_key
 from services.mavlink.hub import Hub
 from services.mavlink.options import Options
 
-AT_ONCE = (ESTIMATE, STATUS, ANSWERS)
+AT_ONCE = (ESTIMATE, STATUS, COMMAND_ACKS)
 
 
 def run(process: Process, given: Any) -> None:

@@ -1,1 +1,1 @@
-"""The door for programs outside a run."""
+"""The listen endpoint for programs outside a run."""

@@ -1,4 +1,4 @@
-"""The door for programs outside a run, a viewer or a ROS 2 bridge: they connect to it as clients.
+"""The listen endpoint for programs outside a run, a viewer or a ROS 2 bridge: they connect to it as clients.
 
 It is no part of the lock step: the services are joined pairwise, and the router only passes on what they publish.
 """
@@ -11,7 +11,7 @@ from services.processes import RECORDER
 
 
 def run(process: Process, given: Any) -> None:
-    """Keep the door open until the recorder has the whole run, or until asked to stop."""
+    """Listen until the recorder has the whole run, or until asked to stop."""
     process.join()
     process.end_with(RECORDER)
     while not process.stopping:

@@ -70,7 +70,7 @@ def sample(p, s, key, tick, truth):
     return BarometerState(s.scale, s.turn_on, walk, line), BarometerReading(arrived[0], variance, valid)
 
 
-# TE MS5611-01BA03 data sheet: 1.2 Pa RMS and 1 Pa resolution at the highest oversampling, +-150 Pa, 1.2 bar. Here
+# TE MS5611-01BA03 data sheet: 1.2 Pa RMS and 1 Pa resolution at the maximum oversampling, +-150 Pa, 1.2 bar. Here
 # 1.5 Pa in samples at 50 Hz; instability (weather, warming) chosen.
 MS5611 = Barometer(
     noise_pa_per_sqrt_hz=0.3,

@@ -1,4 +1,4 @@
-"""Ultrasonic range finder that looks down (theory.md, section 3.2)."""
+"""Sonar: an ultrasonic rangefinder that looks down (theory.md, section 3.2)."""
 
 import math
 from typing import Annotated, NamedTuple

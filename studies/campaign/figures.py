@@ -31,14 +31,14 @@ def figures(seed: int, flight: Flight) -> Figures:
     truth, estimate, armed = flight.truth, flight.estimate, flight.armed
     n = len(armed)
     true = np.column_stack(list(flight.errors.values()))
-    believed = tracking.errors(flight.reference, estimate.position[:n], estimate.attitude[:n], armed)
+    estimated = tracking.errors(flight.reference, estimate.position[:n], estimate.attitude[:n], armed)
     off = np.abs(estimate.position[:n] - truth.position[:n])[armed]
     inside = (off <= SURE * estimate.position_std[:n][armed]).mean(axis=0) if armed.any() else np.full(3, np.nan)
     touchdown = _touchdown(flight)
     return Figures(
         seed,
         flight.rmse,
-        tracking.rmse(believed),
+        tracking.rmse(estimated),
         float(np.linalg.norm(true[:, :3], axis=1).max(initial=0.0)),
         (float(inside[0]), float(inside[1]), float(inside[2])),
         touchdown,

@@ -93,7 +93,7 @@ def plot(path: Path, found: Campaign) -> None:
             panel.set_ylim(0.0, 1.0)
             panel.yaxis.set_major_formatter(PercentFormatter(1.0))
         for row in panels:
-            row[0].set_ylabel("flights with less")
+            row[0].set_ylabel("share of flights with a smaller error")
         lines, names = panels[0, 0].get_legend_handles_labels()
         figure.legend(lines, names, loc="outside lower center", ncols=len(names))
         figure.suptitle(f"{found.scene}: {len(found.flights)} flights, {len(found.crashes)} crashes", fontsize=10)

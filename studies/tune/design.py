@@ -18,7 +18,7 @@ BACK_OFF = 0.95
 ATTEMPTS = 60
 
 
-def believed(airframe: Airframe, model: Hover) -> Airframe:
+def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
     """The airframe with the mass, inertia and lag that the linear model shows."""
     arms = (
         sum(abs(y) for y in airframe.rotor_y),
@@ -27,8 +27,8 @@ def believed(airframe: Airframe, model: Hover) -> Airframe:
     )
     x, y, z = (arm / k for arm, k in zip(arms, (model.roll, model.pitch, model.yaw), strict=True))
     return airframe._replace(
-        yaw_lead=model.yaw_lead,
-        mass=4.0 / model.lift,
+        spin_up_zero=model.spin_up_zero,
+        mass=4.0 / model.altitude,
         inertia_body=(x, y, z),
         motor=airframe.motor._replace(time_constant=model.lag),
     )
@@ -45,7 +45,7 @@ def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
     outer = loop(model.tilt, wanted.position, 0.39, 0.032)
     return GainSet(
         description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in wanted._asdict().items())} rad/s",
-        lift=loop(model.lift, wanted.lift, 0.39, 0.06),
+        altitude=loop(model.altitude, wanted.altitude, 0.39, 0.06),
         yaw=loop(model.yaw, wanted.yaw, 0.21, 0.017),
         roll_inner=(-roll[0], -roll[1], -roll[2]),
         pitch_inner=loop(model.pitch, wanted.attitude, 0.12, 0.024),
@@ -64,7 +64,7 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
     for name, response in loops.items():
         m = margins(response)
         # Only the single loops and the cuts at the motors scale with the vehicle's gain.
-        scaled = CORNERS if name in ("lift", "yaw", "x_motors", "y_motors") else ()
+        scaled = CORNERS if name in ("altitude", "yaw", "x_plant_input", "y_plant_input") else ()
         if not stable(response):
             found[name] = "unstable"
         elif math.degrees(m.phase) < PHASE:
@@ -89,7 +89,7 @@ def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, sa
     Raises:
         ValueError: no bandwidth down to a twentieth of what was wanted holds the margins.
     """
-    plant, now = believed(airframe, model), wanted
+    plant, now = assumed_airframe(airframe, model), wanted
     first: dict[str, str] = {}
     for _ in range(ATTEMPTS):
         wrong = shortfalls(open_loops(build(gain_set(model, now).plain(), airframe), plant, tick, DELAY))
@@ -110,7 +110,7 @@ def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, sa
 
 def _owner(name: str, wrong: dict[str, str]) -> str:
     """The bandwidth that is to blame for a loop: of a cascade the inner one first."""
-    if name in ("lift", "yaw"):
+    if name in ("altitude", "yaw"):
         return name
     return "attitude" if {"roll", "pitch"} & wrong.keys() else "position"
 

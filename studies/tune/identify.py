@@ -18,9 +18,9 @@ from studies.tune.linearise import Hover
 CUT = 60.0  # [rad/s] of the filter, above the loops' bandwidths
 CLEAR = 0.5  # [m] over the start below which the ground may have a say
 LAGS = (2e-3, 0.5)  # [s] between which the rotors' lag is sought
-QUIET = 2e-3  # share of the hovering thrust below which a quota counts as not moved
+QUIET = 2e-3  # share of the hovering thrust below which a demand counts as not moved
 LEAST_FIT = 50.0  # [%]
-LOOPS = ("lift", "roll", "pitch", "yaw")
+LOOPS = ("altitude", "roll", "pitch", "yaw")
 
 
 class Identified(NamedTuple):
@@ -31,13 +31,13 @@ class Identified(NamedTuple):
 
 
 class _Signals(NamedTuple):
-    quota: np.ndarray  # (n, 4) [N] asked of every rotor, as LOOPS
+    demand: np.ndarray  # (n, 4) [N] asked of every rotor, as LOOPS
     response: np.ndarray  # (n, 4) filtered acceleration along z [m/s^2] and angular accelerations [rad/s^2]
     used: np.ndarray  # (n,) bool: in the air
 
 
 def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
-    """Fit acceleration = gain * lag(quota) + constant to a log.
+    """Fit acceleration = gain * lag(demand) + constant to a log.
 
     Args:
         flight: the flight; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
@@ -55,9 +55,9 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
     signals = _signals(flight, p, tick)
     if signals.used.sum() * tick < 2.0:
         raise ValueError(f"{log}: {signals.used.sum() * tick:.1f} s above {CLEAR:g} m; expected 2 s or more")
-    hovering = float(signals.quota[signals.used, 0].mean())
+    hovering = float(signals.demand[signals.used, 0].mean())
     for k, name in enumerate(LOOPS):
-        moved = float(signals.quota[signals.used, k].std())
+        moved = float(signals.demand[signals.used, k].std())
         if moved < QUIET * hovering:
             raise ValueError(
                 f"{log}: {name} was not moved ({moved:.2g} N); fly scenes/excitation.toml and give its log"
@@ -72,7 +72,7 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
     for k, name in enumerate(LOOPS):
         (gains[name], *lead), left = _fitted(signals, k, lag, tick)
         if lead:
-            gains["yaw_lead"] = lead[0] / gains[name]
+            gains["spin_up_zero"] = lead[0] / gains[name]
         fit[name] = float(100.0 * (1.0 - np.sqrt(left)))
         if fit[name] < LEAST_FIT:
             raise ValueError(
@@ -83,26 +83,26 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
 
 
 def _signals(flight: Flight, p: Parameters, tick: float) -> _Signals:
-    """Quotas and filtered responses tick by tick."""
+    """Demands and filtered responses tick by tick."""
     thrust = flight.actuators.thrust
     sensed = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)
     if sensed:
         rates = flight.topic("imu").angular_velocity
-        lift = flight.topic("imu").linear_acceleration[:, 2]
+        vertical = flight.topic("imu").linear_acceleration[:, 2]
     else:
         rates = flight.truth.angular_velocity
-        lift = flight.truth.acceleration[:, 2]
+        vertical = flight.truth.acceleration[:, 2]
     height = flight.setpoint.position[:, 2]
     armed = flight.actuators.armed
     n = min(len(thrust), len(rates), len(height))
     delay = 1 if flight.metadata.get("coupling", "sequential") == "sequential" else 2
     signs = np.column_stack([np.ones(4), np.array(p.signs)])
-    quota = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ signs / 4.0])
+    demand = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ signs / 4.0])
     smooth, differ = _filters(tick)
-    response = np.column_stack([lfilter(*smooth, lift[:n]), lfilter(*differ, rates[:n], axis=0)])
+    response = np.column_stack([lfilter(*smooth, vertical[:n]), lfilter(*differ, rates[:n], axis=0)])
     flying = armed[:n] & (height[:n] > height[0] + CLEAR)
     settled = np.convolve(~flying, np.ones(round(10.0 / CUT / tick)))[:n] == 0  # the filters have forgotten the ground
-    return _Signals(quota, response, settled)
+    return _Signals(demand, response, settled)
 
 
 def _filters(tick: float) -> tuple[tuple, tuple]:
@@ -114,7 +114,7 @@ def _filters(tick: float) -> tuple[tuple, tuple]:
 def _fitted(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
     """Gains of a loop's thrust, for yaw also of its rate, for a lag [s]; and the share of variance that is left."""
     keep, used = np.exp(-tick / lag), signals.used
-    thrust = lfilter([1.0 - keep], [1.0, -keep], signals.quota[:, k])
+    thrust = lfilter([1.0 - keep], [1.0, -keep], signals.demand[:, k])
     regressors = [lfilter(*way, thrust)[used] for way in _filters(tick)[: 2 if LOOPS[k] == "yaw" else 1]]
     response = signals.response[used, k]
     found, *_ = np.linalg.lstsq(np.column_stack([*regressors, np.ones(used.sum())]), response)

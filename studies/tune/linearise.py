@@ -24,11 +24,11 @@ class Hover(NamedTuple):
     voltage: float  # [V] that holds it
     lag: float  # [s] of the rotors' speed behind the voltage
     thrust_slope: float  # [N s/rad] of one rotor over its speed
-    lift: float  # [m/s^2 / N] acceleration upwards over the force quota of every rotor
+    altitude: float  # [m/s^2 / N] acceleration upwards over the force demand of every rotor
     roll: float  # [rad/s^2 / N]
     pitch: float  # [rad/s^2 / N]
     yaw: float  # [rad/s^2 / N] of steady rotor speeds
-    yaw_lead: float  # [s] that of changing speeds over it: (1 + yaw_lead s) is the rotors' spin-up reaction
+    spin_up_zero: float  # [s] that of changing speeds over it: (1 + spin_up_zero s) is the rotors' spin-up reaction
     tilt: float  # [m/s^2 / rad] acceleration ahead over the pitch
 
 
@@ -42,7 +42,7 @@ def hover(scene: Scene) -> Hover:
     still = {name: table for name, table in scene[Effects].tables.items() if not name.startswith("wind")}
     p = parameters(frame, effects.from_scene(still, frame))
     signs = np.sign(np.array([[y, -x, 0.0] for x, y, _ in frame.rotors.position]))
-    signs[:, 2] = frame.rotors.yaw_sign
+    signs[:, 2] = frame.rotors.reaction_sign
 
     def seen(speeds: np.ndarray, voltage: float | np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
         state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)

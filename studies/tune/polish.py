@@ -16,14 +16,19 @@ from studies.campaign.setup import campaign_setup
 from studies.tracking import AXES
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.corners import flown, with_gains
-from studies.tune.design import DELAY, believed, gain_set, shortfalls
+from studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from studies.tune.linearise import Hover
 
 CANDIDATES = 60  # at most
 FIRST_STEP = 0.1  # of the logarithm of every bandwidth
 FINE = 2e-3  # of the same, and of the error, at which the search ends
 SEEDS = 3  # flights of each candidate, so that nothing is tuned to one draw of the noise
-MOVED_BY = {"lift": ("z",), "yaw": ("yaw",), "attitude": ("x", "y"), "position": ("x", "y")}  # what judges a bandwidth
+MOVED_BY = {
+    "altitude": ("z",),
+    "yaw": ("yaw",),
+    "attitude": ("x", "y"),
+    "position": ("x", "y"),
+}  # what judges a bandwidth
 AT_ALL = 1e-6  # [m], [rad]: an axis that errs less, since nothing moves it, is not judged
 
 
@@ -50,7 +55,7 @@ def polish(
     Its aim is the mean over the axes of the RMSE, each over that of `start`. What crashes or lacks a margin counts
     as worse than anything that flies. Deterministic: the same scene gives the same gains.
     """
-    plant, setup = believed(airframe, model), campaign_setup(scene)
+    plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
     seen: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
 
     def fly(gains: GainSet) -> list[Figures]:

@@ -15,14 +15,20 @@ from studies.tune.study import Judged, Tuned
 from studies.tune.systems import AXES, step, systems
 
 OMEGA = np.geomspace(0.2, 500.0, 1200)  # [rad/s]
-SHOWN = {"lift": "height", "yaw": "yaw", "pitch": "pitch (inner)", "x": "x (outer)", "x_motors": "x, cut at the motors"}
+SHOWN = {
+    "altitude": "altitude",
+    "yaw": "yaw",
+    "pitch": "pitch (inner)",
+    "x": "x (outer)",
+    "x_plant_input": "x, loop broken at the plant input",
+}
 LOOKS = ((REFERENCE, (0, (4, 3))), (FLOWN, "-"))  # of before and after
 
 
 def write(path: Path, found: Tuned) -> None:
     """Write the page."""
     both = (found.before, found.after)
-    loops = [systems(j.parameters, found.believed, found.tick, DELAY) for j in both]
+    loops = [systems(j.parameters, found.assumed, found.tick, DELAY) for j in both]
     with styled():
         sections = [
             Section("bode", "Open loops", png(_bode(both, loops)), _BODE),

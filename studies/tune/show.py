@@ -13,11 +13,11 @@ from studies.tune.polish import rmse
 from studies.tune.study import Tuned
 
 UNITS = {
-    "lift": "m/s^2 / N",
+    "altitude": "m/s^2 / N",
     "roll": "rad/s^2 / N",
     "pitch": "rad/s^2 / N",
     "yaw": "rad/s^2 / N",
-    "yaw_lead": "s",
+    "spin_up_zero": "s",
     "lag": "s",
 }
 

@@ -17,7 +17,7 @@ from studies.campaign.setup import campaign_setup
 from studies.flight import Flight
 from studies.tune import corners, polish
 from studies.tune.bandwidths import Bandwidths
-from studies.tune.design import DELAY, believed, design, gain_set, shortfalls
+from studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
 from studies.tune.identify import Identified, identify
 from studies.tune.linearise import Hover, hover
 
@@ -38,7 +38,7 @@ class Tuned(NamedTuple):
     tick: float  # [s] the controller's period
     compiled: Hover  # from the model
     identified: Identified | None  # from a log
-    believed: Airframe  # what the design is for
+    assumed: Airframe  # what the design is for
     before: Judged
     after: Judged
     gains: GainSet
@@ -81,7 +81,7 @@ def tune(
     compiled = hover(scene)
     identified = identify(Flight.read(log), own, compiled) if log else None
     model = identified.model if identified else compiled
-    plant = believed(airframe, model)
+    plant = assumed_airframe(airframe, model)
     before = _judged(config.gains, own, plant, tick)
     for name, why in before.shortfalls.items():
         say(f"warning: gains {config.gains}: {name}: {why}")
@@ -105,7 +105,7 @@ def _judged(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
 
 def write(path: Path, gains: GainSet) -> None:
     """Write a gain set as a scene can name it."""
-    lines = ["# Force quota [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
+    lines = ["# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
     for key, value in gains.model_dump().items():
         if isinstance(value, tuple):
             value = list(value)

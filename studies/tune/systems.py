@@ -11,7 +11,7 @@ from services.autopilot.margins import loops
 
 PADE = 3  # order of the approximation of the delay: 3e-5 off up to 200 rad/s
 CANCEL = 1e-6  # relative distance of poles and zeros that cancel
-AXES = {"z": "lift", "yaw": "yaw", "x": "x", "y": "y"}  # what a setpoint moves, and the loop that closes it
+AXES = {"z": "altitude", "yaw": "yaw", "x": "x", "y": "y"}  # what a setpoint moves, and the loop that closes it
 
 
 class Stepped(NamedTuple):

@@ -140,7 +140,7 @@ def bare_rate(p, t, m):
     d = p.effects[1].torque_constant * multirotor.STANDARD_DENSITY
     f = (b * (w[0] * w[0]), b * (w[1] * w[1]), b * (w[2] * w[2]), b * (w[3] * w[3]))
     q = (d * (w[0] * w[0]), d * (w[1] * w[1]), d * (w[2] * w[2]), d * (w[3] * w[3]))
-    x, y, s = layout.x_body, layout.y_body, layout.yaw_sign
+    x, y, s = layout.x_body, layout.y_body, layout.reaction_sign
     mx = (y[0] * f[0] + y[1] * f[1]) + (y[2] * f[2] + y[3] * f[3])
     my = -((x[0] * f[0] + x[1] * f[1]) + (x[2] * f[2] + x[3] * f[3]))
     mz = (s[0] * q[0] + s[1] * q[1]) + (s[2] * q[2] + s[3] * q[3])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cosim.bundle import BundleError, Bundles, pack_batch, unpack_batch
 from cosim.schedule import Input, Port
 from cosim.wire import Page
-from messages.topics import ANSWERS, OPERATOR, STATUS, TRUTH
+from messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
 from tests.cosim.small_graph import graph_of
 
 
@@ -102,7 +102,7 @@ def records(n):
 
 
 def test_a_batch_comes_out_as_it_went_in():
-    pages = [page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3), records(4), page(ANSWERS, 10, 2, 0)]
+    pages = [page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3), records(4), page(COMMAND_ACKS, 10, 2, 0)]
     stop, found = unpack_batch(pack_batch(pages, 27))
     assert stop == 27
     for before, after in zip(pages, found, strict=True):

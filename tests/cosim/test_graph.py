@@ -13,7 +13,7 @@ from cosim.wire import Wire
 from dynamics.cell import Cell
 from messages import Clock, Setpoint, header
 from messages.records import stamp_columns
-from messages.topics import ANSWERS, CLOCK, SETPOINT, TRAJECTORY
+from messages.topics import CLOCK, COMMAND_ACKS, SETPOINT, TRAJECTORY
 from tests.cosim.parts.readings import LIKE, Readings, expected
 from tests.cosim.parts.running_sum import Number, RunningSum
 from tests.cosim.small_graph import graph_of
@@ -123,7 +123,7 @@ def messages(pages):
 
 def test_pages_are_the_same_whatever_their_lengths():
     def flown(stops):
-        graph = graph_of(readings(end=50), wires=[wire(), wire(ANSWERS, 4)], page=64)
+        graph = graph_of(readings(end=50), wires=[wire(), wire(COMMAND_ACKS, 4)], page=64)
         pages = []
         for stop in stops:
             first = graph.tick
@@ -132,7 +132,7 @@ def test_pages_are_the_same_whatever_their_lengths():
         return messages(pages)
 
     whole = flown([64])
-    assert [len(whole[topic.name]) for topic in (SETPOINT, ANSWERS)] == [51, 13]
+    assert [len(whole[topic.name]) for topic in (SETPOINT, COMMAND_ACKS)] == [51, 13]
     assert flown(range(1, 64)) == flown([7, 8, 30, 31, 60]) == flown([50, 51]) == whole
     for tick, payload in whole[SETPOINT.name]:
         message = Setpoint.decode(payload)
@@ -151,13 +151,13 @@ def test_only_what_is_recorded_is_given_unless_a_topic_is_asked_for():
 def test_single_messages_come_once_and_in_the_ticks_asked_for():
     def say(graph, tick):
         graph.services[0].messages.append((CLOCK, tick, Clock().encode()))
-        graph.services[0].messages.append((ANSWERS, tick, bytes(8 + tick)))
+        graph.services[0].messages.append((COMMAND_ACKS, tick, bytes(8 + tick)))
 
     graph = graph_of(Acting("talker", lambda t: t + 2, (), say), page=16)
     graph.advance(8)
-    assert list(messages(graph.pages(0, 3, keep=True))) == [CLOCK.name, ANSWERS.name]
+    assert list(messages(graph.pages(0, 3, keep=True))) == [CLOCK.name, COMMAND_ACKS.name]
     assert [tick for tick, _ in messages(graph.pages(0, 3))[CLOCK.name]] == [0, 2]
-    assert [(tick, len(p)) for tick, p in messages(graph.pages(3, 8))[ANSWERS.name]] == [(4, 12), (6, 14)]
+    assert [(tick, len(p)) for tick, p in messages(graph.pages(3, 8))[COMMAND_ACKS.name]] == [(4, 12), (6, 14)]
     assert graph.pages(0, 8) == []
 
 

@@ -20,7 +20,7 @@ from services.table import load, resolve
 SCENE = Path("scenes/hover.toml")
 SHORT = ["run.duration=2"]
 SERVICES = {"autopilot", "plant", "trajectory", "recorder"}  # of this scene
-END = 10.0  # [s] a generous bound on how long an end may take; the aim is 2 s
+END = 10.0  # [s] a generous bound on how long an end may take; the target is 2 s
 STARTED = 120.0  # [s] a run gets to start, with kernels to compile
 
 

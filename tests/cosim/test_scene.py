@@ -70,11 +70,16 @@ def test_settings_by_class_and_by_key():
 
 
 def test_overrides_change_values_add_tables_and_reach_into_lists():
-    overrides = ["run.seed=7", "exchange.coupling=parallel", "effects.rotor_gyro={}", "trajectory.phase.1.duration=2"]
+    overrides = [
+        "run.seed=7",
+        "exchange.coupling=parallel",
+        "effects.gyroscopic_torque={}",
+        "trajectory.phase.1.duration=2",
+    ]
     scene = load(HOVER, overrides)
     assert scene[Run].seed == 7
     assert scene[Exchange].loop_delay == 2
-    assert "rotor_gyro" in scene.tables("effects")
+    assert "gyroscopic_torque" in scene.tables("effects")
     assert scene[Trajectory].phase[1].duration == 2.0
     assert scene.overrides == tuple(overrides)
 
@@ -262,7 +267,7 @@ def test_choices_are_listed():
     assert "wind_random" in said(HOVER, "effects.wind={}")
     assert "paper" in said(HOVER, "autopilot.gains=none")
     assert "delivery_drone" in said(HOVER, "vehicle.airframe=none")
-    assert "beer_carrier" in said(HOVER, "vehicle.model=none")
+    assert "unloading" in said(HOVER, "vehicle.model=none")
     assert "minimum_jerk" in said(HOVER, "trajectory.phase.0.z.kind=none")
     assert "autopilot" in said(HOVER, "nothing.here=1")
     assert "expected one of duration, name, x, y, yaw, z" in said(HOVER, "trajectory.phase.0.q=1")

@@ -36,7 +36,7 @@ def test_the_thrust_stand_gives_the_propeller_of_the_example():
 
 def test_the_example_could_fly():
     vehicle = Airframe.model_validate(EXAMPLE)
-    assert 1.8 < performance.highest_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
+    assert 1.8 < performance.maximum_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
     assert performance.trim(vehicle).thrust == pytest.approx(2.0 * 9.80665 / 4.0)
     assert 10.0 < performance.hover_time(vehicle) / 60.0 < 30.0
-    assert performance.highest_speed(vehicle) > 8.0
+    assert performance.maximum_speed(vehicle) > 8.0

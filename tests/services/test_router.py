@@ -19,7 +19,7 @@ def test_a_client_hears_the_run(tmp_path):
             try:
                 with ZenohBus(connect=[door], mode="client") as bus:
                     heard = bus.subscribe("test-router/drone1/pose").get(timeout=2.0)
-            except BusError:  # the door is not open yet
+            except BusError:  # nobody listens yet
                 time.sleep(0.1)
         assert run.wait(timeout=200) == 0
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3

@@ -21,14 +21,14 @@ def test_units_of_the_card():
     rows = {row.name: row for row in card(VEHICLE)}
     drone = load_airframe(VEHICLE)
     assert rows["hover time"].computed == pytest.approx(performance.hover_time(drone) / 60.0)
-    assert rows["highest tilt"].computed == pytest.approx(math.degrees(performance.highest_tilt(drone)))
+    assert rows["maximum tilt"].computed == pytest.approx(math.degrees(performance.maximum_tilt(drone)))
     assert rows["hover time"].published == pytest.approx(19.3)
-    assert rows["highest tilt"].published == pytest.approx(58.9, abs=0.05)
+    assert rows["maximum tilt"].published == pytest.approx(58.9, abs=0.05)
 
 
 def test_where_nothing_is_chosen_the_models_come_near_the_paper():
     rows = {row.name: row for row in card(VEHICLE)}
-    for name in ("hover time", "highest payload", "ceiling", "highest tilt"):
+    for name in ("hover time", "maximum payload", "ceiling", "maximum tilt"):
         assert rows[name].computed == pytest.approx(rows[name].published, rel=0.06), name
 
 

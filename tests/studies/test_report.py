@@ -71,10 +71,10 @@ def messages(std=0.05, rotors=4, reference=True):
                 Actuators(stamp)._replace(armed=t >= 1.0, attitude_reference=Vector3(asked[3], asked[4], 0.0)),
             )
         if tick % 5 == 0:
-            believed = pose._replace(position=Point(position[0] + BELIEVED, *position[1:]))
+            estimated = pose._replace(position=Point(position[0] + BELIEVED, *position[1:]))
             wrong = ("gps", "sonar") if tick == 50 else ("gps",) if tick == 100 else ()
             spread = dict.fromkeys(("position_std", "velocity_std", "attitude_std"), Vector3(std, std, std))
-            yield "estimate", Estimate(stamp, believed)._replace(rejected=wrong, **spread)
+            yield "estimate", Estimate(stamp, estimated)._replace(rejected=wrong, **spread)
             yield "status", Status(stamp)._replace(landed=t >= SECONDS, finished=t >= SECONDS)
 
 
@@ -202,9 +202,12 @@ def test_attitude_error_is_in_the_body_frame(tmp_path):
     """Truth yawed by 90 degrees; an estimate rolled 0.1 rad further about the body's x axis errs by (0.1, 0, 0)."""
     c = math.cos(math.pi / 4)
     true, roll = Quaternion(x=0.0, y=0.0, z=c, w=c), (math.sin(0.05), math.cos(0.05))
-    believed = Quaternion(x=c * roll[0], y=c * roll[0], z=c * roll[1], w=c * roll[1])  # true * roll, by hand
+    estimated = Quaternion(x=c * roll[0], y=c * roll[0], z=c * roll[1], w=c * roll[1])  # true * roll, by hand
     stamp = header(0, "world")
-    both = [("truth", VehicleState(stamp, Pose(Point(), true))), ("estimate", Estimate(stamp, Pose(Point(), believed)))]
+    both = [
+        ("truth", VehicleState(stamp, Pose(Point(), true))),
+        ("estimate", Estimate(stamp, Pose(Point(), estimated))),
+    ]
     later = [(topic, m._replace(header=header(10**9, "world"))) for topic, m in both]
     error = estimator.errors(Flight.read(record(tmp_path / "yawed.mcap", both + later)))
     assert error[:, 6:] == pytest.approx(np.array([[0.1, 0.0, 0.0]] * 2), abs=1e-12)

@@ -73,12 +73,12 @@ impl Vehicle {
             inertia: numbers(&a["inertia_body"]),
             rotor_x: numbers(&a["rotor_x"]),
             rotor_y: numbers(&a["rotor_y"]),
-            spin: numbers(&a["yaw_sign"]),
+            spin: numbers(&a["reaction_sign"]),
             torque_per_thrust: f(&a["torque_per_thrust"]),
             thrust_coefficient: f(&motor["thrust_coefficient"]),
             volts_per_speed: 30.0
                 / std::f64::consts::PI
-                / (f(&motor["belt_ratio"]) * f(&motor["speed_constant"])),
+                / (f(&motor["gear_ratio"]) * f(&motor["speed_constant"])),
             voltage_max: f(&a["voltage_max"]),
             resting_height: f(&a["resting_height"]),
         }

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from messages import Answer
+from messages import CommandAck
 from services.autopilot.commander import checks, transitions
 from services.autopilot.commander.fence import Fence, rally_points
 from services.autopilot.commander.flight_mode import value
@@ -38,12 +38,12 @@ def handle(context: Context, command: Any) -> None:
     outbox = context.outbox
     handler = HANDLERS.get(command.kind)
     if handler is None:
-        outbox.acknowledge(command, Answer.UNSUPPORTED, f"unknown command {command.kind} {command.text}".strip())
+        outbox.acknowledge(command, CommandAck.UNSUPPORTED, f"unknown command {command.kind} {command.text}".strip())
         return
     try:
         handler(context, command)
     except ValueError as error:
-        result = Answer.DENIED if isinstance(error, Denied) else Answer.TEMPORARILY_REJECTED
+        result = CommandAck.DENIED if isinstance(error, Denied) else CommandAck.TEMPORARILY_REJECTED
         if command.kind not in STREAMS:
             outbox.acknowledge(command, result, str(error), _present_value(context, command))
             outbox.say(str(error))
@@ -51,7 +51,7 @@ def handle(context: Context, command: Any) -> None:
     pending = context.state.pending_arm
     waits = pending is not None and pending.command is command
     if command.kind not in STREAMS and not waits:
-        outbox.acknowledge(command, Answer.ACCEPTED, "", _present_value(context, command))
+        outbox.acknowledge(command, CommandAck.ACCEPTED, "", _present_value(context, command))
 
 
 def _present_value(context: Context, command: Any) -> float:
@@ -67,7 +67,7 @@ def arm(context: Context, command: Any) -> None:
         time_left = value(command.values, 1)
         if time_left > 0.0:
             context.state.pending_arm = PendingArm(command, time_left)
-            context.outbox.acknowledge(command, Answer.IN_PROGRESS, reasons[0])
+            context.outbox.acknowledge(command, CommandAck.IN_PROGRESS, reasons[0])
             return
         if value(command.values, 0) != 1.0:
             raise ValueError(f"arming refused: {'; '.join(reasons)}")

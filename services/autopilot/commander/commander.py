@@ -6,7 +6,7 @@ Deterministic: it knows the views of its ticks and nothing else. Every time-out 
 import math
 
 from dynamics.vector import ZERO
-from messages import Answer
+from messages import CommandAck
 from services.autopilot.commander import checks, failsafes
 from services.autopilot.commander.attention import battery_thresholds, needs_attention
 from services.autopilot.commander.command_handlers import handle
@@ -133,9 +133,9 @@ def _retry_arming(context: Context) -> None:
     if not reasons:
         state.pending_arm = None
         arm(context)
-        outbox.acknowledge(command, Answer.ACCEPTED)
+        outbox.acknowledge(command, CommandAck.ACCEPTED)
     elif time_left < view.dt:
         state.pending_arm = None
-        outbox.acknowledge(command, Answer.TEMPORARILY_REJECTED, reasons[0])
+        outbox.acknowledge(command, CommandAck.TEMPORARILY_REJECTED, reasons[0])
     else:
         state.pending_arm = state.pending_arm._replace(time_left=time_left - view.dt)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from messages import Answer
+from messages import CommandAck
 from services.autopilot.interface import Setpoint
 
 
@@ -31,7 +31,7 @@ class Request(NamedTuple):
 
     setpoint: Setpoint | None  # to be followed; None: the scene's trajectory
     parameters: Mapping[str, float] | None  # values of all, where one has changed
-    acknowledgements: tuple[Any, ...]  # of commands, as `Answer` messages
+    acknowledgements: tuple[Any, ...]  # of commands, as `CommandAck` messages
     texts: tuple[str, ...]  # for the operator
     reset_controller: bool  # the vehicle is on the ground: the controller must be as before a flight
     estimate_every_tick: bool  # the setpoint was made from the estimate: show a new one at the next tick
@@ -53,4 +53,4 @@ class Outbox:
 
     def acknowledge(self, command: Any, result: int, text: str = "", value: float = 0.0) -> None:
         """Tell whoever gave a command what became of it."""
-        self.acknowledgements.append(Answer(command.source, command.id, result, float(result == 0), text, value))
+        self.acknowledgements.append(CommandAck(command.source, command.id, result, float(result == 0), text, value))

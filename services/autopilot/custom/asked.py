@@ -12,7 +12,7 @@ from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, s
 from services.autopilot.custom.demand import DEMAND, Demand, demand
 from services.autopilot.custom.periodic import PeriodicPart
 from services.autopilot.setup import CustomCode
-from services.autopilot.stage import FLYING, ON_GROUND, Stage, advance_stage
+from services.autopilot.stage import FLYING, INITIAL_STAGE, Stage, advance_stage
 from services.common import ports
 
 _advance_stage, _estimate_of = uncompiled(advance_stage), uncompiled(estimate_of)
@@ -51,10 +51,10 @@ class AskedController(PeriodicPart):
         estimate, order = graph.latest(ports.ESTIMATE, tick), graph.latest(ORDER, tick)
         follows = order.follow and self._reference != NO_TRAJECTORY
         setpoint = graph.latest(self._reference, tick) if follows else order.reference
-        stage = Stage(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else ON_GROUND
+        stage = Stage(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else INITIAL_STAGE
         if stage.name != FLYING or order.restart_at == tick:
             self._controller = None
-            before = ON_GROUND if order.restart_at == tick else stage
+            before = INITIAL_STAGE if order.restart_at == tick else stage
             asked = _estimate_of(estimate), _setpoint_of(setpoint)
             stage = _advance_stage(before, self._resting_height, *asked, graph.setup.interval)
         if stage.name != FLYING:

@@ -31,7 +31,7 @@ def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
         a.inertia_body,
         a.gravity,
         tuple((x, y, 0.0) for x, y in zip(a.rotor_x, a.rotor_y, strict=True)),
-        a.yaw_sign,
+        a.reaction_sign,
         a.torque_per_thrust,
         thrust_at(a.motor, a.voltage_max),
         a.voltage_max,

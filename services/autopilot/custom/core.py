@@ -1,5 +1,5 @@
 """The autopilot's step with a controller of the user's: the stages of the flight, then that controller, then control
-allocation, motor model, motor watch and status as of the cascaded PID."""
+allocation, motor model, motor failure detection and status as of the cascaded PID."""
 
 import sys
 from typing import Any, NamedTuple
@@ -9,10 +9,10 @@ from numba.extending import overload
 from cosim.part import GO_ON
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
-from services.autopilot import motor_watch
+from services.autopilot import motor_failure
 from services.autopilot.core import Controller, estimate_of, outcome, setpoint_of
 from services.autopilot.custom.demand import Demand, command, demand
-from services.autopilot.stage import FLYING, ON_GROUND, Stage, advance_stage
+from services.autopilot.stage import FLYING, INITIAL_STAGE, Stage, advance_stage
 
 OFF = Demand()
 
@@ -40,14 +40,14 @@ class CustomState(NamedTuple):
     stage: Stage
     own: Any
     held: Demand  # of the user's last step
-    watch: motor_watch.State
+    watch: motor_failure.State
     still_from: int  # [tick]
     charge: float  # of the battery, fraction; NaN: not known
 
 
 def start(p: CustomController) -> CustomState:
     """Before the first tick."""
-    return CustomState(ON_GROUND, p.own_start, OFF, motor_watch.START, 0, float("nan"))
+    return CustomState(INITIAL_STAGE, p.own_start, OFF, motor_failure.START, 0, float("nan"))
 
 
 def _ask(p, s, time, estimate, setpoint, by_port):
@@ -76,7 +76,7 @@ def step(p, s, tick, inputs):
     wanted = inputs[3].value if order.follow else order.reference
     stage, watched, still_from = s.stage, s.watch, s.still_from
     if order.restart_at == tick:
-        stage, watched, still_from = ON_GROUND, motor_watch.START, tick + c.bounce
+        stage, watched, still_from = INITIAL_STAGE, motor_failure.START, tick + c.bounce
     charge = battery.value.charge if battery.due else s.charge
     stage = advance_stage(stage, c.law.value.resting_height, estimate_of(e), setpoint_of(wanted), c.interval)
     own, held = s.own, s.held

@@ -6,7 +6,7 @@ from numba.extending import overload
 
 from dynamics.kernel import leaf
 from services.autopilot.interface import Command
-from services.autopilot.mixer import Quotas, clamp, mix, saturate
+from services.autopilot.mixer import Demands, clamp, mix, saturate
 from services.autopilot.motor import thrust_at, voltage
 from services.autopilot.stage import FLYING, LANDED
 from services.common.controllers import Four, MotorVoltages, ThrustAndMoments
@@ -62,7 +62,7 @@ def command(law, arms, voltage_max, asked, yaw, stage):
         voltage_max: [V].
         asked: Demand.
         yaw: of the setpoint [rad].
-        stage: STANDING, FLYING or LANDED.
+        stage: ON_GROUND, FLYING or LANDED.
     """
     off = (0.0, 0.0, 0.0, 0.0)
     if stage != FLYING:
@@ -77,8 +77,8 @@ def command(law, arms, voltage_max, asked, yaw, stage):
         )
         thrust = (thrust_at(m, volts[0]), thrust_at(m, volts[1]), thrust_at(m, volts[2]), thrust_at(m, volts[3]))
     else:
-        quotas = Quotas(0.25 * n[0], 0.25 * n[1] / arms[0], 0.25 * n[2] / arms[1], 0.25 * n[3] / arms[2])
-        t = mix(law.signs, saturate(law.signs, quotas, top))
+        demands = Demands(0.25 * n[0], 0.25 * n[1] / arms[0], 0.25 * n[2] / arms[1], 0.25 * n[3] / arms[2])
+        t = mix(law.signs, saturate(law.signs, demands, top))
         thrust = (clamp(t[0], 0.0, top), clamp(t[1], 0.0, top), clamp(t[2], 0.0, top), clamp(t[3], 0.0, top))
         volts = (voltage(m, thrust[0]), voltage(m, thrust[1]), voltage(m, thrust[2]), voltage(m, thrust[3]))
     return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)

@@ -9,7 +9,7 @@ from dynamics.vector import Vec3, norm
 from services.autopilot import estimator
 from services.autopilot.estimator import Estimator
 from services.autopilot.navigation.state import NavigationState
-from services.autopilot.stage import STANDING
+from services.autopilot.stage import ON_GROUND
 
 STILL = 0.02  # ratio by which the specific force of a vehicle at rest may differ from gravity
 STANDSTILL_EVERY = 10  # readings between two corrections by a vehicle that is known to stand
@@ -40,7 +40,7 @@ def step(p, s, tick, inputs):
         force_variance = r.specific_force_variance if r.valid else -1.0
         valid = omega_variance >= 0.0 and force_variance >= 0.0
         x = estimator.predict(p.filter, x, r.omega_body, r.specific_force_body, omega_variance, force_variance, valid)
-        on_ground = not flight.due or (flight.value.stage == STANDING and tick >= flight.value.still_from)
+        on_ground = not flight.due or (flight.value.stage == ON_GROUND and tick >= flight.value.still_from)
         if on_ground and tick % p.standstill_every == 0:
             x = estimator.update_standstill(p.filter, x, omega_variance, force_variance)
     return NavigationState(begun, x), (), GO_ON

@@ -2,7 +2,7 @@
 
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters
+from dynamics.vehicles.unloading import UnloadingParameters
 from services.common.ports import TrueState
 from services.plant.cores.autonomous import TOLD
 
@@ -17,4 +17,4 @@ def told(p, t, x):
     )
 
 
-TOLD[BeerCarrierParameters] = told
+TOLD[UnloadingParameters] = told

@@ -7,17 +7,17 @@ from cosim.part import GO_ON
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import NO_ROTATION, exp
 from dynamics.vector import ZERO, add, scale
-from dynamics.vehicles import beer_carrier, beer_places
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters
+from dynamics.vehicles import unloading, unloading_places
+from dynamics.vehicles.unloading import UnloadingParameters
 from services.common.ports import BodyMotions
 
-NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(beer_places.ROLLERS)], "ground")
+NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_places.ROLLERS)], "ground")
 
 
 class UnloadingView(NamedTuple):
     """The crate whose bodies are told."""
 
-    carrier: BeerCarrierParameters
+    carrier: UnloadingParameters
     interval: float  # [s] a tick
 
 
@@ -40,13 +40,13 @@ def _on_roller(rollers, i):
 def step(p, s, tick, inputs):
     """The motions of the bodies at `tick`; the door lies along z of its frame."""
     c, t = p.carrier, tick * p.interval
-    rollers, door, ground, walls = beer_carrier.forces_on_pack(c, t, s)
+    rollers, door, ground, walls = unloading.forces_on_pack(c, t, s)
     on_pack = ZERO
     for force in rollers:
         on_pack = add(on_pack, force)
     on_pack = add(add(add(on_pack, door), ground), walls)
     hinge, along = (0.0, 0.0, c.floor_height), exp((0.0, c.tilt, 0.0))
-    turning = (0.0, beer_places.roller_speed(c, t), 0.0)
+    turning = (0.0, unloading_places.roller_speed(c, t), 0.0)
     told = BodyMotions(
         (s.position_world, hinge, _roller(c, 0), _roller(c, 1), _roller(c, 2), _roller(c, 3), ZERO),
         (s.attitude, exp((0.0, c.tilt + s.door[0], 0.0)), along, along, along, along, NO_ROTATION),

@@ -80,7 +80,7 @@ def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, 
 def problems() -> dict[str, Problem]:
     """One."""
     frame = load_airframe(AIRFRAME)
-    gyro = effects.from_scene({"rotor_gyro": {}}, frame)
+    gyro = effects.from_scene({"gyroscopic_torque": {}}, frame)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     plain = multirotor.parameters(frame, gyro)
     start = multirotor.initial_state(plain, STILL, ATTITUDE, SPEED)
@@ -107,7 +107,7 @@ def problems() -> dict[str, Problem]:
 
 def thrown(p: Any, frame: Any) -> FiveBodies:
     """The five bodies at the start, blades along x."""
-    speeds = tuple(-sign * SPEED for sign in frame.rotors.yaw_sign)
+    speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
     machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
     return hold.together(machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds)
 
@@ -147,7 +147,7 @@ def inertia(frame: Any, angles: Any) -> np.ndarray:
 def reference(frame: Any) -> np.ndarray:
     """(position, R, velocity, omega) at the end: without torque from outside the angular momentum keeps its direction
     in the world, R' = R hat(omega) with J(angles) omega + h = R^T L (theory.md, eq. (8.50)); shape (18,)."""
-    spin = -np.array(frame.rotors.yaw_sign) * SPEED
+    spin = -np.array(frame.rotors.reaction_sign) * SPEED
     own = np.array([0.0, 0.0, frame.rotors.inertia * spin.sum()])
     start = np.array(rotation_matrix(ATTITUDE)).reshape(3, 3)
     momentum = start @ (inertia(frame, 0.0 * spin) @ OMEGA + own)

@@ -57,7 +57,7 @@ def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
     drag = rotor.torque_constant * STANDARD_DENSITY * speed**2
     place = np.column_stack([layout.x_body, layout.y_body, layout.z_body])
     torque = np.cross(place, np.outer(thrust, (0.0, 0.0, 1.0))).sum(axis=0)
-    torque[2] += np.dot(layout.yaw_sign, drag)
+    torque[2] += np.dot(layout.reaction_sign, drag)
     inertia = np.array(body.inertia)
     omega_rate = (torque - np.cross(o, inertia * o)) / inertia
     acceleration = R[:, 2] * thrust.sum() / body.mass - [0.0, 0.0, gravity.acceleration]

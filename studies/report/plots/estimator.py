@@ -57,9 +57,9 @@ def errors(flight: Flight) -> np.ndarray:
     nearer = stamps[later] - wanted > wanted - stamps[later - 1]
     at = later - nearer
     both = flight.truth, flight.estimate
-    true, believed = (np.hstack([view.position, view.velocity]) for view in both)
+    true, estimated = (np.hstack([view.position, view.velocity]) for view in both)
     R_true, R_estimate = (Rotation.from_quat(view.orientation) for view in both)
-    return np.column_stack([believed - true[at], (R_true[at].inv() * R_estimate).as_rotvec()])
+    return np.column_stack([estimated - true[at], (R_true[at].inv() * R_estimate).as_rotvec()])
 
 
 def refusals(flight: Flight) -> str:

@@ -11,13 +11,13 @@ from studies.report.style import AXIS_COLOURS, BOUND, FLOWN, REFERENCE, WIDTH
 ORDER = 5
 TITLE = "Unloading"
 NEEDS = ("truth", "bodies")
-MODELS = ("beer_carrier",)
+MODELS = ("unloading",)
 INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
 
 
 def draw(flight: Flight) -> tuple[Figure, str]:
     """The three displacements, door and forces over time, and six instants from the side."""
-    crate = flight.origin.scene["beer_carrier"]
+    crate = flight.origin.scene["unloading"]
     bodies = flight.topic("bodies")
     t, place = bodies.times, bodies.position
     turn = np.array([_pitch(q) for q in np.moveaxis(bodies.orientation[:, :2], 1, 0)]).T

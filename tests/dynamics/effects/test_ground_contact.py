@@ -58,7 +58,7 @@ def test_rests_for_an_hour_without_drift(drone):
 def test_sticks_on_a_slope_below_the_friction_angle(drone):
     p, state = settled(drone, angle=math.radians(20))
     later = run(p, state, 600.0).motion
-    assert np.abs(np.subtract(later.position_world, state.motion.position_world)).max() < 1e-6  # bar: 1 mm
+    assert np.abs(np.subtract(later.position_world, state.motion.position_world)).max() < 1e-6  # target: 1 mm
 
 
 def test_the_smooth_law_creeps_on_the_same_slope(drone):

@@ -1,4 +1,4 @@
-"""The seed's method: its leading error is the curvature term that theory.md, eq. (6.12) gives."""
+"""The paper's method: its leading error is the curvature term that theory.md, eq. (6.12) gives."""
 
 from typing import NamedTuple
 

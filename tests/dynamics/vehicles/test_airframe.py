@@ -27,9 +27,9 @@ def test_the_delivery_drone_loads():
         ("blades = 2 ", 'blades = "two" ', "propeller.blades"),
         ("[0.27, 0.26, 0.42]", "[0.1, 0.1, 0.42]", "triangle"),
         (
-            "yaw_sign = [1.0, -1.0, 1.0, -1.0]",
-            "yaw_sign = [1.0, -1.0, 0.5, -1.0]",
-            "rotors.yaw_sign: expected +1 or -1 for each of the 4 rotors, got [",
+            'spin_direction = ["cw", "ccw", "cw", "ccw"]',
+            'spin_direction = ["cw", "ccw", "left", "ccw"]',
+            "rotors.spin_direction",
         ),
         ("[motor]", "[engine]", "engine: unknown key 'engine'"),
         ("[motor]", "[motor", "not valid TOML"),

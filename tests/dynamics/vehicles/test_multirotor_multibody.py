@@ -19,7 +19,7 @@ from dynamics.vehicles.multirotor import MultirotorDrive
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
-ACTIVE = effects.from_scene({"gravity": {}, "rotor_thrust": {}, "rotor_gyro": {}, "body_drag": {}}, DRONE)
+ACTIVE = effects.from_scene({"gravity": {}, "rotor_thrust": {}, "gyroscopic_torque": {}, "body_drag": {}}, DRONE)
 VOLTS = (31.0, 33.0, 30.0, 34.0)
 SPEED = 320.0
 
@@ -37,7 +37,7 @@ def reduced():
     rotors, inertia = DRONE.rotors, np.array(DRONE.mass.inertia)
     for hub in np.array(rotors.position):
         inertia += rotors.mass * (hub @ hub - hub * hub) + [4.349e-4, 4.349e-4, rotors.inertia]
-    # the rotor's axial inertia turns with the body too; the spin is `rotor_gyro`'s
+    # the rotor's axial inertia turns with the body too; the spin is `gyroscopic_torque`'s
     return p._replace(body=body_of(DRONE.mass.total, tuple(inertia.tolist())))
 
 
@@ -107,7 +107,7 @@ def test_hinges_carry_thrust_and_drives_hold_the_drag(drive):
     for k, (force, torque) in enumerate(propellers):
         carried = DRONE.rotors.mass * (9.80665 + up) - seen.thrust[k]
         assert force == pytest.approx((0.0, 0.0, carried), abs=1e-11)
-        assert torque == pytest.approx((0.0, 0.0, -DRONE.rotors.yaw_sign[k] * seen.torque[k]), abs=1e-11)
+        assert torque == pytest.approx((0.0, 0.0, -DRONE.rotors.reaction_sign[k] * seen.torque[k]), abs=1e-11)
     assert chassis[0][2] == pytest.approx(-sum(force[2] for force, _ in propellers))
     assert chassis[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-10)
 

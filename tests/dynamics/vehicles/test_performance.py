@@ -32,28 +32,28 @@ def test_forces_balance_at_speed():
 
 
 def test_power_has_a_minimum_at_speed_zero_or_above_and_grows_in_the_end():
-    power = [performance.trim(DRONE, v).power for v in np.linspace(0.0, performance.highest_speed(DRONE), 30)]
+    power = [performance.trim(DRONE, v).power for v in np.linspace(0.0, performance.maximum_speed(DRONE), 30)]
     assert power[-1] > 1.5 * min(power)
 
 
 def test_table_8_of_the_source():
     """Hover time 19.3 min, payload 9.9 kg, ceiling 5.3 km, tilt 58.9 degrees: an online estimator's figures."""
     assert performance.hover_time(DRONE) / 60 == pytest.approx(19.3, rel=0.05)
-    assert performance.highest_payload(DRONE) == pytest.approx(9.9, rel=0.05)
+    assert performance.maximum_payload(DRONE) == pytest.approx(9.9, rel=0.05)
     assert performance.ceiling(DRONE) == pytest.approx(5300, rel=0.06)
-    assert math.degrees(performance.highest_tilt(DRONE)) == pytest.approx(58.9, abs=3)
+    assert math.degrees(performance.maximum_tilt(DRONE)) == pytest.approx(58.9, abs=3)
 
 
 def test_at_the_ceiling_the_highest_thrust_is_the_weight():
     h = performance.ceiling(DRONE)
     density = 1.293 * 273 / 288 * (1 - 0.0065 * h / 288) ** 5.2561
-    assert performance.highest_thrust(DRONE, density) == pytest.approx(WEIGHT)
+    assert performance.maximum_thrust(DRONE, density) == pytest.approx(WEIGHT)
 
 
 def test_the_highest_speed_uses_all_the_voltage():
-    top = performance.highest_speed(DRONE)
+    top = performance.maximum_speed(DRONE)
     assert performance.trim(DRONE, top).voltage == pytest.approx(44.4)
-    assert performance.longest_range(DRONE)[1] <= top
+    assert performance.maximum_range(DRONE)[1] <= top
 
 
 def test_without_the_parts():

@@ -83,7 +83,7 @@ def test_roll_and_drift_of_experiment_2_in_closed_form():
 
 
 def test_net_vertical_force_to_first_order():
-    # the seed's lemma: to first order the net force is weight times the tilted axis less the upright one
+    # the paper's lemma: to first order the net force is weight times the tilted axis less the upright one
     x = start(2154, 2155, 2156, 2155)._replace(attitude=exp((0.0, 0.1, 0.0)))
     weight = 4 * OS4.lift_constant * (2155 * RPM) ** 2
     assert net_force(OS4, x) == pytest.approx((weight * math.sin(0.1), 0.0, weight * (math.cos(0.1) - 1)), abs=3e-3)

@@ -19,13 +19,13 @@ from services.trajectory.phases import Phases
 from services.trajectory.piece import evaluate
 
 ARM = 0.4974 / math.sqrt(2.0)
-MOTOR = Motor(thrust_coefficient=2.234e-4, belt_ratio=2.0 / 3.0, speed_constant=150.0, time_constant=0.02)
+MOTOR = Motor(thrust_coefficient=2.234e-4, gear_ratio=2.0 / 3.0, speed_constant=150.0, time_constant=0.02)
 AIRFRAME = Airframe(
     mass=10.0224,
     inertia_body=(0.27, 0.26, 0.42),
     rotor_x=(ARM, -ARM, -ARM, ARM),
     rotor_y=(ARM, ARM, -ARM, -ARM),
-    yaw_sign=(1.0, -1.0, 1.0, -1.0),
+    reaction_sign=(1.0, -1.0, 1.0, -1.0),
     torque_per_thrust=0.0381,
     motor=MOTOR,
     voltage_max=44.4,
@@ -141,7 +141,7 @@ def fly(p, trajectory, plant, white, noise):
         log[i, 0], log[i, 10], log[i, 11], log[i, 12] = i * TICK, u.roll_reference, u.pitch_reference, u.yaw_reference
         log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), s.stage.name
         volts = u.motor_voltage
-        k = MOTOR.speed_constant * MOTOR.belt_ratio / RPM
+        k = MOTOR.speed_constant * MOTOR.gear_ratio / RPM
         new = (k * volts[0], k * volts[1], k * volts[2], k * volts[3])
         applied = old if plant.delay == 1 else new
         old = new

@@ -1,6 +1,6 @@
 """Short flights on the true state with scripted commands, without wind."""
 
-from messages import Answer, MissionItem, OperatorCommand, Vector3
+from messages import CommandAck, MissionItem, OperatorCommand, Vector3
 from services.table import load
 from tests.cosim import memory_log
 
@@ -76,5 +76,5 @@ def _all(flown, value):
     return [value(m) for m in flown.messages("answers")]
 
 
-ACCEPTED, REJECTED, DENIED = Answer.ACCEPTED, Answer.TEMPORARILY_REJECTED, Answer.DENIED
+ACCEPTED, REJECTED, DENIED = CommandAck.ACCEPTED, CommandAck.TEMPORARILY_REJECTED, CommandAck.DENIED
 UP = {0.04: [command("takeoff", 3.0), command("arm")]}

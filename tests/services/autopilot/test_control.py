@@ -28,7 +28,7 @@ def command(name, setpoint=HIGH, attitude=NO_ROTATION, yaw=0.0, geometric=False,
 def torque(thrust):
     a = AIRFRAME
     return np.array(
-        [np.dot(a.rotor_y, thrust), -np.dot(a.rotor_x, thrust), a.torque_per_thrust * np.dot(a.yaw_sign, thrust)]
+        [np.dot(a.rotor_y, thrust), -np.dot(a.rotor_x, thrust), a.torque_per_thrust * np.dot(a.reaction_sign, thrust)]
     )
 
 

@@ -60,7 +60,7 @@ def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unk
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_a_damaged_rotor_is_named_and_the_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
-    damage += ["effects.rotor_damage.thrust_left=0.55", "effects.rotor_damage.torque_left=0.55"]
+    damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.torque_left=0.55"]
     flown = fly(20, UP, *damage)
     assert "a motor has failed: land" in said(flown)
     failed = flown.column("status", lambda m: m.failed_motor)

@@ -7,7 +7,7 @@ from services.autopilot.law import build
 
 def test_the_paper_s_set_is_table_6():
     gains = load("paper")
-    assert gains.lift == (28.0, 22.0, 18.0)
+    assert gains.altitude == (28.0, 22.0, 18.0)
     assert gains.yaw == (129.1, 181.2, 97.17)
     assert gains.roll_inner == (-3.93, -0.09, -15.68)
     assert gains.pitch_inner == (3.93, 0.089, 15.68)
@@ -28,9 +28,9 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
     text = (FOLDER / "paper.toml").read_text(encoding="utf-8")
     cases = {
         "missing.toml": (None, "cannot be read"),
-        "damaged.toml": ("lift = [", "not valid TOML"),
+        "damaged.toml": ("altitude = [", "not valid TOML"),
         "unknown.toml": (text + "\nlfit = 1.0", "lfit"),
-        "short.toml": (text.replace("lift = [28.0, 22.0, 18.0]", "lift = [28.0]"), "lift"),
+        "short.toml": (text.replace("altitude = [28.0, 22.0, 18.0]", "altitude = [28.0]"), "altitude"),
         "upright.toml": (
             text.replace("tilt_limit = 1.028", "tilt_limit = 1.6"),
             "tilt_limit: expected a number above 0 and below 1.4, got 1.6",

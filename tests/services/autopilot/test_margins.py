@@ -55,7 +55,7 @@ def test_gain_margin_is_where_the_discrete_loop_becomes_unstable(name, delay):
     p = build(load(name), AIRFRAME)
     arm = 4.0 * AIRFRAME.rotor_x[0]
     for loop, pid, effect in (
-        ("lift", p.lift, 4.0 / AIRFRAME.mass),
+        ("altitude", p.altitude, 4.0 / AIRFRAME.mass),
         ("pitch", p.pitch_inner, arm / AIRFRAME.inertia_body[1]),
     ):
         m = margins(open_loops(p, AIRFRAME, TICK, delay)[loop])

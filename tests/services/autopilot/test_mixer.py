@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from services.autopilot.gains import load
 from services.autopilot.law import build
-from services.autopilot.mixer import Quotas, mix, saturate
+from services.autopilot.mixer import Demands, mix, saturate
 
 SIGNS = build(load("paper"), AIRFRAME).signs
 TOP = 48.0
@@ -17,7 +17,7 @@ ANY = st.floats(-100.0, 100.0)
 def wrench(thrust):
     """Total force and torque of the rotors, each at its place, from the cross product."""
     force, torque = np.zeros(3), np.zeros(3)
-    for f, x, y, turn in zip(thrust, AIRFRAME.rotor_x, AIRFRAME.rotor_y, AIRFRAME.yaw_sign, strict=True):
+    for f, x, y, turn in zip(thrust, AIRFRAME.rotor_x, AIRFRAME.rotor_y, AIRFRAME.reaction_sign, strict=True):
         force += (0.0, 0.0, f)
         torque += np.cross((x, y, 0.0), (0.0, 0.0, f))
         torque[2] += turn * AIRFRAME.torque_per_thrust * f
@@ -26,24 +26,24 @@ def wrench(thrust):
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_each_quota_turns_about_its_own_axis_only(axis):
-    quotas = [0.0, 0.0, 0.0, 0.0]
-    quotas[1 + axis] = 2.0
-    force, torque = wrench(mix(SIGNS, Quotas(*quotas)))
+    demands = [0.0, 0.0, 0.0, 0.0]
+    demands[1 + axis] = 2.0
+    force, torque = wrench(mix(SIGNS, Demands(*demands)))
     arm = (AIRFRAME.rotor_y[0], AIRFRAME.rotor_x[0], AIRFRAME.torque_per_thrust)[axis]
     assert force == pytest.approx(0.0, abs=1e-12)
     assert torque == pytest.approx([8.0 * arm if k == axis else 0.0 for k in range(3)], abs=1e-12)
 
 
 def test_lift_turns_nothing():
-    force, torque = wrench(mix(SIGNS, Quotas(3.0, 0.0, 0.0, 0.0)))
+    force, torque = wrench(mix(SIGNS, Demands(3.0, 0.0, 0.0, 0.0)))
     assert force == pytest.approx((0.0, 0.0, 12.0))
     assert torque == pytest.approx(0.0, abs=1e-12)
 
 
 @given(ANY, ANY, ANY, ANY)
 @settings(deadline=None)
-def test_saturated_thrusts_are_possible_and_possible_ones_stay(lift, roll, pitch, yaw):
-    wanted = Quotas(lift, roll, pitch, yaw)
+def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
+    wanted = Demands(collective, roll, pitch, yaw)
     given_ = saturate(SIGNS, wanted, TOP)
     thrust = mix(SIGNS, given_)
     assert min(thrust) >= -1e-9
@@ -56,8 +56,8 @@ def test_saturated_thrusts_are_possible_and_possible_ones_stay(lift, roll, pitch
 
 @given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
 @settings(deadline=None)
-def test_yaw_gets_what_the_others_leave_and_no_less(lift, roll, pitch, yaw):
-    given_ = saturate(SIGNS, Quotas(lift, roll, pitch, yaw), TOP)
+def test_yaw_gets_what_the_others_leave_and_no_less(collective, roll, pitch, yaw):
+    given_ = saturate(SIGNS, Demands(collective, roll, pitch, yaw), TOP)
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
     bare = mix(SIGNS, given_._replace(yaw=0.0))
     shares = [s[2] for s in SIGNS]

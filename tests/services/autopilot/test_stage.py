@@ -1,6 +1,6 @@
 from dynamics.lie.quaternion import NO_ROTATION
 from services.autopilot.interface import Estimate, Setpoint
-from services.autopilot.stage import FLYING, LANDED, ON_GROUND, STANDING, Stage, advance_stage
+from services.autopilot.stage import FLYING, INITIAL_STAGE, LANDED, ON_GROUND, Stage, advance_stage
 
 REST = 0.35
 ZERO = (0.0, 0.0, 0.0)
@@ -15,9 +15,9 @@ def after(stage, height, asked, speed=0.0, asked_speed=0.0, ticks=1):
 
 
 def test_motors_rest_until_the_setpoint_leaves_the_ground():
-    assert after(ON_GROUND, 0.0, 0.0) == STANDING
-    assert after(ON_GROUND, 0.0, 0.0, asked_speed=1.0) == FLYING
-    assert after(ON_GROUND, 0.0, 10.0) == FLYING
+    assert after(INITIAL_STAGE, 0.0, 0.0) == ON_GROUND
+    assert after(INITIAL_STAGE, 0.0, 0.0, asked_speed=1.0) == FLYING
+    assert after(INITIAL_STAGE, 0.0, 10.0) == FLYING
 
 
 def test_motors_stop_below_five_centimetres_only_when_asked_to_land():

@@ -9,8 +9,8 @@ import threading
 import time
 from contextlib import contextmanager
 
-from messages import Answer, Answers, Estimate, OperatorInput, Point, Pose, Quaternion, Status, Vector3, header
-from messages.topics import ANSWERS, ESTIMATE, STATUS
+from messages import CommandAck, CommandAcks, Estimate, OperatorInput, Point, Pose, Quaternion, Status, Vector3, header
+from messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
 from services.common.parameters import Parameter
 from services.mavlink.hub import Hub
 from services.mavlink.options import Options
@@ -75,7 +75,7 @@ class StandIn:
         )  # fmt: skip
         yield STATUS, status._replace(**self.status)
         yield from self.more
-        yield ANSWERS, Answers(head, tuple(self.answers), tuple(self.text))
+        yield COMMAND_ACKS, CommandAcks(head, tuple(self.answers), tuple(self.text))
         yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity))
         self.answers, self.text = [], []
 
@@ -86,7 +86,7 @@ class StandIn:
     def obey(self, c):
         done = getattr(self, f"do_{c.kind}", self.enter)(c)
         result, value = done if isinstance(done, tuple) else (done or 0, 0.0)
-        return Answer(c.source, c.id, result, 0.0, "", value)
+        return CommandAck(c.source, c.id, result, 0.0, "", value)
 
     def enter(self, c):
         if not self.armed:

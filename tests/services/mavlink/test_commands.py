@@ -5,7 +5,7 @@ import math
 import pytest
 from bench import Bench
 
-from messages import Answer
+from messages import CommandAck
 from services.mavlink.dialect import mavlink
 from services.mavlink.flavours import ardupilot, px4
 
@@ -62,7 +62,7 @@ def test_what_the_autopilot_refuses_is_refused(number):
 
 def test_progress_is_passed_on_before_the_end():
     bench = Bench()
-    results = iter([Answer(result=Answer.IN_PROGRESS, progress=0.4)])
+    results = iter([CommandAck(result=CommandAck.IN_PROGRESS, progress=0.4)])
     bench.vehicle.obey = lambda c: next(results)._replace(id=c.id)
     station = bench.station()
     station.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
@@ -70,7 +70,7 @@ def test_progress_is_passed_on_before_the_end():
     ack = station.last("COMMAND_ACK")
     assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
     number = bench.vehicle.kinds["mission"].id
-    bench.vehicle.answers = [Answer(id=number, result=Answer.ACCEPTED)]
+    bench.vehicle.answers = [CommandAck(id=number, result=CommandAck.ACCEPTED)]
     bench.step()
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
 

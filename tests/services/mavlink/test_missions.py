@@ -5,8 +5,8 @@ import math
 import pytest
 from bench import Bench
 
-from messages import Answer, Answers, MissionItem, OperatorCommand, OperatorInput, Vector3, header
-from messages.topics import ANSWERS, OPERATOR
+from messages import CommandAck, CommandAcks, MissionItem, OperatorCommand, OperatorInput, Vector3, header
+from messages.topics import COMMAND_ACKS, OPERATOR
 from services.mavlink.coordinates import Datum
 from services.mavlink.mission_export import to_mavlink
 from services.mavlink.mission_import import from_mavlink
@@ -54,7 +54,10 @@ def test_there_and_back_is_the_same(items, kind):
 def given(bench, time_ns, command, result):
     """Somebody else gives the autopilot a command, and it answers."""
     bench.adapter.take(
-        ANSWERS, time_ns, Answers(header(time_ns, ""), (Answer(command.source, command.id, result),)).encode(), 0.0
+        COMMAND_ACKS,
+        time_ns,
+        CommandAcks(header(time_ns, ""), (CommandAck(command.source, command.id, result),)).encode(),
+        0.0,
     )
     bench.adapter.take(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
 
@@ -63,8 +66,8 @@ def test_a_plans_mission_can_be_downloaded_and_a_refused_one_not():
     bench = Bench()
     station = bench.station()
     bench.step(5)
-    given(bench, 0, OperatorCommand("mission_upload", "plan", 1, (), "", tuple(ITEMS)), Answer.ACCEPTED)
-    given(bench, 0, OperatorCommand("fence_upload", "plan", 2, (), "", tuple(FENCE)), Answer.DENIED)
+    given(bench, 0, OperatorCommand("mission_upload", "plan", 1, (), "", tuple(ITEMS)), CommandAck.ACCEPTED)
+    given(bench, 0, OperatorCommand("fence_upload", "plan", 2, (), "", tuple(FENCE)), CommandAck.DENIED)
     for kind, count in ((0, len(ITEMS)), (1, 0)):
         station.send("mission_request_list", 1, 1, kind)
         assert station.last("MISSION_COUNT").count == count

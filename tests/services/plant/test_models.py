@@ -138,8 +138,8 @@ WRONG = {
         "2 directions that are not zero",
     ),
     "too few directions": (LOAD, "formation.link_direction=[[1, 0, 0]]", "formation.link_direction: expected 2"),
-    "a pack that does not fit": (CRATE, "beer_carrier.depth=0.15", "beer_carrier.pack_size: expected a pack that fits"),
-    "friction that grows": (CRATE, "beer_carrier.door_friction=[0.1, 0.2]", "expected [static, dynamic] with 0 < dyn"),
+    "a pack that does not fit": (CRATE, "unloading.depth=0.15", "unloading.pack_size: expected a pack that fits"),
+    "friction that grows": (CRATE, "unloading.door_friction=[0.1, 0.2]", "expected [static, dynamic] with 0 < dyn"),
     "a step of zero": (OS4, "solver.step=0", "solver.step: expected a number above 0"),
     "control slower than the exchange": (LOAD, "rates.bodies=100", "rates.bodies: expected exchange.rate = 400 Hz"),
 }

@@ -9,7 +9,7 @@ from services.autopilot.margins import margins, open_loops, stable
 from services.autopilot.resolve import known_airframe
 from services.table import load as load_scene
 from studies.tune.bandwidths import Bandwidths
-from studies.tune.design import GAIN, PHASE, believed, design, gain_set, shortfalls
+from studies.tune.design import GAIN, PHASE, assumed_airframe, design, gain_set, shortfalls
 from studies.tune.linearise import hover
 
 SCENE = load_scene(Path(__file__).parents[3] / "scenes" / "hover.toml")
@@ -30,7 +30,7 @@ def test_the_linear_model_is_the_one_derived_by_hand(model, airframe):
     """Theory, eqs. (1.13) and (4.30): 4/m, 4 l/J, 4 b/J_z, the motors' lag, and g over the tilt."""
     arm = sum(abs(x) for x in airframe.rotor_x)
     i_x, i_y, i_z = airframe.inertia_body
-    assert model.lift == pytest.approx(4.0 / airframe.mass, rel=1e-6)
+    assert model.altitude == pytest.approx(4.0 / airframe.mass, rel=1e-6)
     assert model.roll == pytest.approx(arm / i_x, rel=1e-6)
     assert model.pitch == pytest.approx(arm / i_y, rel=1e-6)
     assert model.yaw == pytest.approx(4.0 * airframe.torque_per_thrust / i_z, rel=1e-6)
@@ -46,22 +46,26 @@ def test_the_reaction_to_speeding_rotors_up_leads_the_yaw():
     scene = load_scene(SCENE.path.parent / "delivery_mission.toml")
     with_inertia, without, known = hover(scene), hover(SCENE), known_airframe(scene)
     assert with_inertia.yaw == pytest.approx(without.yaw, rel=1e-6)
-    assert with_inertia.yaw_lead == pytest.approx(known.yaw_lead, rel=0.01)  # at 50 m the air is a little thinner
-    assert without.yaw_lead == 0.0
-    assert known_airframe(SCENE).yaw_lead == 0.0
-    loops = open_loops(build(load("tuned").plain(), known), believed(known, with_inertia), TICK)
+    assert with_inertia.spin_up_zero == pytest.approx(
+        known.spin_up_zero, rel=0.01
+    )  # at 50 m the air is a little thinner
+    assert without.spin_up_zero == 0.0
+    assert known_airframe(SCENE).spin_up_zero == 0.0
+    loops = open_loops(build(load("tuned").plain(), known), assumed_airframe(known, with_inertia), TICK)
     assert shortfalls(loops) == {}
     assert (
         margins(loops["yaw"]).crossover
         > 5.0
-        * margins(open_loops(build(load("tuned").plain(), known), believed(known, without), TICK)["yaw"]).crossover
+        * margins(
+            open_loops(build(load("tuned").plain(), known), assumed_airframe(known, without), TICK)["yaw"]
+        ).crossover
     )
 
 
 def test_a_loop_is_stable_up_to_its_margins_and_no_further(airframe):
     for name in ("paper", "tuned"):
         loops = open_loops(build(load(name).plain(), airframe), airframe, TICK)
-        for loop in ("lift", "yaw", "x_motors", "y_motors"):
+        for loop in ("altitude", "yaw", "x_plant_input", "y_plant_input"):
             m, response = margins(loops[loop]), loops[loop]
             assert stable(response), loop
             assert stable(0.97 * m.gain * response), loop
@@ -75,7 +79,7 @@ def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airfram
     said = []
     wanted = Bandwidths(*(factor * w for w in Bandwidths()))
     gains = gain_set(model, design(model, airframe, TICK, wanted, said.append))
-    loops = open_loops(build(gains.plain(), airframe), believed(airframe, model), TICK)
+    loops = open_loops(build(gains.plain(), airframe), assumed_airframe(airframe, model), TICK)
     for m in map(margins, loops.values()):
         assert math.degrees(m.phase) >= PHASE
         assert m.gain >= 10.0 ** (GAIN / 20.0)
@@ -86,7 +90,7 @@ def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airfram
 
 
 def test_unstable_and_weak_gains_are_named(airframe):
-    fast = load("tuned").model_copy(update={"lift": (160.0, 120.0, 3200.0)})
-    assert shortfalls(open_loops(build(fast.plain(), airframe), airframe, TICK))["lift"] == "unstable"
+    fast = load("tuned").model_copy(update={"altitude": (160.0, 120.0, 3200.0)})
+    assert shortfalls(open_loops(build(fast.plain(), airframe), airframe, TICK))["altitude"] == "unstable"
     assert "phase margin 2" in shortfalls(open_loops(build(load("paper").plain(), airframe), airframe, TICK))["roll"]
     assert shortfalls(open_loops(build(load("tuned").plain(), airframe), airframe, TICK)) == {}

@@ -16,7 +16,7 @@ from studies.tune.linearise import hover
 
 SCENES = Path(__file__).parents[3] / "scenes"
 UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, duration = 4.0 }\n'
-CLOSE = {"lift": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "yaw_lead": 0.15, "lag": 0.1}
+CLOSE = {"altitude": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "spin_up_zero": 0.15, "lag": 0.1}
 
 
 def found(scene):
@@ -47,15 +47,15 @@ def test_gains_and_lag_are_found_again(kind):
     assert min(it.fit.values()) > 75.0
 
 
-def test_a_vehicle_that_is_heavier_than_believed_shows(tmp_path):
+def test_a_vehicle_that_is_heavier_than_assumed_shows(tmp_path):
     airframe = (SCENES / "vehicles" / "delivery_drone.toml").read_text()
     heavy_file = tmp_path / "heavy.toml"
     heavy_file.write_text(re.sub(r"^total = .*$", "total = 12.0", airframe, count=1, flags=re.MULTILINE))
     light = load_scene(SCENES / "excitation.toml")
     heavy = load_scene(SCENES / "excitation.toml", [f"vehicle.airframe={heavy_file}"])
     it = identify(fly(heavy), build(load("tuned").plain(), known_airframe(light)), hover(light))
-    assert it.model.lift == pytest.approx(hover(heavy).lift, rel=0.03)
-    assert it.model.lift == pytest.approx(4.0 / 12.0, rel=0.03)
+    assert it.model.altitude == pytest.approx(hover(heavy).altitude, rel=0.03)
+    assert it.model.altitude == pytest.approx(4.0 / 12.0, rel=0.03)
 
 
 def test_a_flight_that_moves_nothing_is_refused():

@@ -37,7 +37,7 @@ def test_polishing_keeps_the_margins_and_lessens_the_error(found):
     assert found.after.shortfalls == {}
     assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
     moved, asked = found.polished.bandwidths, Bandwidths()
-    assert moved.lift != asked.lift
+    assert moved.altitude != asked.altitude
     assert moved.position == asked.position  # nothing of this flight goes along x or y
 
 
@@ -61,7 +61,7 @@ def test_page_and_tables(found, tmp_path):
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=120)
     show.show(console, found)
-    assert "x_motors" in console.export_text()
+    assert "x_plant_input" in console.export_text()
 
 
 def test_weak_gains_of_the_scene_are_warned_about_with_the_margin():
@@ -77,13 +77,13 @@ def gains_with(tmp_path, **changes):
 
 
 def test_unstable_gains_are_warned_about_before_a_flight(tmp_path):
-    path = gains_with(tmp_path, lift=(160.0, 120.0, 3200.0))
+    path = gains_with(tmp_path, altitude=(160.0, 120.0, 3200.0))
     assert unstable_loops(load_scene(HOVER)) == []
     result = CliRunner().invoke(app, ["check", str(HOVER), "--set", f"autopilot.gains={path}"])
     assert result.exit_code == 0
     warned = [line for line in result.output.splitlines() if "warning" in line]
     assert len(warned) == 1
-    assert "lift: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
+    assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
 
 
 def test_no_scene_that_is_shipped_is_unstable():
@@ -92,8 +92,8 @@ def test_no_scene_that_is_shipped_is_unstable():
 
 
 def test_bad_input_is_one_line(tmp_path):
-    with pytest.raises(ValueError, match=r"^--lift -1: expected a bandwidth above 0 rad/s$"):
-        tune(load_scene(HOVER), Bandwidths(lift=-1.0), lambda _: None)
+    with pytest.raises(ValueError, match=r"^--altitude -1: expected a bandwidth above 0 rad/s$"):
+        tune(load_scene(HOVER), Bandwidths(altitude=-1.0), lambda _: None)
     with pytest.raises(ValueError, match=r"has no \[autopilot\] to tune"):
         tune(load_scene(SCENES / "gyrostat_attitude.toml"), Bandwidths(), lambda _: None)
     for arguments, message in (

@@ -49,5 +49,5 @@ def test_step_of_a_first_order_loop_is_the_closed_form():
 
 def test_steps_settle_at_the_setpoint(airframe):
     loops = systems(build(load("tuned").plain(), airframe), airframe, TICK, DELAY)
-    for loop in ("lift", "yaw", "x", "y"):
+    for loop in ("altitude", "yaw", "x", "y"):
         assert step(loops[loop], 6.0).value[-1] == pytest.approx(1.0, abs=0.01)

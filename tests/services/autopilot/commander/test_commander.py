@@ -7,7 +7,7 @@ import pytest
 from commander_session import CONSTANTS, DT, HIGH, Session
 from flights import command, item
 
-from messages import Answer
+from messages import CommandAck
 from services.autopilot.commander.commander import Commander
 from services.autopilot.estimate import EXACT
 
@@ -73,7 +73,10 @@ def test_the_parameters_that_are_asked_for_are_of_their_tick():
     session.step(commands=(command("parameter", 4.0, text="MPC_XY_CRUISE"),))
     assert first.parameters["MPC_XY_CRUISE"] == 3.0
     assert session.step().parameters is None
-    assert [(a.result, a.value) for a in session.acknowledgements] == [(Answer.ACCEPTED, 3.0), (Answer.ACCEPTED, 4.0)]
+    assert [(a.result, a.value) for a in session.acknowledgements] == [
+        (CommandAck.ACCEPTED, 3.0),
+        (CommandAck.ACCEPTED, 4.0),
+    ]
 
 
 def test_arming_waits_for_the_checks():
@@ -83,7 +86,7 @@ def test_arming_waits_for_the_checks():
     session.run(0.5, estimate=unsure)
     assert not session.step(estimate=unsure).status.armed
     assert session.step(estimate=GROUND).status.armed
-    assert [a.result for a in session.acknowledgements] == [Answer.IN_PROGRESS, Answer.ACCEPTED]
+    assert [a.result for a in session.acknowledgements] == [CommandAck.IN_PROGRESS, CommandAck.ACCEPTED]
 
 
 def test_a_setpoint_made_from_the_estimate_asks_for_a_new_one_at_every_tick():
@@ -130,5 +133,5 @@ def test_a_takeoff_item_in_the_air_or_beyond_reach_does_not_stop_the_commander()
     session.step(commands=(command("mission_upload", items=items), command("mission")))
     assert session.run(0.1).status.mission_current == 1  # higher than the item asks for already
     session.step(commands=(command("mission_upload", items=[item("takeoff", z=2000.0)]),))
-    assert session.acknowledgements[-1].result == Answer.DENIED
+    assert session.acknowledgements[-1].result == CommandAck.DENIED
     assert session.texts[-1] == "item 0: expected a take-off to at most 1000 m"

@@ -9,8 +9,8 @@ import pytest
 from dynamics.integrators import get, march, rate
 from dynamics.lie.quaternion import Quaternion, exp
 from dynamics.tree import retract, scale
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters, energy, initial_state
-from dynamics.vehicles.beer_places import roller_speed
+from dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
+from dynamics.vehicles.unloading_places import roller_speed
 
 RK4 = get("rk4_renormalised").Method()
 G, H = 9.81, 2.5e-4
@@ -18,7 +18,7 @@ SIZE, MASS = (0.2, 0.13, 0.23), 2.0
 INERTIA = tuple(MASS / 12 * (sum(s * s for s in SIZE) - side * side) for side in SIZE)
 HALF = tuple(0.5 * s for s in SIZE)
 SURFACE = (2e4, 60.0)
-P = BeerCarrierParameters(
+P = UnloadingParameters(
     MASS, HALF, INERTIA, math.radians(5.0), 0.1, 0.23, 0.075, 0.02, 0.06, 2 * math.pi, 1.0, 1.0, 0.25, 0.15, 0.043,
     math.pi, 0.002, 50.0, 0.003, 5.0, G, (*SURFACE, 0.5, 0.3), (*SURFACE, 0.2, 0.1), (*SURFACE, 0.5, 0.3),
 )  # fmt: skip

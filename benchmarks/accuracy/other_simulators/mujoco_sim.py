@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from benchmarks.accuracy.peers import matrix, outcome
+from benchmarks.accuracy.other_simulators import matrix, outcome
 from studies.accuracy.problem import Way
 from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

@@ -15,11 +15,11 @@ from studies.accuracy.problem import Outcome
 
 
 def installed() -> list[ModuleType]:
-    """The peers whose package is there; says which are not."""
+    """The other simulators whose package is there; says which are not."""
     found = []
     for name in discovery.names(__name__):
         try:
-            found.append(discovery.get(__name__, name, "peer"))
+            found.append(discovery.get(__name__, name, "simulator"))
         except ImportError as missing:
             print(f"{name}: left out, {missing}")
     return found

@@ -1,4 +1,4 @@
-"""What the spinning rotors' angular momentum does to the body."""
+"""Gyroscopic torque of the spinning rotors on the turning body."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ class Settings(NamedTuple):
     """No keys: the airframe's [rotors] says it all."""
 
 
-class RotorGyro(NamedTuple):
+class GyroscopicTorque(NamedTuple):
     """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
 
     Source: Euler's equations of a body with rotors that spin about its z axis; the propeller's inertia is averaged over
@@ -24,7 +24,7 @@ class RotorGyro(NamedTuple):
     inertia: float  # [kg m^2] of one rotor about its axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorGyro":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GyroscopicTorque":
         """From the airframe's rotors."""
         checked(Settings, table)
         return cls(airframe.rotors.inertia)
@@ -35,10 +35,10 @@ def _signed(_, sign, value):
     return sign * value
 
 
-@torque(RotorGyro)
-def rotor_gyro(e, memory, s, rotors):
+@torque(GyroscopicTorque)
+def gyroscopic_torque(e, memory, s, rotors):
     """Torque [N m] in body coordinates."""
-    sign, omega = s.layout.yaw_sign, s.motion.omega_body
+    sign, omega = s.layout.reaction_sign, s.motion.omega_body
     # a rotor that pushes the body to +z turns about -z itself
     momentum = -e.inertia * total(each(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
     spin_up = e.inertia * total(each(_signed, 0.0, sign, rotors.acceleration))

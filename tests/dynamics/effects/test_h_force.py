@@ -3,7 +3,7 @@ import pytest
 from effects_helpers import rotation_of
 
 from dynamics import effects
-from dynamics.effects.rotor_drag import rotor_drag
+from dynamics.effects.h_force import h_force
 
 
 def test_is_the_sum_over_the_rotors(drone, situation, rotors):
@@ -15,7 +15,7 @@ def test_is_the_sum_over_the_rotors(drone, situation, rotors):
             )
         }
     )
-    (e,) = effects.from_scene({"rotor_drag": {"coefficient": 1e-4}}, lifted)
+    (e,) = effects.from_scene({"h_force": {"coefficient": 1e-4}}, lifted)
     speed, omega = np.array([300.0, 250, 320, 280]), np.array([0.3, -0.5, 0.8])
     s = situation(velocity=(6, -2, 1), wind=(1, 1, 0), turn=(0.1, 0.2, -0.4), omega=omega, speed=speed)
     v = rotation_of(s).T @ np.array([5.0, -3, 1])
@@ -23,14 +23,14 @@ def test_is_the_sum_over_the_rotors(drone, situation, rotors):
     for w, r in zip(speed, lifted.rotors.position, strict=True):
         f = -1.2 * 1e-4 * w * (v + np.cross(omega, r)) * [1, 1, 0]
         force, torque = force + f, torque + np.cross(r, f)
-    result = rotor_drag.py_func(e, (), s, rotors())
+    result = h_force.py_func(e, (), s, rotors())
     assert result[0] == pytest.approx(force, rel=1e-12)
     assert result[1] == pytest.approx(torque, rel=1e-12)
 
 
 def test_default_coefficient_is_the_h_force_of_blade_element_theory(drone):
     """C_H = sigma c_d mu / 4, with thrust-coefficient scaling rho A (w R)^2."""
-    (e,) = effects.from_scene({"rotor_drag": {}}, drone)
+    (e,) = effects.from_scene({"h_force": {}}, drone)
     radius, chord = 0.2794, 0.5588 / 5
     solidity = 2 * chord / (np.pi * radius)
     drag = 0.015 + np.pi * 5 * 6.11**2 / 0.83 * (0.85 * np.arctan(7.4 / (np.pi * 22)) / (np.pi * 5 + 6.11)) ** 2

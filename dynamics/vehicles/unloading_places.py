@@ -1,6 +1,6 @@
 """Where the pack touches what, and how fast: rollers, edges, door, ground and walls (theory.md, section 9.3).
 
-`p` is a BeerCarrierParameters, `x` a BeerCarrierState.
+`p` is a UnloadingParameters, `x` a UnloadingState.
 """
 
 import math
@@ -10,7 +10,7 @@ from dynamics.generate import each_index
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import Vec3, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
-from dynamics.vehicles.beer_contact import Touch, touch
+from dynamics.vehicles.unloading_contact import Touch, touch
 
 ROLLERS, CORNERS = 4, 8
 SIDES = (-0.8, 0.8)  # where along the pack's width it rests on a roller or an edge, of half its width

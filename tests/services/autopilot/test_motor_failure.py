@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from services.autopilot import motor_watch as watch
+from services.autopilot import motor_failure as watch
 from services.autopilot.law import Airframe
 from services.autopilot.motor import Motor
 

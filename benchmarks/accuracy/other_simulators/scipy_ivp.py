@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.accuracy.peers import matrix, outcome
+from benchmarks.accuracy.other_simulators import matrix, outcome
 from studies.accuracy.problem import Way
 from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

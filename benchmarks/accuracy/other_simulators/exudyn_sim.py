@@ -7,7 +7,7 @@ import exudyn as exu
 import numpy as np
 from exudyn import utilities as build
 
-from benchmarks.accuracy.peers import matrix, outcome
+from benchmarks.accuracy.other_simulators import matrix, outcome
 from studies.accuracy.problem import Way
 from studies.accuracy.systems import free_rigid_body, heavy_top
 

@@ -16,8 +16,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from benchmarks.accuracy.peers import matrix, outcome
-from benchmarks.accuracy.peers.mujoco_sim import ACROSS, AXIAL, rotor_speeds
+from benchmarks.accuracy.other_simulators import matrix, outcome
+from benchmarks.accuracy.other_simulators.mujoco_sim import ACROSS, AXIAL, rotor_speeds
 from studies.accuracy.problem import Way
 from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

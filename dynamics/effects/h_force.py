@@ -1,4 +1,4 @@
-"""Drag of the turning rotors in their plane."""
+"""H-force: drag of the turning rotors in their plane."""
 
 from typing import Annotated, NamedTuple
 
@@ -20,7 +20,7 @@ class Settings(NamedTuple):
     coefficient: Annotated[float, Ge(0), Le(1)] | None = None  # [m^3/rad]; from the propeller if left out
 
 
-class RotorDrag(NamedTuple):
+class HForce(NamedTuple):
     """Force -rho c w v on each rotor, across its axis, from the rotor's speed w and its velocity v (theory.md, eq.
     (2.11)).
 
@@ -34,7 +34,7 @@ class RotorDrag(NamedTuple):
     square_arm: tuple[float, ...]  # [m^2] squared distance of each rotor from the body z axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorDrag":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "HForce":
         """From the airframe's propeller unless the table has the coefficient."""
         given = checked(Settings, table)
         positions = airframe.rotors.position
@@ -54,8 +54,8 @@ def _product(_, a, b):
     return a * b
 
 
-@wrench_body(RotorDrag)
-def rotor_drag(e, memory, s, rotors):
+@wrench_body(HForce)
+def h_force(e, memory, s, rotors):
     """Force [N] and torque [N m] in body coordinates."""
     layout, omega, speed = s.layout, s.motion.omega_body, s.motion.rotor_speed
     v = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))

@@ -13,13 +13,13 @@ from dynamics.integrators import RATES
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import Quaternion, exp
 from dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
-from dynamics.vehicles.beer_places import CORNERS, ROLLERS, SIDES, Y, contacts, frames
+from dynamics.vehicles.unloading_places import CORNERS, ROLLERS, SIDES, Y, contacts, frames
 
 LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] at which somebody takes the pack up, [s] in which he gets it moving
 Surface = tuple[float, float, float, float]  # stiffness [N/m], damping [N s/m], static and dynamic friction
 
 
-class BeerCarrierParameters(NamedTuple):
+class UnloadingParameters(NamedTuple):
     """SI units."""
 
     pack_mass: float  # [kg]
@@ -48,7 +48,7 @@ class BeerCarrierParameters(NamedTuple):
     on_ground: Surface
 
 
-class BeerCarrierState(NamedTuple):
+class UnloadingState(NamedTuple):
     """World frame; z = 0 is the ground, y the direction of the hinge."""
 
     position_world: Vec3  # [m] of the pack's middle
@@ -116,7 +116,7 @@ def rate(p, t, x):
     else:
         acceleration = scale(1.0 / GRIP, subtract((0.0, 0.0, LIFT_SPEED), v))
         angular = scale(-1.0 / GRIP, o)
-    return BeerCarrierState(
+    return UnloadingState(
         v,
         o,
         acceleration,
@@ -128,16 +128,16 @@ def rate(p, t, x):
     )
 
 
-RATES[BeerCarrierParameters] = rate
+RATES[UnloadingParameters] = rate
 
 
-def initial_state(p: BeerCarrierParameters, gap: float = 0.01) -> BeerCarrierState:
+def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:
     """At rest on the rollers, its front `gap` [m] behind the shut door."""
     none = (0.0, 0.0, 0.0)
     c, s = math.cos(p.tilt), math.sin(p.tilt)
     back, up = gap + p.pack_half[0], 2.0 * p.roller_radius + p.pack_half[2]
     position = (up * s - back * c, 0.0, p.floor_height + back * s + up * c)
-    return BeerCarrierState(
+    return UnloadingState(
         position,
         exp((0.0, p.tilt, 0.0)),
         none,

@@ -8,8 +8,8 @@ from pydantic import Field
 from cosim.scene import Scene, Section
 from cosim.setup import ServiceSetup
 from dynamics.errors import KeyedError
-from dynamics.vehicles import beer_carrier
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters, BeerCarrierState, Surface
+from dynamics.vehicles import unloading
+from dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
 from services.common.ports import TrueState
 from services.common.sections import Exchange, Triple, can_have, needs
 from services.plant.cores import unloading_bodies
@@ -22,10 +22,10 @@ STIFFNESS, DAMPING = 2.0e4, 60.0  # [N/m], [N s/m] of one place of contact
 Pair = tuple[float, float]  # static and dynamic friction
 
 
-class BeerCarrier(Section):
+class Unloading(Section):
     """The crate, its rollers, its door and the pack (theory.md, chapter 9)."""
 
-    TABLE: ClassVar[str] = "beer_carrier"
+    TABLE: ClassVar[str] = "unloading"
     OPTIONAL: ClassVar[bool] = True
     pack_mass: float = Field(gt=0.0)  # [kg]
     pack_size: Triple  # [m] length, width, height
@@ -55,22 +55,22 @@ class BeerCarrier(Section):
     def check(self, scene: Scene) -> None:
         """Sizes are sizes, the pack fits into the crate, friction is lower in motion."""
         if not all(side > 0.0 for side in self.pack_size):
-            raise KeyedError("beer_carrier.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
+            raise KeyedError("unloading.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
         length, width, _ = self.pack_size
         if width > self.width or length + self.gap > self.depth:
             room = f"{self.depth:g} m deep and {self.width:g} m wide"
             expected = f"a pack that fits into the crate, {room}"
-            raise KeyedError("beer_carrier.pack_size", f"got {length:g} m by {width:g} m", expected)
+            raise KeyedError("unloading.pack_size", f"got {length:g} m by {width:g} m", expected)
         for key in ("roller_friction", "door_friction", "ground_friction"):
             static, dynamic = getattr(self, key)
             if not 0.0 < dynamic <= static:
                 expected = "[static, dynamic] with 0 < dynamic <= static"
-                raise KeyedError(f"beer_carrier.{key}", f"got {[static, dynamic]}", expected)
+                raise KeyedError(f"unloading.{key}", f"got {[static, dynamic]}", expected)
 
 
 def check(scene: Scene) -> None:
     """The crate is described, and nothing asks of it what it cannot do."""
-    needs(scene, "beer_carrier")
+    needs(scene, "unloading")
     can_have(scene)
     check_system(scene, *system(scene))
 
@@ -86,16 +86,16 @@ def _surface(friction: Pair) -> Surface:
     return (STIFFNESS, DAMPING, *friction)
 
 
-def system(scene: Scene) -> tuple[BeerCarrierParameters, BeerCarrierState]:
+def system(scene: Scene) -> tuple[UnloadingParameters, UnloadingState]:
     """(parameters, state at the start)."""
-    c = scene[BeerCarrier]
+    c = scene[Unloading]
     length, width, height = c.pack_size
     m = c.pack_mass / 12.0
     inertia = (m * (width**2 + height**2), m * (length**2 + height**2), m * (length**2 + width**2))
-    p = BeerCarrierParameters(
+    p = UnloadingParameters(
         c.pack_mass, (0.5 * length, 0.5 * width, 0.5 * height), inertia, math.radians(c.tilt_deg), c.floor_height,
         c.depth, 0.5 * c.width, c.roller_radius, c.roller_spacing, c.roller_rpm * RPM, c.ramp_start, c.ramp_duration,
         c.door_length, c.door_mass, c.door_spring, c.door_preload, c.door_damping, c.door_lock, c.edge_radius, c.pickup,
         c.gravity, _surface(c.roller_friction), _surface(c.door_friction), _surface(c.ground_friction),
     )  # fmt: skip
-    return p, beer_carrier.initial_state(p, c.gap)
+    return p, unloading.initial_state(p, c.gap)
