@@ -79,7 +79,7 @@ def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
 
 
 @leaf
-def lift_quota(p, integral, error, error_rate, acceleration, roll, pitch):
+def collective_demand(p, integral, error, error_rate, acceleration, roll, pitch):
     """Lift [N] of every rotor; with feed-forward, the weight and the tilt are made up for (theory.md, eq. (4.13))."""
     collective = output(p.altitude, integral, error, error_rate)
     if p.hover_demand > 0.0:
@@ -136,7 +136,7 @@ def step(p, s, dt, estimate, setpoint):
         integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
     )
     wanted = Demands(
-        lift_quota(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
+        collective_demand(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
         output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
         - p.torque_demands[0] * tilt_y.demand_acceleration,
         output(p.pitch_inner, integral_angles[1], turn[1], turn_rate[1])

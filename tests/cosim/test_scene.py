@@ -100,7 +100,7 @@ def test_overrides_reach_into_the_files_that_a_scene_names(tmp_path):
     parameters.write_text("MPC_XY_CRUISE 3.0\nNAV_ACC_RAD 2.0\n")
     overrides = [
         f"autopilot.parameters={parameters}",
-        "gains.lift=[1, 2, 3]",
+        "gains.altitude=[1, 2, 3]",
         "gains.yaw.0=5",
         "airframe.mass.total=9.5",
         "airframe.propeller.diameter=0.5",
@@ -109,7 +109,7 @@ def test_overrides_reach_into_the_files_that_a_scene_names(tmp_path):
         "autopilot.parameters.NAV_ACC_RAD=4",
     ]
     scene = load(DELIVERY, overrides)
-    assert scene[GainSet].lift == (1.0, 2.0, 3.0)
+    assert scene[GainSet].altitude == (1.0, 2.0, 3.0)
     assert scene[GainSet].yaw[0] == 5.0
     assert airframe(scene).mass.total == 9.5
     assert airframe(scene).propeller.diameter == 0.5
@@ -295,12 +295,12 @@ def test_choices_are_listed():
         ("trajectory.phase=[]", "--set trajectory.phase: expected at least 1"),
         ("trajectory.phase.9.duration=1", "--set trajectory.phase.9.duration=1: expected an index from 0 to 3, got 9"),
         ("trajectory.phase.x.duration=1", "expected an index from 0 to 3, got x"),
-        ("gains.lift.3=1", "--set gains.lift.3=1: expected an index from 0 to 2, got 3"),
+        ("gains.altitude.3=1", "--set gains.altitude.3=1: expected an index from 0 to 2, got 3"),
         ("trajectory.phase.1.name=climb", "two phases are named 'climb'"),
         ("airframe.mass.total=-1", "--set airframe.mass.total: expected a number above 0, got -1"),
         ("airframe.mass.payload=11", "--set airframe.mass.payload: expected less than total = 10.0224 kg, got 11"),
         ("airframe.mass.totl=1", "--set airframe.mass.totl: unknown key 'totl'; did you mean total?"),
-        ("gains.lift=[1, 2]", "--set gains.lift.2: missing; expected a number"),
+        ("gains.altitude=[1, 2]", "--set gains.altitude.2: missing; expected a number"),
         ("gains.tilt_limit=1.5", "--set gains.tilt_limit: expected a number above 0 and below 1.4, got 1.5"),
         ("autopilot.parameters=none.params", "--set autopilot.parameters: scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),

@@ -25,7 +25,7 @@ def wrench(thrust):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_each_quota_turns_about_its_own_axis_only(axis):
+def test_each_demand_turns_about_its_own_axis_only(axis):
     demands = [0.0, 0.0, 0.0, 0.0]
     demands[1 + axis] = 2.0
     force, torque = wrench(mix(SIGNS, Demands(*demands)))
