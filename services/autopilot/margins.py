@@ -67,7 +67,7 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
         position = _pid(outer, s) * p.gravity / s**2  # tilt asked for over tilt
         found[tilt] = turn * feedback
         found[way] = position * turn * demand / (1.0 + turn * feedback)
-        found[f"{way}_motors"] = turn * (feedback + position * demand)
+        found[f"{way}_plant_input"] = turn * (feedback + position * demand)
     return found
 
 
