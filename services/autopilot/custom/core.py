@@ -2,17 +2,20 @@
 allocation, motor model, motor watch and status as of the cascaded PID."""
 
 import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from numba import types
 from numba.extending import overload
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
 from services.autopilot import motor_watch
 from services.autopilot.core import Controller, estimate_of, outcome, setpoint_of
 from services.autopilot.custom.demand import Demand, command, demand
 from services.autopilot.stage import FLYING, ON_GROUND, Stage, advance_stage
+from services.common.ports import Reference, StateEstimate
 
 OFF = Demand()
 
@@ -50,18 +53,24 @@ def start(p: CustomController) -> CustomState:
     return CustomState(ON_GROUND, p.own_start, OFF, motor_watch.START, 0, float("nan"))
 
 
-def _ask(p, s, time, estimate, setpoint, by_port):
+def _ask(
+    p: Any, s: Any, time: float, estimate: StateEstimate, setpoint: Reference, by_port: tuple[Received, ...]
+) -> tuple[Any, Demand]:
     """`step` of the user's module; or what has come by the port."""
     raise NotImplementedError("compiled code only")
 
 
 @overload(_ask, jit_options={"forceinline": True})
-def _ask_of(p, s, time, estimate, setpoint, by_port):
+def _ask_of(
+    p: types.Type, s: types.Type, time: types.Type, estimate: types.Type, setpoint: types.Type, by_port: types.Type
+) -> Callable:
     if p.instance_class is FromPort:
         return lambda p, s, time, estimate, setpoint, by_port: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
 
-    def ask(p, s, time, estimate, setpoint, by_port):
+    def ask(
+        p: Any, s: Any, time: float, estimate: StateEstimate, setpoint: Reference, by_port: tuple
+    ) -> tuple[Any, Demand]:
         s, output = found(p, s, time, estimate, setpoint)
         return s, demand(output)
 
@@ -69,7 +78,9 @@ def _ask_of(p, s, time, estimate, setpoint, by_port):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: CustomController, s: CustomState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[CustomState, tuple, int]:
     """The command at `tick`."""
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]

@@ -2,13 +2,13 @@
 
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
-from dynamics.vehicles.beer_carrier import BeerCarrierParameters
+from dynamics.vehicles.beer_carrier import BeerCarrierParameters, BeerCarrierState
 from services.common.ports import TrueState
 from services.plant.cores.autonomous import TOLD
 
 
 @leaf
-def told(p, t, x):
+def told(p: BeerCarrierParameters, t: float, x: BeerCarrierState) -> tuple[TrueState]:
     """The pack's motion."""
     return (
         TrueState(
