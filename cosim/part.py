@@ -18,10 +18,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from cosim.schedule import KEPT, Input, Port, due
 from dynamics.cell import Cell
+from dynamics.generate import define, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.rows import load, store
 
@@ -111,7 +112,7 @@ def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-@overload(step, jit_options={"forceinline": True})
+@implements(step, inline=True)
 def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Callable:
     found = sys.modules[parameters.instance_class.__module__].step
     return lambda parameters, state, tick, inputs: found(parameters, state, tick, inputs)
@@ -141,24 +142,20 @@ def _take_all(inputs: tuple[InputRows, ...], tick: int) -> tuple[Received, ...]:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_take_all, jit_options={"forceinline": True})
+@implements(_take_all, inline=True)
 def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
     calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
-    names: dict[str, Any] = {"take": _take}
-    exec(f"def take_all(inputs, tick):\n    return ({calls})\n", names)
-    return names["take_all"]
+    return define("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
 def _give_all(values: tuple, outputs: tuple[OutputRows, ...], tick: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_give_all, jit_options={"forceinline": True})
+@implements(_give_all, inline=True)
 def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
-    calls = "".join(f"    give(values[{i}], outputs[{i}], tick)\n" for i in range(len(outputs)))
-    names: dict[str, Any] = {"give": _give}
-    exec(f"def give_all(values, outputs, tick):\n{calls}    return None\n", names)
-    return names["give_all"]
+    calls = [f"give(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
+    return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
 @intrinsic

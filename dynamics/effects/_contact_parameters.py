@@ -82,7 +82,7 @@ class GroundContact(NamedTuple):
         rate = _rate_bound(airframe, points.feet, given.stiffness, given.tangential_stiffness)
         return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[float, float, float, float], ...]:
         """No foot is on the ground."""
         return ((0.0, 0.0, FREE, 0.0),) * len(self.feet)
 
@@ -107,7 +107,7 @@ class GroundContactSmooth(NamedTuple):
     rate_bound: float  # [1/s]
     mobility: float  # [1/kg] highest acceleration of a foot by a unit force on all feet
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[()], ...]:
         """Nothing to remember, foot by foot."""
         return ((),) * len(self.feet)
 

@@ -47,7 +47,7 @@ class AirDensity(NamedTuple):
             coefficients.append(-coefficients[-1] * (EXPONENT - k) / (k + 1) * LAPSE_RATE / (kelvin * base))
         return cls(tuple(coefficients))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float, float]:
         """The tangent at home."""
         return (self.series[0], self.series[1])
 

@@ -42,7 +42,7 @@ class Battery(NamedTuple):
         resistance = pack.cells * pack.cell_resistance
         return cls(float(pack.cells), pack.capacity, resistance, given.charge, pack.cells * given.cut_off)
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
         return (self.charge, self.cells * open_circuit_voltage(self.charge), 0.0)
 

@@ -48,7 +48,7 @@ class Payload(NamedTuple):
         release = float("inf") if given.release_time is None else given.release_time
         return cls(release, body_of(total, inertia), body_of(total - mass, rest))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float]:
         """1 once released."""
         return (0.0,)
 

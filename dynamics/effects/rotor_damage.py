@@ -6,7 +6,7 @@ from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import factors, sample
 from dynamics.effects._scene import checked
-from dynamics.effects._types import Factors
+from dynamics.effects._types import Factors, PerRotor
 from dynamics.errors import KeyedError
 from dynamics.generate import each
 from dynamics.kernel import leaf
@@ -46,7 +46,7 @@ class RotorDamage(NamedTuple):
 
         return cls(given.time, only_this(given.thrust_left), only_this(given.torque_left))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[PerRotor, PerRotor]:
         """Fractions of thrust and torque in force."""
         return (1.0,) * len(self.thrust_left), (1.0,) * len(self.torque_left)
 

@@ -58,7 +58,7 @@ class WindDryden(NamedTuple):
             math.sin(given.heading),
         )
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[float, ...], Vec3]:
         """(along, first and second state across, first and second vertical, 1 once started), then the wind."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 

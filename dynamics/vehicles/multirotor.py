@@ -181,8 +181,8 @@ def accelerations(drive, t, motion):
 FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
 
 
-def seen(layout, x):
-    """The vehicle's Motion, whatever form its state has."""
+def seen(layout: RotorLayout, x: Any) -> Motion:
+    """The vehicle's Motion, whatever form its state has; in compiled code only."""
     raise NotImplementedError("compiled code only")
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 from numba import types
-from numba.extending import overload
 
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
@@ -13,6 +12,7 @@ from cosim.schedule import LockStepError
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks
+from dynamics.generate import implements
 from dynamics.integrators import not_finite
 from dynamics.kernel import kernel
 from dynamics.multibody.five_bodies import FiveBodies
@@ -119,7 +119,7 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_struck)
+@implements(_struck)
 def _struck_of(drive: types.Type, x: types.Type) -> Callable:
     found = multirotor_multibody.struck if x.instance_class is FiveBodies else multirotor_euler.struck
     return lambda drive, x: found(drive, x)

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.extending import overload
 
 from cosim.part import GO_ON, Received
+from dynamics.generate import implements
 from dynamics.geodesy import Home
 from dynamics.kernel import leaf
 from dynamics.noise import Key
@@ -37,7 +37,7 @@ def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_sample, jit_options={"forceinline": True})
+@implements(_sample, inline=True)
 def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Callable:
     found = sys.modules[p.instance_class.__module__].sample
     return lambda p, s, key, tick, truth: found(p, s, key, tick, truth)
@@ -48,7 +48,7 @@ def _initial(p: Any, key: Key, truth: Truth) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_initial, jit_options={"forceinline": True})
+@implements(_initial, inline=True)
 def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Callable:
     found = sys.modules[p.instance_class.__module__].initial
     return lambda p, key, truth: found(p, key, truth)

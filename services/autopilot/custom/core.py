@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.extending import overload
 
 from cosim.part import GO_ON, Received
+from dynamics.generate import implements
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
 from services.autopilot import motor_watch
@@ -60,21 +60,20 @@ def _ask(
     raise NotImplementedError("compiled code only")
 
 
-@overload(_ask, jit_options={"forceinline": True})
+@leaf
+def _demanded(given: tuple) -> tuple[Any, Demand]:
+    """State and output of the user's step, the output as a demand."""
+    return given[0], demand(given[1])
+
+
+@implements(_ask, inline=True)
 def _ask_of(
     p: types.Type, s: types.Type, time: types.Type, estimate: types.Type, setpoint: types.Type, by_port: types.Type
 ) -> Callable:
     if p.instance_class is FromPort:
         return lambda p, s, time, estimate, setpoint, by_port: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
-
-    def ask(
-        p: Any, s: Any, time: float, estimate: StateEstimate, setpoint: Reference, by_port: tuple
-    ) -> tuple[Any, Demand]:
-        s, output = found(p, s, time, estimate, setpoint)
-        return s, demand(output)
-
-    return ask
+    return lambda p, s, time, estimate, setpoint, by_port: _demanded(found(p, s, time, estimate, setpoint))
 
 
 @leaf

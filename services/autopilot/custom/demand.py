@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.extending import overload
 
+from dynamics.generate import define, implements
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
 from services.autopilot import control
@@ -42,18 +42,14 @@ def _two(roll_pitch: Iterable[float]) -> tuple[float, float]:
     return roll, pitch
 
 
-@overload(demand, jit_options={"forceinline": True})
+@implements(demand, inline=True)
 def _demand(output: types.Type) -> Callable:
     told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
-    motors = output.instance_class is MotorVoltages
-
-    def made(output: Any) -> Demand:
-        roll_pitch = output[-1] if told else (0.0, 0.0)
-        if motors:
-            return Demand(True, output[0], roll_pitch)
-        return Demand(False, (output[0], output[1][0], output[1][1], output[1][2]), roll_pitch)
-
-    return made
+    roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
+    if output.instance_class is MotorVoltages:
+        return define("demand(output)", {"Demand": Demand}, f"return Demand(True, output[0], {roll_pitch})")
+    numbers = "(output[0], output[1][0], output[1][1], output[1][2])"
+    return define("demand(output)", {"Demand": Demand}, f"return Demand(False, {numbers}, {roll_pitch})")
 
 
 @leaf

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.extending import overload
 
 from cosim.part import Received
+from dynamics.generate import implements
 from dynamics.integrators import march
 from dynamics.kernel import ByClass, leaf
 from dynamics.tree import finite
@@ -33,7 +33,7 @@ TOLD = ByClass()
 """The compiled function of `told` by the class of a system's parameters."""
 
 
-@overload(told, jit_options={"forceinline": True})
+@implements(told, inline=True)
 def _told(p: types.Type, t: types.Type, x: types.Type) -> Callable:
     found = TOLD[p.instance_class]
     return lambda p, t, x: found(p, t, x)

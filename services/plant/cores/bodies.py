@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.extending import overload
 
 from cosim.part import GO_ON, Received
 from dynamics.effects import _hooks as hooks
+from dynamics.generate import implements
 from dynamics.kernel import leaf
 from dynamics.multibody.five_bodies import FiveBodies
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
@@ -28,7 +28,7 @@ def on_se3(x: Any) -> FiveBodies:
     raise NotImplementedError("compiled code only")
 
 
-@overload(on_se3)
+@implements(on_se3)
 def _on_se3(x: types.Type) -> Callable:
     if x.instance_class is FiveBodies:
         return lambda x: x
