@@ -1,6 +1,6 @@
 """A propeller that is damaged or lost in flight."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
@@ -10,7 +10,9 @@ from dynamics.effects._types import Factors, PerRotor
 from dynamics.errors import KeyedError
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -34,7 +36,7 @@ class RotorDamage(NamedTuple):
     torque_left: tuple[float, ...]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorDamage":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
         """For one of the airframe's rotors."""
         given = checked(Settings, table)
         count = len(airframe.rotors.position)
