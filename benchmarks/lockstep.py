@@ -18,7 +18,8 @@ from statistics import median
 from cosim.bus import ZenohBus, mesh
 from cosim.graph import Service
 from cosim.launcher import loopback_endpoints
-from cosim.process import Process, pin, run_lockstep
+from cosim.lockstep import pin, run_lockstep
+from cosim.process import Process
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup, Setup
 from dynamics.rows import to_row

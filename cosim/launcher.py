@@ -1,38 +1,26 @@
 """Starts the services of a scene as processes, watches them, and ends them all together."""
 
-import fcntl
-import os
-import re
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import IO, Any
 
-from cosim.bundle import unpack_batch
 from cosim.bus import ZenohBus, mesh
-from cosim.process import ALIVE_KEY, BATCH_KEY, COMPILING_KEY, WAITING_KEY
-from messages.topics import Topic
+from cosim.watch import STALL, WATCHER, Watch
 
-STALL = 2.5  # [s] without any message after which somebody is held to be frozen
 GRACE = 1.5  # [s] a process gets to end after SIGTERM
 FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick
-WATCHER = "mission"  # this process, among the participants
 PARTICIPANT = "services.participant"  # the module that a child runs
 REFUSED = 2  # exit code of a service whose user can mend what is wrong
 
 
 class RunFailed(RuntimeError):
     """A run that did not reach its end; the text names the culprit."""
-
-
-class SpaceInUse(ValueError):
-    """Another run uses this key space."""
 
 
 def loopback_endpoints(names: Iterable[str]) -> dict[str, str]:
@@ -42,102 +30,6 @@ def loopback_endpoints(names: Iterable[str]) -> dict[str, str]:
     for s in sockets.values():
         s.close()
     return endpoints
-
-
-def check_space(space: str) -> None:
-    """Refuse what cannot be the first part of a Zenoh key.
-
-    Raises:
-        ValueError: characters that a key cannot have, or an empty part.
-    """
-    if not re.fullmatch(r"[\w.-]+(/[\w.-]+)*", space, re.ASCII):
-        raise ValueError(f"--space {space}: expected letters, digits, _, - and . (parts joined by /)")
-
-
-@contextmanager
-def key_space(space: str) -> Iterator[None]:
-    """Hold a key space on this machine for the length of a run.
-
-    Raises:
-        SpaceInUse: another run holds it.
-        ValueError: not a key space.
-    """
-    check_space(space)
-    path = Path(tempfile.gettempdir()) / f"lapwing-{os.getuid()}-{space.replace('/', '_')}.lock"
-    with path.open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise SpaceInUse(
-                f"--space {space}: another run uses this key space; wait for its end or choose another name"
-            ) from None
-        yield
-
-
-class Watch:
-    """What a launcher sees of a run: who is there, how far it is, what it waits for."""
-
-    def __init__(self, bus: ZenohBus, space: str):
-        """Follow the batches of all services; `newest` holds the newest payload of each topic."""
-        self._space = space
-        self.newest: dict[Topic, bytes] = {}
-        self.waiting: dict[str, str] = {}
-        self.compiling = False  # somebody compiles kernels
-        self.present: set[str] = set()
-        self.gone: set[str] = set()
-        self.time_ns = 0  # up to which everybody who has spoken has come
-        self._times: dict[str, int] = {}
-        self.began: float | None = None  # [s] of the monotonic clock, at the first batch
-        self.wall = 0.0  # [s] from the first batch to the newest
-        self.ended = False  # somebody has handed over the last tick
-        self.last_news = time.monotonic()
-        self._news = bus.subscribe(*(f"{space}/{key}/*" for key in (BATCH_KEY, WAITING_KEY, COMPILING_KEY)))
-        bus.watch_alive(f"{space}/{ALIVE_KEY}/*", self._alive)
-
-    def _alive(self, key: str, alive: bool) -> None:
-        name = key.rsplit("/", 1)[1]
-        if alive:
-            self.present.add(name)
-            self.gone.discard(name)
-        elif name in self.present:
-            self.gone.add(name)
-
-    def poll(self, seconds: float) -> None:
-        """Take in what arrives during `seconds`."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            news = self._news.get_with_key(timeout=left)
-            if news is None:
-                return
-            key, time_ns, payload = news
-            head, _, name = key.removeprefix(f"{self._space}/").partition("/")
-            if head == COMPILING_KEY:
-                self.compiling = True
-                continue
-            if head == WAITING_KEY:
-                self.waiting[name] = payload.decode()
-                continue
-            self.last_news = time.monotonic()
-            self.waiting.clear()
-            if not payload:
-                self.ended = True
-                continue
-            self.began = self.began or self.last_news
-            self.wall = self.last_news - self.began
-            self._times[name] = time_ns
-            self.time_ns = min(self._times.values())
-            for page in unpack_batch(payload)[1]:
-                self.newest[page.topic] = page.payloads[-1].tobytes()
-
-    def frozen(self, names: Iterable[str]) -> str | None:
-        """A sentence that names who holds up the run, None while it goes on."""
-        if self.ended or time.monotonic() - self.last_news < STALL:
-            return None
-        silent = sorted(set(names) - set(self.waiting))
-        where = f"at t = {self.time_ns * 1e-9:.3f} s"
-        if silent:
-            return f"{', '.join(silent)}: no answer since {STALL:g} s, {where}"
-        return f"the run stands still {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())
 
 
 def launch(

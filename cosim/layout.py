@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cosim.process import ALIVE_KEY, BATCH_KEY, SETUP_KEY, STEP_KEY, WAITING_KEY
+from cosim.keys import ALIVE_KEY, BATCH_KEY, SETUP_KEY, STEP_KEY, WAITING_KEY
 from cosim.serialise import to_json
 from cosim.setup import Setup
 

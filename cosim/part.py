@@ -18,10 +18,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from cosim.schedule import KEPT, Input, Port, due
 from dynamics.cell import Cell
+from dynamics.generate import define, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.rows import load, store
 
@@ -106,19 +107,19 @@ def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Cod
     return Code(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name), memory, cell)
 
 
-def step(parameters, state, tick, inputs):
+def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
     """`step` of the module that declares the class of the parameters."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(step, jit_options={"forceinline": True})
-def _step(parameters, state, tick, inputs):
+@implements(step, inline=True)
+def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Callable:
     found = sys.modules[parameters.instance_class.__module__].step
     return lambda parameters, state, tick, inputs: found(parameters, state, tick, inputs)
 
 
 @leaf
-def row_of(stamp, period, rows):
+def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
     """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
     if period == 1:
         return stamp & (rows.shape[0] - 1)
@@ -126,51 +127,47 @@ def row_of(stamp, period, rows):
 
 
 @leaf
-def _take(given, tick):
+def _take(given: InputRows, tick: int) -> Received:
     stamp = due(tick, given.period, given.delay)
     return Received(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
 
 
 @leaf
-def _give(value, taken, tick):
+def _give(value: Any, taken: OutputRows, tick: int) -> None:
     if due(tick, taken.period, 0) >= 0:
         store(value, taken.rows, row_of(tick, taken.period, taken.rows))
 
 
-def _take_all(inputs, tick):
+def _take_all(inputs: tuple[InputRows, ...], tick: int) -> tuple[Received, ...]:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_take_all, jit_options={"forceinline": True})
-def _take_each(inputs, tick):
+@implements(_take_all, inline=True)
+def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
     calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
-    names: dict[str, Any] = {"take": _take}
-    exec(f"def take_all(inputs, tick):\n    return ({calls})\n", names)
-    return names["take_all"]
+    return define("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
-def _give_all(values, outputs, tick):
+def _give_all(values: tuple, outputs: tuple[OutputRows, ...], tick: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@overload(_give_all, jit_options={"forceinline": True})
-def _give_each(values, outputs, tick):
-    calls = "".join(f"    give(values[{i}], outputs[{i}], tick)\n" for i in range(len(outputs)))
-    names: dict[str, Any] = {"give": _give}
-    exec(f"def give_all(values, outputs, tick):\n{calls}    return None\n", names)
-    return names["give_all"]
+@implements(_give_all, inline=True)
+def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
+    calls = [f"give(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
+    return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
 @intrinsic
-def _address(typing_context, cell):
-    def generate(context, builder, signature, arguments):
+def _address(typing_context: Any, cell: types.Type) -> tuple[Any, Callable]:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
 
     return types.int64(cell), generate
 
 
 @kernel
-def advance(memory, tick):
+def advance(memory: Any, tick: int) -> int:
     """One step of the part whose `Core` is in the cell `memory`; its signal. At tick -1: the cell's address."""
     if tick < 0:
         return _address(memory)
@@ -182,8 +179,8 @@ def advance(memory, tick):
 
 
 @intrinsic
-def _invoke(typing_context, function, memory, tick):
-    def generate(context, builder, signature, arguments):
+def _invoke(typing_context: Any, function: types.Type, memory: types.Type, tick: types.Type) -> tuple[Any, Callable]:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
         pointer = ir.IntType(8).as_pointer()
         structure = ir.LiteralStructType([pointer])
         kind = ir.FunctionType(ir.IntType(64), [structure, ir.IntType(64)])
@@ -215,7 +212,7 @@ def schedule(codes: Sequence[Code | None], every: Sequence[int]) -> Schedule:
 
 
 @kernel
-def run(schedule, tick, first, stop):
+def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]:
     """Run the schedule in a cell from part `first` of `tick` until before the tick `stop`, or until somebody has a say.
 
     Returns:

@@ -33,7 +33,7 @@ class LockStepError(RuntimeError):
 
 
 @leaf
-def due(tick, period, delay):
+def due(tick: int, period: int, delay: int) -> int:
     """The tick with which the message due at `tick` is stamped; -1 where none is."""
     stamp = tick - delay
     return stamp if stamp >= 0 and (period <= 1 or stamp % period == 0) else -1

@@ -4,6 +4,7 @@ A kernel can neither index a tuple of unlike members by a variable nor choose a 
 written out as text when it is compiled, and cost nothing when it runs. All text that `dynamics` runs as code is here.
 """
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -44,9 +45,29 @@ def generated(signature: str, generate: Callable[..., Callable], doc: str, *, in
 
     function.__name__, function.__qualname__, function.__doc__ = name, name, doc
     function.__module__ = generate.__module__
+    _implement(function, arguments, generate, inline)
+    return function
+
+
+def implements(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
+    """Decorates what takes the numba types of a function's arguments and gives its implementation in compiled code.
+
+    Args:
+        function: what stands in the source of kernels; it is not called in them.
+        inline: always into its caller.
+    """
+
+    def decorate(generate: Callable[..., Callable]) -> Callable:
+        _implement(function, ", ".join(inspect.signature(function).parameters), generate, inline)
+        return generate
+
+    return decorate
+
+
+def _implement(function: Callable, arguments: str, generate: Callable[..., Callable], inline: bool) -> None:
+    # numba compares the argument lists, annotations and all: this one has none, like the implementations
     chosen = define(f"chosen({arguments})", {"generate": generate}, f"return generate({arguments})")
     overload(function, jit_options=INLINE if inline else {})(chosen)
-    return function
 
 
 def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:

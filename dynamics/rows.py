@@ -8,12 +8,14 @@ row costs as much as the numbers that are used of it.
 # numba.core.types fills itself at import
 # mypy: disable-error-code="attr-defined"
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba.core import types
 from numba.core.errors import TypingError
-from numba.extending import overload
+
+from dynamics.generate import define, implements
 
 
 def width(tree: Any) -> int:
@@ -82,13 +84,13 @@ def _kind(tree: types.Type) -> str:
     raise TypingError(f"a row holds numbers, tuples and NamedTuples only, not {tree}")
 
 
-def load(like, rows, i):
+def load(like: Any, rows: np.ndarray, i: int) -> Any:
     """The tree of the type of `like` in row i."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(load, jit_options={"forceinline": True})
-def _load(like, rows, i):
+@implements(load, inline=True)
+def _load(like: types.Type, rows: types.Type, i: types.Type) -> Callable:
     names: dict[str, Any] = {}
     column = 0
 
@@ -104,17 +106,17 @@ def _load(like, rows, i):
             return f"{name}({', '.join(parts)})"
         return f"({', '.join(parts)}{',' if len(parts) == 1 else ''})"
 
-    exec(f"def load(like, rows, i):\n    return {expression(like)}\n", names)
-    return names["load"]
+    result = expression(like)
+    return define("load(like, rows, i)", names, f"return {result}")
 
 
-def store(tree, rows, i):
+def store(tree: Any, rows: np.ndarray, i: int) -> None:
     """Put a tree into row i."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(store, jit_options={"forceinline": True})
-def _store(tree, rows, i):
+@implements(store, inline=True)
+def _store(tree: types.Type, rows: types.Type, i: types.Type) -> Callable:
     lines: list[str] = []
 
     def walk(part: types.Type, path: str) -> None:
@@ -123,9 +125,7 @@ def _store(tree, rows, i):
                 walk(item, f"{path}[{k}]")
         else:
             _kind(part)
-            lines.append(f"    rows[i, {len(lines)}] = {path}")
+            lines.append(f"rows[i, {len(lines)}] = {path}")
 
     walk(tree, "tree")
-    names: dict[str, Any] = {}
-    exec("def store(tree, rows, i):\n" + "\n".join(lines or ["    pass"]) + "\n", names)
-    return names["store"]
+    return define("store(tree, rows, i)", {}, *lines, "return None")

@@ -8,9 +8,9 @@ import sys
 from typing import IO, Any, NamedTuple
 
 from cosim import user_module
-from cosim.launcher import WATCHER
 from cosim.serialise import from_json, to_json
 from cosim.setup import Setup
+from cosim.watch import WATCHER
 
 _LENGTH = struct.Struct("<Q")
 
@@ -68,7 +68,8 @@ def take_part(given: Participation) -> None:
         LockStepError: the lock step cannot go on.
     """
     from cosim.bus import ZenohBus, mesh
-    from cosim.process import Process, Stopped, run_encoder, run_lockstep
+    from cosim.lockstep import run_encoder, run_lockstep
+    from cosim.process import Process, Stopped
     from services import processes
 
     setup, encoded = given.setup, processes.encoded(given.name)

@@ -13,8 +13,10 @@ import services
 from cosim import scene as scenes
 from cosim.scene import Overrides, Scene, Vocabulary
 from cosim.setup import Setup
-from services.common import sections
-from services.common.sections import Exchange, Run, Vehicle
+from services.common import exchange, modules, sections, vehicle
+from services.common.exchange import Exchange
+from services.common.sections import Run
+from services.common.vehicle import Vehicle
 from services.plant import models
 from services.processes import PROCESSES, entry
 
@@ -29,7 +31,7 @@ def _configurations() -> list[ModuleType]:
 @cache
 def vocabulary() -> Vocabulary:
     """Every table that a scene may have: of several services, of one, and of the plant's models."""
-    tables = [sections, *_configurations(), *map(models.get, models.names())]
+    tables = [sections, exchange, vehicle, modules, *_configurations(), *map(models.get, models.names())]
     return Vocabulary.of(tables, models.check)
 
 

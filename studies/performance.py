@@ -11,7 +11,7 @@ from rich.table import Table
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import Airframe, load_airframe
-from services.common.sections import airframe
+from services.common.vehicle import airframe
 from services.table import load
 
 
@@ -75,7 +75,7 @@ def _airframe(subject: Path) -> Airframe:
     return airframe(load(subject))
 
 
-def show(rows: list[Row]) -> None:
+def show(console: Console, rows: list[Row]) -> None:
     """Print the card."""
     source = rows[0].source
     table = Table(show_lines=True)
@@ -89,7 +89,7 @@ def show(rows: list[Row]) -> None:
         if source:
             cells += ["" if row.published is None else f"{row.published:.1f}", row.reason]
         table.add_row(*cells)
-    Console().print(table)
+    console.print(table)
 
 
 def write_json(path: Path, rows: list[Row]) -> None:

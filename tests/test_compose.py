@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from cosim.launcher import WATCHER
+from cosim.watch import WATCHER
 from lapwing.runs.joined import parse_peers
 from services import processes
 from services.table import load, resolve

@@ -1,7 +1,7 @@
 """A scene: one TOML file and all that it names, read once and turned into frozen, validated values.
 
 Each service declares the tables that it alone reads as `Section` classes in its own `config.py`, those that several
-read are in `services/common/sections.py`. They are handed over as a `Vocabulary`. A service gets its settings with
+read are in `services/common`. They are handed over as a `Vocabulary`. A service gets its settings with
 `scene[SectionClass]`.
 """
 

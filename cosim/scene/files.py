@@ -88,3 +88,9 @@ def laid_over(content: dict[str, Any], given: Any) -> Any:
         below = content.get(key)
         merged[key] = laid_over(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
     return merged
+
+
+def named(tree: dict[str, Any], table: str, key: str, default: Any = None) -> Any:
+    """The value of a key in data that is not yet validated; None where there is no such table."""
+    found = tree.get(table)
+    return found.get(key, default) if isinstance(found, dict) else None

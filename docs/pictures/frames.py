@@ -14,7 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
-from services.common.sections import Exchange, airframe
+from services.common.exchange import Exchange
+from services.common.vehicle import airframe
 from services.sensors.registry import parameters
 from services.table import load
 

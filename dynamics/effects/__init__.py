@@ -11,10 +11,13 @@ import importlib
 import pkgutil
 from collections.abc import Mapping
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from dynamics.effects._scene import checked
 from dynamics.errors import KeyedError
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 __all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
 
@@ -53,7 +56,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
     return getattr(found, wanted)
 
 
-def from_scene(tables: Mapping[str, Mapping], airframe: Airframe) -> tuple:
+def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe") -> tuple:
     """The active effects of a scene, sorted by name, from the table of each.
 
     Raises:

@@ -1,7 +1,7 @@
 """What a scene says about the contact with the ground, and the two effects that come of it."""
 
 import math
-from typing import Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
@@ -9,7 +9,9 @@ from dynamics.effects._ground import Ground
 from dynamics.effects._scene import cannot, checked
 from dynamics.errors import KeyedError
 from dynamics.vector import Vec3
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(5)]
 Stiffness = Annotated[float, Gt(0), Le(1e9)]
@@ -55,7 +57,7 @@ class GroundContact(NamedTuple):
     rate_bound: float  # [1/s] of the fastest mode in contact
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundContact | GroundContactSmooth":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
         """With the airframe's feet and mass."""
         given = checked(Settings, table)
         if given.friction_dynamic > given.friction_static:
@@ -82,7 +84,7 @@ class GroundContact(NamedTuple):
         rate = _rate_bound(airframe, points.feet, given.stiffness, given.tangential_stiffness)
         return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[float, float, float, float], ...]:
         """No foot is on the ground."""
         return ((0.0, 0.0, FREE, 0.0),) * len(self.feet)
 
@@ -107,7 +109,7 @@ class GroundContactSmooth(NamedTuple):
     rate_bound: float  # [1/s]
     mobility: float  # [1/kg] maximum acceleration of a foot by a unit force on all feet
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[()], ...]:
         """Nothing to remember, foot by foot."""
         return ((),) * len(self.feet)
 
@@ -119,13 +121,13 @@ SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
 STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
 
 
-def _mobility(airframe: Airframe, points: tuple[Vec3, ...]) -> float:
+def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
     inertia = airframe.mass.inertia
     arm = max(point[0] ** 2 + point[1] ** 2 + point[2] ** 2 for point in points)
     return 1.0 / airframe.mass.total + arm / min(inertia)
 
 
-def _rate_bound(airframe: Airframe, feet: tuple[Vec3, ...], normal: float, tangential: float) -> float:
+def _rate_bound(airframe: "Airframe", feet: tuple[Vec3, ...], normal: float, tangential: float) -> float:
     """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it."""
     mass = airframe.mass
     xx, yy, zz = (sum(foot[i] ** 2 for foot in feet) for i in range(3))

@@ -2,11 +2,12 @@
 
 from numba.extending import overload
 
+from dynamics.effects._types import PerRotor
 from dynamics.generate import INLINE, define
-from dynamics.vector import add
+from dynamics.vector import Vec3, add
 
 
-def total(a):
+def total(a: PerRotor) -> float:
     """Sum of a tuple, added in pairs: a shorter chain of dependent additions."""
     return sum(a)
 
@@ -20,8 +21,8 @@ def _total(a):
     return define("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
 
 
-def total_wrench(a):
-    """Sum of a tuple of (force, torque)."""
+def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
+    """Sum of a tuple of (force [N], torque [N m]); in compiled code only."""
     raise NotImplementedError("compiled code only")
 
 

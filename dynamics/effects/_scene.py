@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, NoReturn, TypeVar
-
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from dynamics.errors import KeyedError
-from dynamics.validation import fault
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from pydantic import TypeAdapter
 
 T = TypeVar("T")
 
 
 @cache
-def _adapter(cls: type) -> TypeAdapter:
+def _adapter(cls: type) -> "TypeAdapter":
+    from pydantic import ConfigDict, TypeAdapter
+
     return TypeAdapter(cls, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
@@ -23,6 +25,10 @@ def checked(cls: type[T], table: Mapping[str, Any]) -> T:
     Raises:
         KeyedError: a key is missing, unknown, of the wrong type or out of range.
     """
+    from pydantic import ValidationError
+
+    from dynamics.validation import fault
+
     try:
         return _adapter(cls).validate_python(_tuples(table))  # type: ignore[arg-type]
     except ValidationError as error:

@@ -1,13 +1,15 @@
 """Air density that falls with altitude."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import air, sample
 from dynamics.effects._scene import checked
 from dynamics.effects._types import Air
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 KELVIN = 273.0  # [K] at 0 degC, as the paper rounds it
 LAPSE_RATE = 0.0065  # [K/m]
@@ -37,7 +39,7 @@ class AirDensity(NamedTuple):
     series: tuple[float, ...]  # [kg/m^3], [kg/m^4], ... in powers of the height above home
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "AirDensity":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "AirDensity":
         """Taylor coefficients of rho_0 (1 - L (h + z) / T)^n in z."""
         settings = checked(Settings, table)
         kelvin = KELVIN + settings.temperature
@@ -47,7 +49,7 @@ class AirDensity(NamedTuple):
             coefficients.append(-coefficients[-1] * (EXPONENT - k) / (k + 1) * LAPSE_RATE / (kelvin * base))
         return cls(tuple(coefficients))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float, float]:
         """The tangent at home."""
         return (self.series[0], self.series[1])
 

@@ -1,7 +1,7 @@
 """A battery that empties and sags under load."""
 
 import math
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
@@ -10,7 +10,9 @@ from dynamics.effects._rotors import total
 from dynamics.effects._scene import cannot, checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -35,14 +37,14 @@ class Battery(NamedTuple):
     cut_off: float  # [V] of all cells
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "Battery":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
         """From the airframe's battery."""
         given = checked(Settings, table)
         pack = airframe.battery or cannot("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
         return cls(float(pack.cells), pack.capacity, resistance, given.charge, pack.cells * given.cut_off)
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
         return (self.charge, self.cells * open_circuit_voltage(self.charge), 0.0)
 

@@ -1,13 +1,15 @@
 """Air drag of the fuselage."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from dynamics.effects._hooks import wrench_body
 from dynamics.effects._scene import cannot, checked
 from dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(100)]
 Triple = tuple[Coefficient, Coefficient, Coefficient]
@@ -31,7 +33,7 @@ class BodyDrag(NamedTuple):
     linear: Vec3  # [N s/m]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "BodyDrag":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyDrag":
         """With the airframe's areas unless the table has its own."""
         given = checked(Settings, table)
         area = given.area

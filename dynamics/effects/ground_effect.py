@@ -1,14 +1,16 @@
 """More thrust close to the ground."""
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import asleep, factors
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import Factors
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the factor is kept
 FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.4 %, is faded out
@@ -29,7 +31,7 @@ class GroundEffect(NamedTuple):
     highest: float  # [m] of the centre of mass, above which no rotor feels the ground
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundEffect":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")

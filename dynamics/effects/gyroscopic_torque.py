@@ -1,13 +1,15 @@
 """Gyroscopic torque of the spinning rotors on the turning body."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import torque
 from dynamics.effects._rotors import total
 from dynamics.effects._scene import checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -24,7 +26,7 @@ class GyroscopicTorque(NamedTuple):
     inertia: float  # [kg m^2] of one rotor about its axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "GyroscopicTorque":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GyroscopicTorque":
         """From the airframe's rotors."""
         checked(Settings, table)
         return cls(airframe.rotors.inertia)

@@ -1,6 +1,6 @@
 """H-force: drag of the turning rotors in their plane."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
@@ -10,8 +10,10 @@ from dynamics.effects._scene import cannot, checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vector import apply_transposed, subtract
-from dynamics.vehicles.airframe import Airframe
 from dynamics.vehicles.propeller import drag_coefficients
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -34,7 +36,7 @@ class HForce(NamedTuple):
     square_arm: tuple[float, ...]  # [m^2] squared distance of each rotor from the body z axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "HForce":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "HForce":
         """From the airframe's propeller unless the table has the coefficient."""
         given = checked(Settings, table)
         positions = airframe.rotors.position

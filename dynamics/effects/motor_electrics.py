@@ -1,12 +1,14 @@
 """Motors with a winding, instead of a rotor speed that follows the voltage with a lag."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import motor
 from dynamics.effects._scene import checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 KIND = "motor model"
 FULL_FRICTION = 1.0  # [rad/s] above which the idle current is drawn in full
@@ -31,7 +33,7 @@ class MotorElectrics(NamedTuple):
     inverse_inertia: float  # [1/(kg m^2)] of one rotor
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "MotorElectrics":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "MotorElectrics":
         """From the airframe's motor."""
         checked(Settings, table)
         engine = airframe.motor

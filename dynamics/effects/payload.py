@@ -1,6 +1,6 @@
 """A payload that is let go."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
@@ -8,7 +8,9 @@ from dynamics.effects._hooks import body, sample
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import MassProperties, body_of
 from dynamics.errors import KeyedError
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 Length = Annotated[float, Gt(0), Le(10)]
 
@@ -33,7 +35,7 @@ class Payload(NamedTuple):
     empty: MassProperties
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "Payload":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Payload":
         """Mass properties with and without the box."""
         given = checked(Settings, table)
         mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
@@ -48,7 +50,7 @@ class Payload(NamedTuple):
         release = float("inf") if given.release_time is None else given.release_time
         return cls(release, body_of(total, inertia), body_of(total - mass, rest))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[float]:
         """1 once released."""
         return (0.0,)
 

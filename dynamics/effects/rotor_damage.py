@@ -1,16 +1,18 @@
 """A propeller that is damaged or lost in flight."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import factors, sample
 from dynamics.effects._scene import checked
-from dynamics.effects._types import Factors
+from dynamics.effects._types import Factors, PerRotor
 from dynamics.errors import KeyedError
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -34,7 +36,7 @@ class RotorDamage(NamedTuple):
     torque_left: tuple[float, ...]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorDamage":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
         """For one of the airframe's rotors."""
         given = checked(Settings, table)
         count = len(airframe.rotors.position)
@@ -46,7 +48,7 @@ class RotorDamage(NamedTuple):
 
         return cls(given.time, only_this(given.remaining_thrust), only_this(given.torque_left))
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[PerRotor, PerRotor]:
         """Fractions of thrust and torque in force."""
         return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.torque_left)
 

@@ -1,7 +1,7 @@
 """Correction of the rotors' thrust and torque for air that comes along their axis."""
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import loads
 from dynamics.effects._scene import cannot, checked
@@ -9,8 +9,10 @@ from dynamics.effects._types import Loads
 from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vector import subtract
-from dynamics.vehicles.airframe import Airframe
 from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -31,7 +33,7 @@ class RotorInflow(NamedTuple):
     turn_per_metre: float  # [rad/m] 2 pi over pitch
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorInflow":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInflow":
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")

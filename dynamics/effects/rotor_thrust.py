@@ -1,15 +1,17 @@
 """Static thrust and torque of the rotors from the propeller's geometry."""
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import loads
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import Loads
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vehicles.airframe import Airframe
 from dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 KIND = "rotor thrust model"
 
@@ -29,7 +31,7 @@ class RotorThrust(NamedTuple):
     torque_constant: float  # [m^5/rad^2] C_M D^5 / (4 pi^2)
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorThrust":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]; name rotor_quadratic instead")

@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
@@ -12,7 +12,9 @@ from dynamics.effects._types import Air
 from dynamics.kernel import leaf
 from dynamics.noise import normal3
 from dynamics.vector import Vec3
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 LANE_FIRST, LANE_SECOND = zlib.crc32(b"wind_dryden 1"), zlib.crc32(b"wind_dryden 2")
 FOOT = 0.3048  # [m]
@@ -42,7 +44,7 @@ class WindDryden(NamedTuple):
     sine: float
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: Airframe) -> "WindDryden":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDryden":
         """Intensities and scales at the given altitude."""
         given = checked(Settings, table)
         feet = given.altitude / FOOT
@@ -58,7 +60,7 @@ class WindDryden(NamedTuple):
             math.sin(given.heading),
         )
 
-    def initial_memory(self):
+    def initial_memory(self) -> tuple[tuple[float, ...], Vec3]:
         """(along, first and second state across, first and second vertical, 1 once started), then the wind."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 

@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import sample, wrench
 from dynamics.noise import normal3
-from dynamics.vector import NOTHING, ZERO, add, norm, scale, subtract
+from dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
@@ -28,7 +28,7 @@ class WindRandom(NamedTuple):
     density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
     shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
 
-    def initial_memory(self):
+    def initial_memory(self) -> Vec3:
         """No force before the first exchange."""
         return ZERO
 

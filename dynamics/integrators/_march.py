@@ -6,6 +6,7 @@ class do.
 
 import sys
 from collections import namedtuple
+from typing import Any
 
 from numba.extending import overload
 
@@ -43,7 +44,7 @@ def rate(p, t, x):
     return _rate(p, t, x)
 
 
-def step(method, p, t, x, h):
+def step(method: Any, p: Any, t: float, x: Any, h: float) -> Any:
     """The state at t + h: one step of `method` (an instance of its module's `Method`) on the system of parameters p."""
     return sys.modules[type(method).__module__].step(rate, p, t, x, h)
 

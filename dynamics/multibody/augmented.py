@@ -8,11 +8,13 @@ multipliers the shortest are given.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynamics.kernel import kernel
 from dynamics.multibody import euler, pivoted_qr
 from dynamics.multibody.constraints import equations, in_coordinates
 from dynamics.multibody.placement import nine, place, three
+from dynamics.multibody.system import System
 from dynamics.vector import apply_transposed
 
 RANK_TOLERANCE = 1e-9  # of a unit row: what is left of a dependent row after elimination is round-off
@@ -161,10 +163,17 @@ def stabilised(e, velocity, damping, stiffness):
     return gamma
 
 
-def accelerations(system, configuration, velocity, wrench=None, drive=None) -> Solution:
+def accelerations(
+    system: System,
+    configuration: ArrayLike,
+    velocity: ArrayLike,
+    wrench: ArrayLike | None = None,
+    drive: ArrayLike | None = None,
+) -> Solution:
     """Accelerations of all coordinates, multipliers, rank and conflict of a system (theory.md, eqs. (8.20)-(8.22)).
 
     Args:
+        system: n bodies and d drives.
         configuration: (n, 6) Euler or (n, 7) quaternion coordinates; see `placement`.
         velocity: (n, 6).
         wrench: (n, 6) external force at each centre of mass [N], world, and torque [N m], body; gravity is added.
@@ -179,8 +188,21 @@ def accelerations(system, configuration, velocity, wrench=None, drive=None) -> S
     return solution
 
 
-def prepared(system, configuration, velocity, wrench, drive):
-    """Float arrays of the right shapes, zeros for None; ValueError that names the argument otherwise."""
+def prepared(
+    system: System,
+    configuration: ArrayLike,
+    velocity: ArrayLike,
+    wrench: ArrayLike | None,
+    drive: ArrayLike | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The arguments of `accelerations` as arrays of floats, zeros for None.
+
+    Returns:
+        configuration (n, 6) or (n, 7), velocity (n, 6), wrench (n, 6), drive (d, 2).
+
+    Raises:
+        ValueError: a shape is wrong or a number is not finite; names the argument.
+    """
     n, d = len(system.bodies), len(system.drives)
     wrench = np.zeros((n, 6)) if wrench is None else np.ascontiguousarray(wrench, float)
     drive = np.zeros((d, 2)) if drive is None else np.ascontiguousarray(drive, float).reshape(d, 2)
@@ -199,7 +221,7 @@ def prepared(system, configuration, velocity, wrench, drive):
     return configuration, velocity, wrench, drive
 
 
-def refuse_singular(system, body, when="") -> None:
+def refuse_singular(system: System, body: int, when: str = "") -> None:
     """ValueError if `body` is not -1: its Euler angles are singular."""
     if body >= 0:
         raise ValueError(

@@ -4,6 +4,7 @@ No constraint can drift; the multibody system is solved on the fast path at ever
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from dynamics.integrators import RATES
@@ -71,15 +72,15 @@ class Flight(NamedTuple):
 
 def delivery_drone(
     *,
-    central_frame,
-    payload,
-    frame_inertia,
-    propeller,
-    propeller_inertia,
-    arm_length,
-    rotor_sign_x,
-    rotor_sign_y,
-    driven="torque",
+    central_frame: float,
+    payload: float,
+    frame_inertia: Sequence[float],
+    propeller: float,
+    propeller_inertia: Sequence[float],
+    arm_length: float,
+    rotor_sign_x: Sequence[float],
+    rotor_sign_y: Sequence[float],
+    driven: str = "torque",
 ) -> Drone:
     """The paper's five bodies (Tables 2, 3) from SI numbers under the names of facts/delivery_drone.toml.
 

@@ -5,6 +5,7 @@ the general engine, unless `hold` brings them back after a step. A hinge holds a
 point; both its axes are z.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from dynamics.lanes import beside, separate, where
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody.arrow import Core, Leaf, eliminate, felt
+from dynamics.multibody.delivery_drone import Drone
 from dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, divide, dot, multiply, scale, subtract
 
 UP: Vec3 = (0.0, 0.0, 1.0)
@@ -185,14 +187,23 @@ def reactions(p, t, x):
 
 
 def machine(
-    drone,
-    gravity,
-    drive=(0.0, 0.0, 0.0, 0.0),
-    speeds=(0.0, 0.0, 0.0, 0.0),
-    wrenches=(NO_WRENCH,) * 5,
-    feedback=0.0,
+    drone: Drone,
+    gravity: Vec3,
+    drive: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    speeds: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    wrenches: Sequence[Wrench] = (NO_WRENCH,) * 5,
+    feedback: float = 0.0,
 ) -> Machine:
-    """The five bodies of a `delivery_drone.Drone`; `wrenches`: chassis first."""
+    """The five bodies of a drone.
+
+    Args:
+        drone: mass properties.
+        gravity: [m/s^2], world.
+        drive: of each propeller: torque from the chassis [N m] if it spins, else imposed acceleration [rad/s^2].
+        speeds: imposed speeds relative to the chassis at t = 0 [rad/s].
+        wrenches: on each body from outside, chassis first.
+        feedback: Baumgarte's rate [1/s]; 0: none.
+    """
     rotors = tuple(
         Rotor(
             drone.propeller_mass[k], drone.propeller_inertia[k], drone.hubs[k], drone.spins[k],

@@ -7,10 +7,12 @@ Each function returns (system, configuration (n, 7), velocity (n, 6)), consisten
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble
+from dynamics.multibody.delivery_drone import Drone
+from dynamics.multibody.system import GROUND, Body, Drive, Revolute, System, assemble
 
 GRAVITY = (0.0, -9.81, 0.0)
 Z = (0.0, 0.0, 1.0)
@@ -23,14 +25,14 @@ def _at(positions):
     return configuration
 
 
-def pendulum(inertia=1e-9):
+def pendulum(inertia: float = 1e-9) -> tuple[System, np.ndarray, np.ndarray]:
     """A01: 1 kg at 1 m from a hinge, released at rest from the horizontal; with a trace of inertia [kg m^2]."""
     hinge = Revolute("hinge", GROUND, 0, (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), Z, Z)
     system = assemble([Body("mass", 1.0, (inertia,) * 3)], [hinge], gravity=GRAVITY)
     return system, _at([(1.0, 0.0, 0.0)]), np.zeros((1, 6))
 
 
-def four_bars(n=2, speed=1.0):
+def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.ndarray]:
     """A02: n four-bar windows, 2 n + 1 rods of 1 kg and 1 m; cranks upright, tips moving at `speed` [m/s] along x.
 
     Bodies: cranks 0..n, then couplers. Whenever the cranks lie flat, the mechanism has n + 1 degrees of freedom.
@@ -53,7 +55,7 @@ def four_bars(n=2, speed=1.0):
     return assemble(bodies, joints, gravity=GRAVITY), configuration, velocity
 
 
-def bricard():
+def bricard() -> tuple[System, np.ndarray, np.ndarray]:
     """A04: five rods of 1 kg and 1 m, 0.1 m square, along the edges of a cube, and six hinges; at rest.
 
     Counting equations leaves no freedom; one of them is redundant, and it moves.
@@ -77,7 +79,7 @@ def bricard():
     return assemble(bodies, joints, gravity=GRAVITY), _at(middles), np.zeros((5, 6))
 
 
-def drone_system(drone, driven=(True, True, True, True)):
+def drone_system(drone: Drone, driven: Sequence[bool] = (True, True, True, True)) -> System:
     """The five bodies of a `delivery_drone.Drone` as a general system: 30 coordinates, 20 joint rows and three rows for
     each propeller that is `driven` at an imposed speed (gravity along -z, 9.81 m/s^2). Body 0 is the chassis."""
     origin = (0.0, 0.0, 0.0)

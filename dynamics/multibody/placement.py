@@ -8,6 +8,7 @@ quaternions (w, x, y, z). Its velocity is an array (n, 6): the coordinates' rate
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynamics.kernel import kernel
 from dynamics.lie import quaternion
@@ -118,7 +119,7 @@ def displaced(configuration, step):
     return out
 
 
-def euler_from_quaternion(configuration, velocity):
+def euler_from_quaternion(configuration: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same state in Euler angles: configuration (n, 7) to (n, 6), velocity (n, 6) to (n, 6).
 
     Raises:
@@ -134,7 +135,7 @@ def euler_from_quaternion(configuration, velocity):
     return angles_out, rates_out
 
 
-def quaternion_from_euler(configuration, velocity):
+def quaternion_from_euler(configuration: ArrayLike, velocity: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """The same state with quaternions: configuration (n, 6) to (n, 7), velocity (n, 6) to (n, 6)."""
     placed = place(np.asarray(configuration, float), np.asarray(velocity, float))
     q = [quaternion.from_matrix(tuple(R)) for R in placed.rotation[:-1]]

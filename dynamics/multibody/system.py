@@ -3,10 +3,12 @@
 The reference point of every body is its centre of mass. Body index -1 is the ground, fixed in the world frame.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 GROUND = -1
 
@@ -89,7 +91,7 @@ class System:
         )
 
 
-def triad(axis) -> np.ndarray:
+def triad(axis: ArrayLike) -> np.ndarray:
     """Right-handed unit vectors v1, v2, v3 as rows, shape (3, 3), with v3 along `axis` (theory.md, eq. (8.11))."""
     v3 = np.asarray(axis, float) / np.linalg.norm(axis)
     # the coordinate axis furthest from v3 keeps the cross product far from zero
@@ -98,8 +100,13 @@ def triad(axis) -> np.ndarray:
     return np.array([v1, np.cross(v3, v1), v3])
 
 
-def assemble(bodies, joints=(), drives=(), gravity=(0.0, 0.0, -9.81)) -> System:
-    """Check the parts and pack them; gravity in the world frame [m/s^2].
+def assemble(
+    bodies: Iterable[Body],
+    joints: Iterable[Revolute] = (),
+    drives: Iterable[Drive] = (),
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> System:
+    """Check the parts and pack them; gravity in the world frame [m/s^2], shape (3,).
 
     Raises:
         ValueError: a mass or inertia that no rigid body has, an axis without direction, an unknown body, a twin name.
@@ -107,7 +114,8 @@ def assemble(bodies, joints=(), drives=(), gravity=(0.0, 0.0, -9.81)) -> System:
     bodies, joints, drives = tuple(bodies), tuple(joints), tuple(drives)
     for body in bodies:
         _check_body(body)
-    for constraint in (*joints, *drives):
+    constraints: tuple[Revolute | Drive, ...] = (*joints, *drives)
+    for constraint in constraints:
         for index in (constraint.body_i, constraint.body_j):
             if not GROUND <= index < len(bodies):
                 raise ValueError(
@@ -119,7 +127,7 @@ def assemble(bodies, joints=(), drives=(), gravity=(0.0, 0.0, -9.81)) -> System:
             axis = getattr(constraint, key, (1.0, 0.0, 0.0))
             if not (np.all(np.isfinite(axis)) and np.linalg.norm(axis) > 0.0):
                 raise ValueError(f"{constraint.name}: {key} must be a direction, not {axis}")
-    names = [part.name for part in (*bodies, *joints, *drives)]
+    names = [body.name for body in bodies] + [constraint.name for constraint in constraints]
     if len(set(names)) < len(names):
         raise ValueError(f"the name {next(n for n in names if names.count(n) > 1)!r} is used twice")
 

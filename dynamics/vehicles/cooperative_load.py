@@ -63,7 +63,7 @@ COMMANDS = ByClass()
 """The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
 
 
-def command(p, t, x):
+def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> LiftCommand:
     """The LiftCommand at time t: given, or by the control law that `p.drive` belongs to."""
     return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
 

@@ -8,7 +8,7 @@ every force is an effect (dynamics/effects). All functions are pure. What stands
 import math
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numba.extending import overload
 
@@ -19,7 +19,9 @@ from dynamics.generate import each
 from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
 from dynamics.vector import ZERO, Vec3, scale
-from dynamics.vehicles.airframe import Airframe
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
@@ -181,8 +183,8 @@ def accelerations(drive, t, motion):
 FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
 
 
-def seen(layout, x):
-    """The vehicle's Motion, whatever form its state has."""
+def seen(layout: RotorLayout, x: Any) -> Motion:
+    """The vehicle's Motion, whatever form its state has; in compiled code only."""
     raise NotImplementedError("compiled code only")
 
 
@@ -298,7 +300,7 @@ def observe(p, tick, interval, state, command):
     )
 
 
-def parameters(airframe: Airframe, effects: tuple = ()) -> MultirotorParameters:
+def parameters(airframe: "Airframe", effects: tuple = ()) -> MultirotorParameters:
     """The compiled plant's numbers for an airframe under effects (from `dynamics.effects.from_scene`)."""
     mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
     x_body, y_body, z_body = zip(*rotors.position, strict=True)

@@ -5,7 +5,7 @@ A form of `multirotor`'s state: each body has its own pose on SE(3), the arrow s
 follows here from the bodies themselves.
 """
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._rotors import total, total_wrench
@@ -19,8 +19,10 @@ from dynamics.multibody.delivery_drone import Drone
 from dynamics.multibody.five_bodies import NO_WRENCH, BodyState, FiveBodies, Machine, Rotor, Wrench
 from dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe
 from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation
 BECOMES = {  # what may become of a propeller: (spins, powered, held)
@@ -215,7 +217,7 @@ def joints(drive, t, x):
     )
 
 
-def drone_of(airframe: Airframe, drive: str = "torque") -> Drone:
+def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
     """The five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
 
     Raises:
@@ -231,7 +233,7 @@ def drone_of(airframe: Airframe, drive: str = "torque") -> Drone:
 
 
 def parameters(
-    airframe: Airframe, effects: tuple = (), drive: str = "torque", stabilisation: str = "projection"
+    airframe: "Airframe", effects: tuple = (), drive: str = "torque", stabilisation: str = "projection"
 ) -> MultirotorParameters:
     """The compiled plant's numbers, as `multirotor.parameters`.
 

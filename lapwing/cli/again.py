@@ -55,7 +55,7 @@ def replay(
 ) -> None:
     """Publish a log on Zenoh with its own timing, as the live run did."""
     from cosim.interrupt import Stop
-    from cosim.launcher import key_space
+    from cosim.key_space import key_space
     from services.replay.player import play
     from services.replay.schedule import Cut
 

@@ -40,7 +40,9 @@ def scenes(
 @app.command()
 def check(scene: SceneFile, set_: Overrides = None) -> None:
     """Validate a scene."""
-    from services.common.sections import Exchange, Run, Vehicle
+    from services.common.exchange import Exchange
+    from services.common.sections import Run
+    from services.common.vehicle import Vehicle
     from services.table import resolve
 
     with user_errors():

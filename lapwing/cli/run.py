@@ -54,7 +54,7 @@ def run(
     ] = None,
 ) -> None:
     """Fly a scene, record it, and report."""
-    from cosim.launcher import WATCHER
+    from cosim.watch import WATCHER
     from lapwing.runs.joined import check_endpoint, parse_external, parse_peers
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan

@@ -40,7 +40,7 @@ def service(
     plan: PlanFile = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
-    from cosim.launcher import check_space
+    from cosim.key_space import check_space
     from lapwing.runs.joined import parse_peers
     from services import processes
     from services.common.plan import OPERATED

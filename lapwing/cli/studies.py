@@ -1,18 +1,52 @@
 """The studies: performance, effects, accuracy, campaign, tune."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.errors import user_errors
 from lapwing.cli.files import check_distinct, check_plot, check_writable
-from lapwing.cli.options import (
-    Overrides,
-    SceneFile,
-)
+from lapwing.cli.options import Overrides, SceneFile
 from studies.tune.bandwidths import Bandwidths
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def _study(
+    name: str,
+    subject: Path,
+    json: Path | None,
+    plot: Path | None,
+    console: "Console",
+    find: Callable[[], Any],
+    module: ModuleType,
+) -> None:
+    """Refuse files that cannot be written, then study, show, and write what was asked for.
+
+    Args:
+        name: of the argument that says what is studied, for messages.
+        subject: its value.
+        json: file for the figures.
+        plot: file for the picture.
+        console: where it is shown.
+        find: the study.
+        module: has `show(console, found)`, `write_json(path, found)` and `plot(path, found)`.
+    """
+    check_distinct({name: subject, "--json": json, "--plot": plot})
+    check_writable(json)
+    check_plot(plot)
+    found = find()
+    module.show(console, found)
+    if json:
+        module.write_json(json, found)
+    if plot:
+        module.plot(plot, found)
 
 
 @app.command()
@@ -21,14 +55,12 @@ def performance(
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures as JSON")] = None,
 ) -> None:
     """Hover time, payload, range, ceiling, tilt and speed from the models, beside published figures."""
-    from studies.performance import card, show, write_json
+    from rich.console import Console
+
+    from studies import performance as study
 
     with user_errors():
-        check_writable(json)
-        figures = card(subject)
-        show(figures)
-        if json:
-            write_json(json, figures)
+        _study("SCENE|VEHICLE", subject, json, None, Console(), lambda: study.card(subject), study)
 
 
 @app.command()
@@ -44,21 +76,17 @@ def effects(
 
     from services.table import load
     from studies.effects import show
-    from studies.effects.study import study
+    from studies.effects.study import Study, study
 
     with user_errors():
         if not within > 0.0:
             raise ValueError(f"--within {within:g}: expected a distance above 0 m")
-        check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
-        check_writable(json)
-        check_plot(plot)
         console = Console()
-        found = study(load(scene, set_ or []), within, lambda text: console.print(text, highlight=False))
-        show.show(console, found)
-        if json:
-            show.write_json(json, found)
-        if plot:
-            show.plot(plot, found)
+
+        def find() -> Study:
+            return study(load(scene, set_ or []), within, lambda text: console.print(text, highlight=False))
+
+        _study("SCENE", scene, json, plot, console, find, show)
 
 
 @app.command()
@@ -75,9 +103,9 @@ def accuracy(
     with user_errors():
         from studies.accuracy import command
 
-        check_writable(json)
-        check_plot(plot)
-        command.run(target, set_ or [], goal, json, plot)
+        console = command.console()
+        find = partial(command.study, console, target, set_ or [], goal)
+        _study("TARGET", Path(target), json, plot, console, find, command)
 
 
 @app.command()
@@ -98,19 +126,15 @@ def campaign(
     with user_errors():
         if seeds < 1:
             raise ValueError(f"--seeds {seeds}: expected at least 1")
-        check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
-        check_writable(json)
-        check_plot(plot)
         console = Console()
-        loaded = load(scene, set_ or [])
-        with Progress(console=console, transient=True) as progress:
-            task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
-            found = study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
-        show.show(console, found)
-        if json:
-            show.write_json(json, found)
-        if plot:
-            show.plot(plot, found)
+
+        def fly() -> study.Campaign:
+            loaded = load(scene, set_ or [])
+            with Progress(console=console, transient=True) as progress:
+                task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
+                return study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
+
+        _study("SCENE", scene, json, plot, console, fly, show)
 
 
 @app.command()

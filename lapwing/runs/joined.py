@@ -6,9 +6,11 @@ from collections.abc import Iterable
 
 from cosim.bus import ZenohBus, mesh
 from cosim.interrupt import Stop
-from cosim.launcher import WATCHER, RunFailed, Watch, check_space
-from cosim.process import ALIVE_KEY
+from cosim.key_space import check_space
+from cosim.keys import ALIVE_KEY
+from cosim.launcher import RunFailed
 from cosim.setup import Setup
+from cosim.watch import WATCHER, Watch
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.runs.processes import Clock
 from services import processes

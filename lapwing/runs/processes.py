@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import IO
 
 from cosim.interrupt import Stop
-from cosim.launcher import Watch, key_space, launch
+from cosim.key_space import key_space
+from cosim.launcher import launch
 from cosim.setup import Setup
+from cosim.watch import Watch
 from lapwing.runs.compiling import NOTICE
 from lapwing.runs.observer import Elapsed, Observer
 from messages.topics import POSE, STATUS

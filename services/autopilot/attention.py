@@ -2,8 +2,9 @@
 
 from typing import Any, NamedTuple
 
+from cosim.part import Received
 from dynamics.kernel import leaf
-from services.autopilot.commander.attention import needs_attention
+from services.autopilot.commander.attention import BatteryThresholds, needs_attention
 
 LOOK_EVERY = 5  # ticks between two looks of the commander at the estimate
 
@@ -16,7 +17,7 @@ class Attention(NamedTuple):
 
 
 @leaf
-def attention_due(p, tick, health, battery, flight):
+def attention_due(p: Attention, tick: int, health: int, battery: Received, flight: Received) -> bool:
     """Whether the commander has a say at `tick`; battery and flight as they were received."""
     charge = battery.value.charge if battery.due else 1.0
     failed = flight.value.failed_motor if flight.due else 0
@@ -24,6 +25,6 @@ def attention_due(p, tick, health, battery, flight):
 
 
 @leaf
-def battery_warning(thresholds, charge):
+def battery_warning(thresholds: BatteryThresholds, charge: float) -> int:
     """0: none, 1: low, 2: critical, 3: nearly empty; an unknown charge (NaN) is none."""
     return int(charge < thresholds.low) + int(charge < thresholds.critical) + int(charge < thresholds.emergency)

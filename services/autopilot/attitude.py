@@ -3,18 +3,18 @@
 import math
 
 from dynamics.kernel import leaf
-from dynamics.lie.quaternion import conjugate, from_roll_pitch_yaw, log, multiply, rotate
-from dynamics.vector import subtract
+from dynamics.lie.quaternion import Quaternion, conjugate, from_roll_pitch_yaw, log, multiply, rotate
+from dynamics.vector import Vec3, subtract
 
 
 @leaf
-def wrap(angle):
+def wrap(angle: float) -> float:
     """The same angle in [-pi, pi] [rad]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
 
 
 @leaf
-def angle_rates(roll, pitch, omega_body):
+def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
     """Rates of roll, pitch and yaw [rad/s] from the body rates (theory.md, eq. (4.17)); pitch away from +-pi/2."""
     s, c = math.sin(roll), math.cos(roll)
     turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
@@ -22,7 +22,7 @@ def angle_rates(roll, pitch, omega_body):
 
 
 @leaf
-def body_rates(roll, pitch, rates):
+def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
     """Inverse of `angle_rates`: omega_body of the rates of roll, pitch and yaw."""
     s, c = math.sin(roll), math.cos(roll)
     turn = math.cos(pitch) * rates[2]
@@ -30,7 +30,7 @@ def body_rates(roll, pitch, rates):
 
 
 @leaf
-def error_by_angle(angles, angles_reference, rates_reference, omega_body):
+def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
     """Reference minus measured (roll, pitch, yaw) [rad], and its derivative [rad/s]: the cascade of the paper."""
     rates = angle_rates(angles[0], angles[1], omega_body)
     roll, pitch, yaw = subtract(angles_reference, angles)
@@ -38,7 +38,9 @@ def error_by_angle(angles, angles_reference, rates_reference, omega_body):
 
 
 @leaf
-def error_on_so3(attitude, angles_reference, rates_reference, omega_body):
+def error_on_so3(
+    attitude: Quaternion, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3
+) -> tuple[Vec3, Vec3]:
     """Rotation vector [rad] in body axes from the attitude to the reference, and its rate [rad/s].
 
     It has no preferred order of the angles and no singularity (theory.md, eq. (4.18)).

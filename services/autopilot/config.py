@@ -5,12 +5,12 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from cosim.scene import Files, Scene, Section
-from cosim.scene.files import laid_over
+from cosim.scene.files import laid_over, named
 from dynamics.errors import KeyedError
 from services.autopilot.gains import FOLDER, GainSet
-from services.common import parameters, user_code
+from services.common import modules, parameters, user_code
 from services.common.parameter_file import parse
-from services.common.sections import airframe, named
+from services.common.vehicle import airframe
 
 ESTIMATORS = ("sensors", "truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
@@ -46,7 +46,7 @@ class Autopilot(Section):
                 if code not in ESTIMATORS:
                     raise KeyedError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
             elif isinstance(code, str):
-                user_code.embed(tree, files, where, user_code.parted(where, code)[0])
+                modules.embed(tree, files, where, user_code.parted(where, code)[0])
         if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
             path = files.folder / file
             text = files.text("autopilot.parameters", "autopilot.parameters", path)

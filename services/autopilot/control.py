@@ -2,14 +2,15 @@
 (theory.md, section 4.2)."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import to_roll_pitch_yaw
 from dynamics.vector import ZERO, Vec3, subtract
 from services.autopilot.attitude import error_by_angle, error_on_so3
-from services.autopilot.interface import Command
-from services.autopilot.mixer import Demands, clamp, mix, saturate
+from services.autopilot.interface import Command, Estimate, Setpoint
+from services.autopilot.mixer import Demands, Signs, clamp, mix, saturate
 from services.autopilot.motor import Motor, voltage
 from services.autopilot.pid import Pid, integrate, output
 from services.autopilot.reference import AT_REST, Angle, Smoothing, advance
@@ -31,7 +32,7 @@ class Parameters(NamedTuple):
     gravity: float  # [m/s^2]
     torque_demands: Vec3  # (roll, pitch, yaw) demand of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
     geometric: bool  # attitude error on SO(3) instead of angle by angle
-    signs: tuple[Vec3, Vec3, Vec3, Vec3]  # (roll, pitch, yaw) share of every rotor, each +1 or -1
+    signs: Signs  # (roll, pitch, yaw) share of every rotor, each +1 or -1
     thrust_max: float  # [N] of a rotor
     motor: Motor
     resting_height: float  # world z of the vehicle's origin when it stands [m]
@@ -53,20 +54,22 @@ START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, Demands(0.0, 0.0, 0.0
 
 
 @leaf
-def sign(x):
+def sign(x: float) -> float:
     """-1.0, 0.0 or 1.0."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
 @leaf
-def to_heading(yaw, v_world):
+def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
     """Components along the heading and to its left of a vector in world axes (theory.md, eq. (4.11))."""
     s, c = math.sin(yaw), math.cos(yaw)
     return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
 
 
 @leaf
-def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
+def tilt_targets(
+    p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
+) -> tuple[float, float]:
     """Tilts [rad] towards the heading and to its left that the outer loops ask for (theory.md, eq. (4.12))."""
     x, y = to_heading(yaw, error)
     vx, vy = to_heading(yaw, error_rate)
@@ -79,7 +82,9 @@ def tilt_targets(p, yaw, integral, error, error_rate, acceleration_world):
 
 
 @leaf
-def collective_demand(p, integral, error, error_rate, acceleration, roll, pitch):
+def collective_demand(
+    p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
+) -> float:
     """Lift [N] of every rotor; with feed-forward, the weight and the tilt are made up for (theory.md, eq. (4.13))."""
     collective = output(p.altitude, integral, error, error_rate)
     if p.hover_demand > 0.0:
@@ -89,7 +94,7 @@ def collective_demand(p, integral, error, error_rate, acceleration, roll, pitch)
 
 
 @kernel
-def step(p, s, dt, estimate, setpoint):
+def step(p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpoint) -> tuple[State, Command]:
     """The command of one tick, and the state after it.
 
     Args:

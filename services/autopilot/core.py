@@ -2,12 +2,12 @@
 
 from typing import Any, NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from services.autopilot import control, interface, motor_failure
 from services.autopilot.attention import battery_warning
 from services.autopilot.stage import FLYING, ON_GROUND
-from services.common.ports import AutopilotStatus, MotorCommand, Reference
+from services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate
 
 ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
 NO_TRAJECTORY = "no_trajectory"  # stands for that of the trajectory where there is none; never written
@@ -55,7 +55,7 @@ START = ControllerState(control.START, motor_failure.START, 0, float("nan"))
 
 
 @leaf
-def setpoint_of(wanted):
+def setpoint_of(wanted: Reference) -> interface.Setpoint:
     """What the control law is asked for."""
     return interface.Setpoint(
         wanted.position_world, wanted.velocity_world, wanted.acceleration_world, wanted.yaw, wanted.yaw_rate
@@ -63,13 +63,23 @@ def setpoint_of(wanted):
 
 
 @leaf
-def estimate_of(e):
+def estimate_of(e: StateEstimate) -> interface.Estimate:
     """What the control law believes."""
     return interface.Estimate(e.position_world, e.attitude, e.velocity_world, e.omega_body)
 
 
 @leaf
-def outcome(p, watched, still_from, battery_charge, order, e, wanted, stage, c):
+def outcome(
+    p: Controller,
+    watched: motor_failure.State,
+    still_from: int,
+    battery_charge: float,
+    order: Order,
+    e: StateEstimate,
+    wanted: Reference,
+    stage: int,
+    c: interface.Command,
+) -> tuple[motor_failure.State, tuple[MotorCommand, Reference, AutopilotStatus, Flight]]:
     """The motor failure detection after a tick, and what the part gives: command, setpoint, status and flight.
 
     Args:
@@ -99,7 +109,9 @@ def outcome(p, watched, still_from, battery_charge, order, e, wanted, stage, c):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: Controller, s: ControllerState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[ControllerState, tuple, int]:
     """The command at `tick`."""
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     wanted = inputs[3].value if order.follow else order.reference

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from dynamics.vector import Vec3
 from services.autopilot.control import Parameters
 from services.autopilot.interface import Four
+from services.autopilot.mixer import Signs
 from services.autopilot.motor import Motor, thrust_at
 from services.autopilot.pid import Pid
 from services.autopilot.reference import Smoothing
@@ -87,7 +88,7 @@ def _mean_size(values: Four) -> float:
     return sum(abs(v) for v in values) / 4.0
 
 
-def _signs(airframe: Airframe) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+def _signs(airframe: Airframe) -> Signs:
     # Thrust at (x, y) turns the body by (y, -x) times the thrust: theory.md, eq. (4.20).
     a, b, c, d = (
         (math.copysign(1.0, y), -math.copysign(1.0, x), math.copysign(1.0, turn))

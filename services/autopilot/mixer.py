@@ -3,6 +3,10 @@
 from typing import NamedTuple
 
 from dynamics.kernel import leaf
+from dynamics.vector import Vec3
+from services.autopilot.interface import Four
+
+Signs = tuple[Vec3, Vec3, Vec3, Vec3]  # (roll, pitch, yaw) share of every rotor, each +1 or -1
 
 
 class Demands(NamedTuple):
@@ -15,7 +19,7 @@ class Demands(NamedTuple):
 
 
 @leaf
-def mix(signs, q):
+def mix(signs: Signs, q: Demands) -> Four:
     """The rotors' thrusts [N] of demands q without saturation; signs are (roll, pitch, yaw) of every rotor."""
     a, b, c, d = signs
     return (
@@ -27,13 +31,13 @@ def mix(signs, q):
 
 
 @leaf
-def clamp(x, low, high):
+def clamp(x: float, low: float, high: float) -> float:
     """The nearest value to x in [low, high]."""
     return min(max(x, low), high)
 
 
 @leaf
-def saturate(signs, q, thrust_max):
+def saturate(signs: Signs, q: Demands, thrust_max: float) -> Demands:
     """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
     Attitude comes first, then collective; yaw is given up first: it gets what room the others leave.

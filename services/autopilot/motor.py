@@ -18,14 +18,14 @@ class Motor(NamedTuple):
 
 
 @leaf
-def voltage(motor, thrust):
+def voltage(motor: Motor, thrust: float) -> float:
     """The voltage [V] that holds the speed of a thrust [N] >= 0."""
     propeller = math.sqrt(thrust / motor.thrust_coefficient)
     return RPM * propeller / (motor.gear_ratio * motor.speed_constant)
 
 
 @leaf
-def thrust_at(motor, volts):
+def thrust_at(motor: Motor, volts: float) -> float:
     """The steady thrust [N] at a voltage [V]; inverse of `voltage`."""
     propeller = motor.speed_constant * volts * motor.gear_ratio / RPM
     return motor.thrust_coefficient * propeller * propeller

@@ -55,19 +55,19 @@ def build(airframe: Airframe) -> Parameters:
 
 
 @leaf
-def _follow(share, root, asked):
+def _follow(share: float, root: float, asked: float) -> float:
     return root + share * (math.sqrt(asked) - root)
 
 
 @leaf
-def _arm(p, k, root):
+def _arm(p: Parameters, k: int, root: Four) -> tuple[float, float]:
     """Angular acceleration [rad/s^2] about x and y that rotor k should give."""
     thrust = max(root[k] * root[k], LEAST * p.hovering)
     return p.rotor_y[k] * thrust / p.inertia_body[0], -p.rotor_x[k] * thrust / p.inertia_body[1]
 
 
 @leaf
-def suspect(p, root, disturbance):
+def suspect(p: Parameters, root: Four, disturbance: tuple[float, float]) -> int:
     """Number of the rotor, from 1, whose lack of thrust explains the disturbance; 0 if none does."""
     x, y = disturbance
     found, most = 0, LOST
@@ -81,7 +81,7 @@ def suspect(p, root, disturbance):
 
 
 @leaf
-def step(p, s, dt, omega_body, height, asked):
+def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: Four) -> State:
     """The watch after a tick of dt [s].
 
     Args:

@@ -14,7 +14,7 @@ class Pid(NamedTuple):
 
 
 @leaf
-def integrate(gains, integral, error, cut, dt):
+def integrate(gains: Pid, integral: float, error: float, cut: float, dt: float) -> float:
     """The integral of the error [e s] after dt [s], held while it would push further into saturation.
 
     `cut` is the sign of the part of the last output that saturation cut off, 0 where nothing was cut.
@@ -23,6 +23,6 @@ def integrate(gains, integral, error, cut, dt):
 
 
 @leaf
-def output(gains, integral, error, error_rate):
+def output(gains: Pid, integral: float, error: float, error_rate: float) -> float:
     """P error + I integral + D error_rate [u]."""
     return gains.p * error + gains.i * integral + gains.d * error_rate

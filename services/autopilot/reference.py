@@ -30,7 +30,7 @@ AT_REST = Angle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @leaf
-def advance(p, s, target, dt):
+def advance(p: Smoothing, s: Angle, target: float, dt: float) -> Angle:
     """The state one tick of dt [s] on, towards `target` [rad]: dt times bandwidth must stay well below 1."""
     acceleration = p.bandwidth * (p.bandwidth * (target - s.demand) - 2.0 * p.damping * s.demand_rate)
     demand = s.demand + dt * (s.demand_rate + 0.5 * dt * acceleration)

@@ -18,18 +18,11 @@ from services.autopilot.law import Airframe
 from services.autopilot.motor import Motor
 from services.autopilot.setup import AutopilotSetup, CustomCode
 from services.common import parameters, ports
+from services.common.exchange import Exchange, Rates, ticks
+from services.common.modules import Modules
 from services.common.ports import AutopilotStatus, MotorCommand, Reference
-from services.common.sections import (
-    Effects,
-    Exchange,
-    Rates,
-    airframe,
-    follows_trajectory,
-    gravity,
-    start_height,
-    ticks,
-)
-from services.common.user_code import Modules
+from services.common.sections import follows_trajectory
+from services.common.vehicle import Effects, airframe, gravity, start_height
 
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR)
 

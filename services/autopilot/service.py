@@ -15,12 +15,10 @@ from services.autopilot.commanding import Commanding, Operator, controller
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
 from services.autopilot.custom.parts import controller_parts, estimator_parts
 from services.autopilot.estimate import before
-from services.autopilot.navigation.barometer import BarometerFusion
+from services.autopilot.navigation.correction import Correction
 from services.autopilot.navigation.estimate import FilterEstimate
 from services.autopilot.navigation.gps import GpsFusion
 from services.autopilot.navigation.inertial import STANDSTILL_EVERY, InertialNavigation
-from services.autopilot.navigation.magnetometer import MagnetometerFusion
-from services.autopilot.navigation.sonar import SonarFusion
 from services.autopilot.navigation.state import blank
 from services.autopilot.navigation.truth import TrueEstimate
 from services.autopilot.setup import AutopilotSetup
@@ -80,10 +78,10 @@ def _navigation(setup: Setup, given: AutopilotSetup, attention: Attention, estim
     inputs = (Input(ports.IMU), Input(ports.MAGNETOMETER), flight)
     parts = [Part(f"{NAME}.inertial", begin, state, inputs, (), given.imu_every)]
     for port, fusion in (
-        (ports.MAGNETOMETER, MagnetometerFusion(p)),
-        (ports.BAROMETER, BarometerFusion(p)),
+        (ports.MAGNETOMETER, Correction(p)),
+        (ports.BAROMETER, Correction(p)),
         (ports.GPS, GpsFusion(p, given.gps_age)),
-        (ports.SONAR, SonarFusion(p)),
+        (ports.SONAR, Correction(p)),
     ):
         if port in known:
             parts.append(Part(f"{NAME}.{port}", fusion, state, (Input(port),), (), known[port].period))

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from dynamics.kernel import leaf
+from services.autopilot.interface import Estimate, Setpoint
 
 ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
 CUT_HEIGHT = (
@@ -24,7 +25,7 @@ INITIAL_STAGE = Stage(ON_GROUND, 0.0)
 
 
 @leaf
-def advance_stage(stage, resting_height, estimate, setpoint, dt):
+def advance_stage(stage: Stage, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float) -> Stage:
     """The stage one tick of dt [s] on; `resting_height` is world z of the standing vehicle [m]."""
     height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
     asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]

@@ -8,7 +8,7 @@ from services.autopilot.gains import GainSet
 from services.autopilot.law import build
 from services.autopilot.margins import excess, open_loops
 from services.autopilot.resolve import known_airframe
-from services.common.sections import Exchange
+from services.common.exchange import Exchange
 
 MODELS = ("reduced", "multibody")  # of vehicles whose hover the margins are for
 

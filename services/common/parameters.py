@@ -6,10 +6,12 @@ defaults of the gains are those of the scene's gain set; `[autopilot.parameters]
 """
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cosim.scene import Scene
 from dynamics.errors import KeyedError
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from cosim.scene import Scene
 
 NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # what a failsafe does
 _ACTION = "0 a warning, 1 hold, 2 return, 3 land, 4 descend, which needs no position"
@@ -81,7 +83,7 @@ _TERMS = "PID"
 _UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # of P; the other loops': N/rad
 
 
-def table(scene: Scene) -> dict[str, Parameter]:
+def table(scene: "Scene") -> dict[str, Parameter]:
     """The parameters of a scene with an `[autopilot]`, by name; defaults are what the scene says.
 
     Raises:

@@ -1,67 +1,11 @@
-"""What a scene says of the user's own code: "module:Name", and the modules' texts."""
+"""The user's own code, as a scene names it: "module", or "module:Name"."""
 
 from collections.abc import Mapping
 from types import ModuleType
-from typing import Any, ClassVar
-
-from pydantic import ConfigDict
+from typing import Any
 
 from cosim import user_module
-from cosim.scene import Files, Section
 from dynamics.errors import KeyedError
-
-
-class Modules(Section):
-    """The texts of the user's own modules, by name: what the keys that name one resolve to."""
-
-    TABLE: ClassVar[str] = "modules"
-    OPTIONAL: ClassVar[bool] = True
-    FROM_FILE: ClassVar[bool] = True
-    model_config = ConfigDict(extra="allow", frozen=True)
-    __pydantic_extra__: dict[str, str]
-
-    @property
-    def texts(self) -> dict[str, str]:
-        """By name."""
-        return dict(self.__pydantic_extra__)
-
-
-def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
-    """Put the text of a module, and of those beside it that it imports, into the table `modules`.
-
-    Args:
-        tree: the scene's data, not yet validated.
-        files: of the scene.
-        key: dotted key that names the module.
-        module: its name.
-
-    Raises:
-        KeyedError: there is none, or it cannot be read.
-    """
-    for name, path in user_module.find(key, module, files.folder).items():
-        tree.setdefault(Modules.TABLE, {})[name] = files.text(f"{Modules.TABLE}.{name}", key, path)
-
-
-def embed_all(tree: dict[str, Any], files: Files, table: str) -> None:
-    """`embed` for each entry of a table of tables that has the key `module`."""
-    entries = tree.get(table, {})
-    for name, entry in entries.items() if isinstance(entries, dict) else ():
-        if isinstance(entry, dict) and isinstance(module := entry.get("module"), str):
-            embed(tree, files, f"{table}.{name}.module", module)
-
-
-def load_all(table: str, entries: Mapping[str, Any], texts: Mapping[str, str]) -> None:
-    """Import the modules of those entries of a table that have the key `module`.
-
-    Raises:
-        KeyedError: one cannot be imported.
-    """
-    for name, entry in entries.items():
-        if "module" in entry:
-            key = f"{table}.{name}.module"
-            if not isinstance(entry["module"], str):
-                raise KeyedError(key, f"got {entry['module']!r}", "the name of a module")
-            loaded(key, entry["module"], texts)
 
 
 def parted(key: str, text: str) -> tuple[str, str]:

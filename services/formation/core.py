@@ -1,8 +1,8 @@
 """The formation's control, compiled: every body's state in, thrusts and moments out."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.generate import each_index
 from dynamics.kernel import leaf
 from dynamics.vehicles.cooperative_control import formation_control
@@ -19,7 +19,7 @@ class FormationLaw(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: FormationLaw, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[RotorWrenches], int]:
     """The command of a tick; the load comes first among the bodies, the quadrotors next. It has no state."""
     b = inputs[0].value
     load, velocity = b.position_world[0], b.velocity_world[0]

@@ -2,11 +2,11 @@
 
 from dynamics.kernel import leaf
 from dynamics.lie.ts2 import Swing, normalise
-from dynamics.vector import cross, norm, scale, subtract
+from dynamics.vector import Vec3, cross, norm, scale, subtract
 
 
 @leaf
-def link(load, speed, positions, velocities, i):
+def link(load: Vec3, speed: Vec3, positions: tuple[Vec3, ...], velocities: tuple[Vec3, ...], i: int) -> Swing:
     """Link i as its ends show it: direction from quadrotor to load, and angular velocity."""
     d = subtract(load, positions[i])
     along = 1.0 / norm(d)

@@ -7,8 +7,9 @@ from dynamics.vector import ZERO, norm, scale
 from dynamics.vehicles.cooperative_control import FormationControl
 from dynamics.vehicles.cooperative_load import CooperativeLoadParameters
 from services.common import ports
+from services.common.exchange import Exchange
 from services.common.ports import RotorWrenches
-from services.common.sections import CooperativeLoad, Exchange
+from services.common.sections import CooperativeLoad
 from services.formation.config import Formation
 from services.formation.core import FormationLaw
 

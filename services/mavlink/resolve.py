@@ -2,8 +2,9 @@
 
 from cosim.scene import Scene
 from dynamics.effects import battery
+from services.common.exchange import Exchange
 from services.common.parameters import table
-from services.common.sections import Exchange, Vehicle, active, airframe, start_height
+from services.common.vehicle import Vehicle, active, airframe, start_height
 from services.mavlink.config import Mavlink
 from services.mavlink.vehicle import Battery, VehicleDescription
 

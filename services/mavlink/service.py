@@ -7,7 +7,8 @@ to what it shows at once; all else it reads from the services' batches, which wa
 from typing import Any
 
 from cosim.bundle import unpack_batch
-from cosim.process import BATCH_KEY, Process
+from cosim.keys import BATCH_KEY
+from cosim.process import Process
 from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS
 from services.common.operator import OPERATOR_KEY
 from services.mavlink.channel import read_key

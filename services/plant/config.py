@@ -7,7 +7,7 @@ from pydantic import Field, field_validator
 from cosim.scene import Scene, SceneError, Section, Source
 from dynamics import integrators
 from dynamics.errors import KeyedError
-from services.common.sections import Exchange
+from services.common.exchange import Exchange
 
 
 class Solver(Section):

@@ -4,7 +4,7 @@ import importlib
 
 from cosim.scene import Scene
 from cosim.setup import ServiceSetup
-from services.common.sections import Vehicle
+from services.common.vehicle import Vehicle
 from services.plant.cores.multirotor import MultirotorPlant
 from services.plant.models._common import noise_key
 

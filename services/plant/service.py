@@ -1,9 +1,10 @@
 """The plant as a service: it owns time, and integrates what the scene's `vehicle.model` names."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from numba.extending import overload
+from numba import types
 
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
@@ -11,12 +12,14 @@ from cosim.schedule import LockStepError
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks
+from dynamics.generate import implements
 from dynamics.integrators import not_finite
 from dynamics.kernel import kernel
 from dynamics.multibody.five_bodies import FiveBodies
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorState
+from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters, MultirotorState
 from services.common import ports
+from services.common.ports import PerRotor
 from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
 from services.plant.cores.multirotor import MultirotorPlantState
 from services.plant.setup import PlantEvent, PlantSetup
@@ -104,19 +107,19 @@ class Breakages:
 
 
 @kernel
-def lock(p, s, command):
+def lock(p: MultirotorParameters, s: MultirotorState, command: PerRotor) -> MultirotorState:
     """The state s with the constraints of parameters p met at once, under a command [V]."""
     memory = s.memory
     drive = MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, command)
     return MultirotorState(_struck(drive, s.motion), memory)
 
 
-def _struck(drive, x):
+def _struck(drive: MultirotorDrive, x: Any) -> Any:
     """The bodies after impulses in their hinges, in whichever coordinates they are."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(_struck)
-def _struck_of(drive, x):
+@implements(_struck)
+def _struck_of(drive: types.Type, x: types.Type) -> Callable:
     found = multirotor_multibody.struck if x.instance_class is FiveBodies else multirotor_euler.struck
     return lambda drive, x: found(drive, x)

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from cosim.bundle import unpack_batch
+from cosim.keys import BATCH_KEY
 from cosim.log import LogWriter
-from cosim.process import BATCH_KEY, Process, Stopped
+from cosim.process import Process, Stopped
 from cosim.provenance import attachments, metadata
 from cosim.recording import Recording
 from cosim.wire import Page

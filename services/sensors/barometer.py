@@ -7,11 +7,12 @@ from annotated_types import Ge, Gt, Lt
 
 from dynamics.geodesy import air_pressure
 from dynamics.kernel import kernel
-from dynamics.noise import TURN_ON, normal, normal3
+from dynamics.noise import TURN_ON, Key, normal, normal3
 from dynamics.vector import ZERO, Vec3
 from services.common.ports import BarometerReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
 
 CHANNELS = ("pressure",)
 
@@ -46,7 +47,7 @@ def blank() -> BarometerState:
 
 
 @kernel
-def initial(p, key, truth):
+def initial(p: Barometer, key: Key, truth: Truth) -> BarometerState:
     """State before the first sample."""
     draw = normal3(key, TURN_ON, 0)
     true = air_pressure(truth.home.height + truth.position_world[2], truth.temperature_celsius)
@@ -57,7 +58,9 @@ def initial(p, key, truth):
 
 
 @kernel
-def sample(p, s, key, tick, truth):
+def sample(
+    p: Barometer, s: BarometerState, key: Key, tick: int, truth: Truth
+) -> tuple[BarometerState, BarometerReading]:
     """Next state and reading; arguments as of `imu.sample`."""
     deviation = errors.walk_deviation(p.bias_instability_pa)
     walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))

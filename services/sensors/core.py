@@ -1,11 +1,13 @@
 """One instrument, compiled: the true state in, its reading out at its own rate."""
 
 import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
+from numba import types
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
+from dynamics.generate import implements
 from dynamics.geodesy import Home
 from dynamics.kernel import leaf
 from dynamics.noise import Key
@@ -30,30 +32,30 @@ class Instrument(NamedTuple):
     around: Surroundings
 
 
-def _sample(p, s, key, tick, truth):
+def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
     """`sample` of the sensor whose parameters `p` are."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(_sample, jit_options={"forceinline": True})
-def _sample_of(p, s, key, tick, truth):
+@implements(_sample, inline=True)
+def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Callable:
     found = sys.modules[p.instance_class.__module__].sample
     return lambda p, s, key, tick, truth: found(p, s, key, tick, truth)
 
 
-def _initial(p, key, truth):
+def _initial(p: Any, key: Key, truth: Truth) -> Any:
     """`initial` of the sensor whose parameters `p` are."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(_initial, jit_options={"forceinline": True})
-def _initial_of(p, key, truth):
+@implements(_initial, inline=True)
+def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Callable:
     found = sys.modules[p.instance_class.__module__].initial
     return lambda p, key, truth: found(p, key, truth)
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: Instrument, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
     """The reading at `tick`; the instrument is switched on at tick 0."""
     x, around = inputs[0].value, p.around
     truth = Truth(

@@ -6,11 +6,12 @@ from annotated_types import Ge, Gt, Lt
 
 from dynamics.geodesy import enu_to_geodetic
 from dynamics.kernel import kernel, leaf
-from dynamics.noise import TURN_ON, normal3
+from dynamics.noise import TURN_ON, Key, normal3
 from dynamics.vector import ZERO, Vec3, add, multiply
 from services.common.ports import GpsReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
 
 CHANNELS = ("position", "velocity")
 
@@ -43,13 +44,13 @@ def blank() -> GpsState:
 
 
 @leaf
-def _deviations(p):
+def _deviations(p: Gps) -> Vec3:
     """Standard deviations of the wander [m]."""
     return (p.wander_horizontal, p.wander_horizontal, p.wander_vertical)
 
 
 @kernel
-def initial(p, key, truth):
+def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
     """State before the first sample: the receiver has run at this place for as long as its latency."""
     wander = normal3(key, TURN_ON, 0)
     position = add(truth.position_world, multiply(_deviations(p), wander))
@@ -60,7 +61,7 @@ def initial(p, key, truth):
 
 
 @kernel
-def sample(p, s, key, tick, truth):
+def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsState, GpsReading]:
     """Next state and reading; arguments as of `imu.sample`."""
     w = _deviations(p)
     across = errors.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)

@@ -7,11 +7,12 @@ from annotated_types import Ge, Gt, Lt
 
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotate_back
-from dynamics.noise import TURN_ON, normal3
+from dynamics.noise import TURN_ON, Key, normal3
 from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
 from services.common.ports import ImuReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
 
 CHANNELS = ("gyro", "accelerometer")
 _DPS = math.radians(1.0)  # [rad/s] in one degree per second
@@ -97,7 +98,7 @@ def blank() -> ImuState:
 
 
 @leaf
-def _gyro_units(g):
+def _gyro_units(g: Gyro) -> _Units:
     return _Units(
         g.noise_dps_per_sqrt_hz * _DPS,
         g.bias_instability_deg_per_h * _DPS / 3600.0,
@@ -112,7 +113,7 @@ def _gyro_units(g):
 
 
 @leaf
-def _accelerometer_units(a):
+def _accelerometer_units(a: Accelerometer) -> _Units:
     return _Units(
         a.noise_mg_per_sqrt_hz * _MG,
         a.bias_instability_ug * 1e-3 * _MG,
@@ -127,13 +128,13 @@ def _accelerometer_units(a):
 
 
 @leaf
-def _true_values(truth):
+def _true_values(truth: Truth) -> tuple[Vec3, Vec3]:
     a = truth.acceleration_world
     return truth.omega_body, rotate_back(truth.attitude, (a[0], a[1], a[2] + truth.gravity))
 
 
 @kernel
-def _new_triad(u, key, lane, cold, value):
+def _new_triad(u: _Units, key: Key, lane: int, cold: float, value: Vec3) -> Triad:
     matrix = errors.scale_and_misalignment(
         u.scale_error, u.misalignment, normal3(key, TURN_ON, lane), normal3(key, TURN_ON, lane + 1)
     )
@@ -145,7 +146,7 @@ def _new_triad(u, key, lane, cold, value):
 
 
 @kernel
-def initial(p, key, truth):
+def initial(p: Imu, key: Key, truth: Truth) -> ImuState:
     """State before the first sample: what differs from unit to unit and from start to start is drawn here."""
     omega, force = _true_values(truth)
     return ImuState(
@@ -156,7 +157,9 @@ def initial(p, key, truth):
 
 
 @kernel
-def _measure(u, t, p, cold, channel, key, tick, value):
+def _measure(
+    u: _Units, t: Triad, p: Imu, cold: float, channel: int, key: Key, tick: int, value: Vec3
+) -> tuple[Triad, Vec3, bool]:
     """One triad's reading: theory.md, eq. (3.9)."""
     walk = errors.walk(
         t.walk, errors.walk_deviation(u.instability), u.bias_time, p.rate, normal3(key, tick, 2 * channel)
@@ -169,7 +172,7 @@ def _measure(u, t, p, cold, channel, key, tick, value):
 
 
 @kernel
-def sample(p, s, key, tick, truth):
+def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuState, ImuReading]:
     """Next state and reading.
 
     Args:

@@ -6,7 +6,7 @@ A faulty instrument still sends: a reading that is lost says so with `valid = Fa
 from typing import NamedTuple
 
 from dynamics.kernel import kernel, leaf
-from dynamics.noise import normal3, uniform
+from dynamics.noise import Key, normal3, uniform
 from dynamics.vector import ZERO, Vec3, add, multiply, scale
 
 DEPTH = 16  # samples that a line remembers
@@ -33,19 +33,21 @@ class Fault(NamedTuple):
 
 
 @leaf
-def new_line(value):
+def new_line(value: Vec3) -> Line:
     """A line that has carried only this value."""
     four = (value, value, value, value)
     return four + four + four + four  # DEPTH of them; compiled tuples have no `*`
 
 
 @leaf
-def _pushed(line, value):
+def _pushed(line: Line, value: Vec3) -> Line:
     return (value,) + line[:-1]  # noqa: RUF005 (compiled tuples have no unpacking)
 
 
 @kernel
-def carry(faults, line, latency, channel, key, tick, value):
+def carry(
+    faults: tuple[Fault, ...] | None, line: Line, latency: int, channel: int, key: Key, tick: int, value: Vec3
+) -> tuple[Line, Vec3, bool]:
     """Send one value of a channel down its line.
 
     Args:

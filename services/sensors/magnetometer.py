@@ -7,11 +7,12 @@ from annotated_types import Ge, Gt, Lt
 
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import rotate_back
-from dynamics.noise import TURN_ON, normal3
+from dynamics.noise import TURN_ON, Key, normal3
 from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
 from services.common.ports import MagnetometerReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
 
 CHANNELS = ("field",)
 _NANO = 1e-9
@@ -48,7 +49,7 @@ def blank() -> MagnetometerState:
 
 
 @kernel
-def initial(p, key, truth):
+def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
     """State before the first sample."""
     matrix = errors.scale_and_misalignment(
         p.scale_error, math.radians(p.misalignment_deg), normal3(key, TURN_ON, 0), normal3(key, TURN_ON, 1)
@@ -60,7 +61,9 @@ def initial(p, key, truth):
 
 
 @kernel
-def sample(p, s, key, tick, truth):
+def sample(
+    p: Magnetometer, s: MagnetometerState, key: Key, tick: int, truth: Truth
+) -> tuple[MagnetometerState, MagnetometerReading]:
     """Next state and reading; arguments as of `imu.sample`."""
     deviation = errors.walk_deviation(p.bias_instability_nt * _NANO)
     walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, normal3(key, tick, 0))

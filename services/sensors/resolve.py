@@ -13,7 +13,9 @@ from dynamics.errors import KeyedError
 from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from dynamics.noise import stream_key
 from services.common import ports
-from services.common.sections import Exchange, Run, Vehicle, gravity, ticks
+from services.common.exchange import Exchange, ticks
+from services.common.sections import Run
+from services.common.vehicle import Vehicle, gravity
 from services.sensors.config import Sensors
 from services.sensors.core import Instrument, Surroundings
 from services.sensors.registry import module_of, parameters

@@ -8,10 +8,11 @@ from annotated_types import Ge, Gt, Lt
 
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.noise import TURN_ON, normal
+from dynamics.noise import TURN_ON, Key, normal
 from services.common.ports import SonarReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
 
 CHANNELS = ("range",)
 
@@ -44,7 +45,7 @@ def blank() -> SonarState:
 
 
 @leaf
-def _distance(p, truth):
+def _distance(p: Sonar, truth: Truth) -> float:
     """Distance to level ground along the ray of the beam nearest to the vertical; +inf without an echo (eq. (3.16))."""
     cosine = rotation_matrix(truth.attitude)[8]
     tilt = math.acos(min(max(cosine, -1.0), 1.0))
@@ -54,13 +55,13 @@ def _distance(p, truth):
 
 
 @kernel
-def initial(p, key, truth):
+def initial(p: Sonar, key: Key, truth: Truth) -> SonarState:
     """State before the first sample."""
     return SonarState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((_distance(p, truth), 0.0, 0.0)))
 
 
 @kernel
-def sample(p, s, key, tick, truth):
+def sample(p: Sonar, s: SonarState, key: Key, tick: int, truth: Truth) -> tuple[SonarState, SonarReading]:
     """Next state and reading; arguments as of `imu.sample`."""
     noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     measured = (s.scale * _distance(p, truth) + noise, 0.0, 0.0)

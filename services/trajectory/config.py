@@ -18,7 +18,7 @@ A channel that a phase does not name holds. A channel may have a list of segment
 from typing import Any, ClassVar
 
 from cosim.scene import Files, Scene, Section
-from services.common.sections import named
+from cosim.scene.files import named
 from services.trajectory.mission import CHANNELS, compile
 from services.trajectory.phases import Phases
 from services.trajectory.table_file import parse

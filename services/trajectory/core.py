@@ -1,8 +1,8 @@
 """The trajectory, compiled: the reference at every tick."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from services.common.ports import Reference
 from services.trajectory import piece
@@ -17,7 +17,7 @@ class TrajectoryPath(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Reference], int]:
     """The reference at `tick`; it has no state."""
     r = piece.evaluate(p.path, tick * p.interval)
     return s, (

@@ -57,7 +57,7 @@ class Reference(NamedTuple):
 
 
 @leaf
-def last_not_after(times, t):
+def last_not_after(times: np.ndarray, t: float) -> int:
     """Index of the last entry of ascending `times` that is <= t, or 0."""
     low, high = 0, len(times)
     while high - low > 1:
@@ -70,7 +70,7 @@ def last_not_after(times, t):
 
 
 @leaf
-def channel_at(channel, t):
+def channel_at(channel: Channel, t: float) -> Vec3:
     """Value, first and second derivative of a channel at time t [s] (theory.md, eq. (4.1))."""
     k = last_not_after(channel.start, t)
     c = channel.coefficients[k]
@@ -89,7 +89,7 @@ def channel_at(channel, t):
 
 
 @kernel
-def evaluate(p, t):
+def evaluate(p: Parameters, t: float) -> Reference:
     """The reference at time t [s] of compiled parameters p; before 0 the one at 0, after the end the end, held."""
     t = max(t, 0.0)
     x, vx, ax = channel_at(p.x, t)

@@ -4,8 +4,10 @@ from cosim.scene import Scene
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup
 from services.common import ports
+from services.common.exchange import Exchange
 from services.common.ports import Reference
-from services.common.sections import Exchange, follows_trajectory, start_height
+from services.common.sections import follows_trajectory
+from services.common.vehicle import start_height
 from services.trajectory.config import Trajectory
 from services.trajectory.core import TrajectoryPath
 from services.trajectory.mission import compile

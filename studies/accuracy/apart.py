@@ -11,7 +11,8 @@ import numpy as np
 
 from cosim.scene import Scene
 from messages.topics import TRUTH
-from services.common.sections import Exchange, Rates, Run
+from services.common.exchange import Exchange, Rates
+from services.common.sections import Run
 from services.table import load
 from studies.accuracy.plant import longest_step
 from studies.flight import Flight

@@ -10,7 +10,9 @@ from cosim.scene import Scene, SceneError, Source
 from dynamics import integrators
 from dynamics.errors import KeyedError
 from dynamics.kernel import cache_folder, source_digest
-from services.common.sections import Effects, Exchange, Run, Vehicle
+from services.common.exchange import Exchange
+from services.common.sections import Run
+from services.common.vehicle import Effects, Vehicle
 from services.plant.config import Solver
 from studies.accuracy import scenes
 from studies.accuracy.measure import Point, cheapest, measure

@@ -1,29 +1,46 @@
-"""`lapwing accuracy`: measure, print, and write what was asked for."""
+"""`lapwing accuracy`: a target studied, and what was found shown, written and drawn."""
 
 import sys
 import threading
 from pathlib import Path
+from typing import NamedTuple
 
 from rich.console import Console
 
 from studies.accuracy import apart, scenes, table
 from studies.accuracy import plot as picture
-from studies.accuracy.measure import cheapest, check_target, measure
+from studies.accuracy.apart import Part
+from studies.accuracy.measure import Point, cheapest, check_target, measure
+from studies.accuracy.problem import Problem
 from studies.accuracy.targets import find, scene_of
 
 WIDTH = 120  # letters of a table that goes to no terminal
 SLOW = 3.0  # [s] after which the user is told why
 
 
-def run(target: str, overrides: list[str], goal: float | None, json: Path | None, plot: Path | None) -> None:
+class Study(NamedTuple):
+    """What was found of a target."""
+
+    target: str
+    problem: Problem
+    points: list[Point]
+    chosen: Point | None  # the cheapest that meets the goal
+    parts: list[Part]  # the three errors of a scene
+
+
+def console() -> Console:
+    """Where it is shown."""
+    return Console(width=None if sys.stdout.isatty() else WIDTH)
+
+
+def study(screen: Console, target: str, overrides: list[str], goal: float | None) -> Study:
     """Study one target.
 
     Args:
+        screen: where the user is told why it takes long.
         target: name of a problem, or a scene's file.
         overrides: "key=value" of the scene.
         goal: error whose cheapest choice is named, None for no such choice.
-        json: file for all points.
-        plot: file for the picture.
 
     Raises:
         ValueError: no such target, no sound goal, or a goal that no method meets.
@@ -31,20 +48,29 @@ def run(target: str, overrides: list[str], goal: float | None, json: Path | None
     check_target(goal)
     scene = scene_of(target, overrides)
     problem = scenes.problem(scene) if scene else find(target)
-    console = Console(width=None if sys.stdout.isatty() else WIDTH)
-    notice = threading.Timer(SLOW, console.print, ["measuring (the first time each method is compiled) ..."])
+    notice = threading.Timer(SLOW, screen.print, ["measuring (the first time each method is compiled) ..."])
     notice.daemon = True
     notice.start()
     try:
         points = measure(problem)
         chosen = None if goal is None else cheapest(points, goal)
-        parts = apart.errors(scene) if scene else []
+        return Study(target, problem, points, chosen, apart.errors(scene) if scene else [])
     finally:
         notice.cancel()
-    table.show(console, problem, points, chosen)
-    if parts:
-        table.show_parts(console, parts)
-    if json:
-        table.write_json(json, target, problem, points, chosen, parts)
-    if plot:
-        picture.draw(plot, problem.title, points, parts)
+
+
+def show(screen: Console, found: Study) -> None:
+    """Print the table, and that of the three errors of a scene."""
+    table.show(screen, found.problem, found.points, found.chosen)
+    if found.parts:
+        table.show_parts(screen, found.parts)
+
+
+def write_json(path: Path, found: Study) -> None:
+    """Write all points for other programs."""
+    table.write_json(path, found.target, found.problem, found.points, found.chosen, found.parts)
+
+
+def plot(path: Path, found: Study) -> None:
+    """Draw error over time."""
+    picture.draw(path, found.problem.title, found.points, found.parts)

@@ -16,7 +16,9 @@ from dynamics.noise import Key, stream_key
 from dynamics.tree import flatten
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
-from services.common.sections import Exchange, Run, Vehicle
+from services.common.exchange import Exchange
+from services.common.sections import Run
+from services.common.vehicle import Vehicle
 from services.plant import models
 from studies.accuracy.coordinates import coordinates, defect
 from studies.accuracy.integrate import SAMPLES, applicable

@@ -8,7 +8,9 @@ from cosim.scene import Scene
 from dynamics.integrators import get
 from dynamics.tree import flatten
 from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
-from services.common.sections import Exchange, Run, Vehicle
+from services.common.exchange import Exchange
+from services.common.sections import Run
+from services.common.vehicle import Vehicle
 from studies.accuracy import plant
 from studies.accuracy.coordinates import coordinates
 from studies.accuracy.integrate import SAMPLES, fixed_ways, sampled

@@ -4,7 +4,8 @@ from cosim.scene import Scene
 from cosim.setup import Setup
 from messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, TRUTH
 from services.autopilot.config import Autopilot
-from services.common.sections import Exchange, Rates, follows_trajectory
+from services.common.exchange import Exchange, Rates
+from services.common.sections import follows_trajectory
 from services.table import resolve
 
 TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, STATUS)

@@ -12,7 +12,7 @@ from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.kernel import kernel
 from dynamics.noise import Key, stream_key
 from dynamics.vehicles import multirotor
-from services.common.sections import active, airframe, start_height
+from services.common.vehicle import active, airframe, start_height
 from services.plant.config import method
 from studies.effects.variants import Tables, variant
 

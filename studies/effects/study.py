@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from cosim.scene import Scene
 from dynamics import effects
 from services.autopilot.config import Autopilot
-from services.common.sections import Effects, Vehicle
+from services.common.vehicle import Effects, Vehicle
 from studies.effects.cost import costs
 from studies.effects.influence import Influence, influence
 from studies.effects.variants import Hangar, Tables, hangar, refusal

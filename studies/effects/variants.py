@@ -10,7 +10,7 @@ from typing import Any
 from cosim.scene import Scene
 from dynamics import effects
 from messages.topics import TRUTH
-from services.common.sections import Effects, airframe
+from services.common.vehicle import Effects, airframe
 from studies.flight import Flight
 from studies.fly import fly
 

@@ -11,7 +11,7 @@ from dynamics import effects
 from dynamics.vehicles import multirotor
 from services.autopilot.gains import GainSet
 from services.common.parameters import of_gains
-from services.common.sections import Effects, airframe, start_pose
+from services.common.vehicle import Effects, airframe, start_pose
 from studies.campaign.figures import Figures, figures
 from studies.campaign.setup import TOPICS
 from studies.fly import fly

@@ -10,7 +10,7 @@ from cosim.scene import Scene
 from dynamics import effects
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, from_roll_pitch_yaw
 from dynamics.vehicles.multirotor import initial_state, observe, parameters
-from services.common.sections import Effects, airframe
+from services.common.vehicle import Effects, airframe
 
 HEIGHT = 50.0  # [m] clear of the ground and of its effect
 INTERVAL = 0.004  # [s] only scales the tick number, which is 0

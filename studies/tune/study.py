@@ -11,7 +11,9 @@ from services.autopilot.gains import GainSet
 from services.autopilot.law import Airframe, build
 from services.autopilot.margins import Margins, margins, open_loops
 from services.autopilot.resolve import known_airframe
-from services.common.sections import Exchange, Vehicle, follows_trajectory
+from services.common.exchange import Exchange
+from services.common.sections import follows_trajectory
+from services.common.vehicle import Vehicle
 from studies.campaign.figures import Figures
 from studies.campaign.setup import campaign_setup
 from studies.flight import Flight

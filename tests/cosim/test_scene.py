@@ -10,8 +10,10 @@ import pytest
 from cosim.scene import Scene, SceneError
 from cosim.serialise import from_json, to_json
 from services.autopilot.gains import GainSet
+from services.common.exchange import Exchange
 from services.common.parameters import table
-from services.common.sections import Exchange, Run, Vehicle, airframe, gravity, start_height
+from services.common.sections import Run
+from services.common.vehicle import Vehicle, airframe, gravity, start_height
 from services.table import from_resolved, load, vocabulary
 from services.trajectory.config import Trajectory
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.launcher import key_space
+from cosim.key_space import key_space
 from dynamics.kernel import kernel
 from lapwing.runs import single
 from lapwing.runs.compiling import NOTICE, told

@@ -2,17 +2,20 @@
 allocation, motor model, motor failure detection and status as of the cascaded PID."""
 
 import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
+from numba import types
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
+from dynamics.generate import implements
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
 from services.autopilot import motor_failure
 from services.autopilot.core import Controller, estimate_of, outcome, setpoint_of
 from services.autopilot.custom.demand import Demand, command, demand
 from services.autopilot.stage import FLYING, INITIAL_STAGE, Stage, advance_stage
+from services.common.ports import Reference, StateEstimate
 
 OFF = Demand()
 
@@ -50,26 +53,33 @@ def start(p: CustomController) -> CustomState:
     return CustomState(INITIAL_STAGE, p.own_start, OFF, motor_failure.START, 0, float("nan"))
 
 
-def _ask(p, s, time, estimate, setpoint, by_port):
+def _ask(
+    p: Any, s: Any, time: float, estimate: StateEstimate, setpoint: Reference, by_port: tuple[Received, ...]
+) -> tuple[Any, Demand]:
     """`step` of the user's module; or what has come by the port."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(_ask, jit_options={"forceinline": True})
-def _ask_of(p, s, time, estimate, setpoint, by_port):
+@leaf
+def _demanded(given: tuple) -> tuple[Any, Demand]:
+    """State and output of the user's step, the output as a demand."""
+    return given[0], demand(given[1])
+
+
+@implements(_ask, inline=True)
+def _ask_of(
+    p: types.Type, s: types.Type, time: types.Type, estimate: types.Type, setpoint: types.Type, by_port: types.Type
+) -> Callable:
     if p.instance_class is FromPort:
         return lambda p, s, time, estimate, setpoint, by_port: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
-
-    def ask(p, s, time, estimate, setpoint, by_port):
-        s, output = found(p, s, time, estimate, setpoint)
-        return s, demand(output)
-
-    return ask
+    return lambda p, s, time, estimate, setpoint, by_port: _demanded(found(p, s, time, estimate, setpoint))
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: CustomController, s: CustomState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[CustomState, tuple, int]:
     """The command at `tick`."""
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]

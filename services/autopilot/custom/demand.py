@@ -1,10 +1,14 @@
 """What a controller of the user's asks for, and its way to the motors."""
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
-from numba.extending import overload
+from numba import types
 
+from dynamics.generate import define, implements
 from dynamics.kernel import leaf
+from dynamics.vector import Vec3
+from services.autopilot import control
 from services.autopilot.interface import Command
 from services.autopilot.mixer import Demands, clamp, mix, saturate
 from services.autopilot.motor import thrust_at, voltage
@@ -22,7 +26,7 @@ class Demand(NamedTuple):
     roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] that the controller steers to
 
 
-def demand(output):
+def demand(output: Any) -> Demand:
     """The demand of a `MotorVoltages` or `ThrustAndMoments`; TypeError of anything else."""
     if isinstance(output, MotorVoltages):
         a, b, c, d = map(float, output.volts)
@@ -33,27 +37,23 @@ def demand(output):
     raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
 
 
-def _two(roll_pitch):
+def _two(roll_pitch: Iterable[float]) -> tuple[float, float]:
     roll, pitch = map(float, roll_pitch)
     return roll, pitch
 
 
-@overload(demand, jit_options={"forceinline": True})
-def _demand(output):
+@implements(demand, inline=True)
+def _demand(output: types.Type) -> Callable:
     told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
-    motors = output.instance_class is MotorVoltages
-
-    def made(output):
-        roll_pitch = output[-1] if told else (0.0, 0.0)
-        if motors:
-            return Demand(True, output[0], roll_pitch)
-        return Demand(False, (output[0], output[1][0], output[1][1], output[1][2]), roll_pitch)
-
-    return made
+    roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
+    if output.instance_class is MotorVoltages:
+        return define("demand(output)", {"Demand": Demand}, f"return Demand(True, output[0], {roll_pitch})")
+    numbers = "(output[0], output[1][0], output[1][1], output[1][2])"
+    return define("demand(output)", {"Demand": Demand}, f"return Demand(False, {numbers}, {roll_pitch})")
 
 
 @leaf
-def command(law, arms, voltage_max, asked, yaw, stage):
+def command(law: control.Parameters, arms: Vec3, voltage_max: float, asked: Demand, yaw: float, stage: int) -> Command:
     """The motors' command.
 
     Args:

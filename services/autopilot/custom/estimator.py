@@ -4,7 +4,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from cosim.part import GO_ON, LOOK
+from cosim.part import GO_ON, LOOK, Received
 from cosim.schedule import KEPT, Input, LockStepError, Port
 from cosim.user_module import blame
 from dynamics.kernel import leaf
@@ -51,7 +51,7 @@ class HeldEstimate(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The estimate that holds at `tick`; it has no state of its own."""
     held, battery, flight = inputs
     due = attention_due(p.attention, tick, held.value.health, battery, flight)

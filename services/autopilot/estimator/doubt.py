@@ -4,7 +4,10 @@ A reading is refused because it contradicts the estimate; when that lasts, the e
 widens the covariance of what the source speaks about, until its readings are taken again.
 """
 
+import numpy as np
+
 from dynamics.kernel import kernel, leaf
+from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import (
     ACCELEROMETER,
     BARO,
@@ -18,6 +21,7 @@ from services.autopilot.estimator.state import (
     POSITION,
     THETA,
     VELOCITY,
+    Memory,
 )
 
 _MOTION = 0.3  # [s] position and velocity refused together for so long: the inertial unit is doubted
@@ -26,13 +30,13 @@ _LONG = 10.0  # [s] any other source
 
 
 @leaf
-def _widen(c, start, deviation):
+def _widen(c: np.ndarray, start: int, deviation: float) -> None:
     for i in range(start, start + 3):
         c[i, i] += deviation * deviation
 
 
 @kernel
-def doubt(p, m, source):
+def doubt(p: Estimator, m: Memory, source: int) -> None:
     """Widen the covariance after a reading of `source` was refused by the gate."""
     c = m.covariance
     for_long = m.since[source] * p.interval > _LONG

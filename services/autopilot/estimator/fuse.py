@@ -5,20 +5,20 @@ the rows of one reading are all taken about the same estimate.
 """
 
 from dynamics.kernel import kernel, leaf
-from dynamics.vector import Vec3
-from services.autopilot.estimator.state import ACCELEROMETER, POSITION, SIZE, THETA, VELOCITY, WANDER
+from dynamics.vector import Mat3, Vec3
+from services.autopilot.estimator.state import ACCELEROMETER, POSITION, SIZE, THETA, VELOCITY, WANDER, Memory
 
 _FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
 
 
 @leaf
-def clear(m):
+def clear(m: Memory) -> None:
     """Empty the row."""
     m.row[:] = 0.0
 
 
 @kernel
-def innovation_variance(m, variance):
+def innovation_variance(m: Memory, variance: float) -> float:
     """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
     m.product[:] = 0.0
     for j in range(SIZE):
@@ -33,7 +33,7 @@ def innovation_variance(m, variance):
 
 
 @kernel
-def fuse(m, innovation, variance):
+def fuse(m: Memory, innovation: float, variance: float) -> float:
     """Take in the row's measurement; returns its normalised innovation squared."""
     s = innovation_variance(m, variance)
     y = innovation
@@ -48,7 +48,7 @@ def fuse(m, innovation, variance):
 
 
 @kernel
-def acceleration_row(m, force_world, r, axis, k):
+def acceleration_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, k: float) -> None:
     """Add k times the row of the acceleration's error: theta x f - R b (theory.md, eq. (3.22))."""
     x, y, z = force_world
     if axis == 0:
@@ -63,7 +63,7 @@ def acceleration_row(m, force_world, r, axis, k):
 
 
 @leaf
-def late_position_row(m, force_world, r, axis, delay):
+def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30))."""
     clear(m)
     m.row[POSITION + axis] = 1.0
@@ -73,7 +73,7 @@ def late_position_row(m, force_world, r, axis, delay):
 
 
 @leaf
-def late_velocity_row(m, force_world, r, axis, delay):
+def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Row of the velocity `delay` seconds ago."""
     clear(m)
     m.row[VELOCITY + axis] = 1.0

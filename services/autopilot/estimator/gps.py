@@ -3,15 +3,16 @@
 from dynamics.geodesy import geodetic_to_enu
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.vector import ZERO, add, scale, subtract
+from dynamics.vector import ZERO, Vec3, add, scale, subtract
 from services.autopilot.estimator.doubt import doubt
 from services.autopilot.estimator.fuse import fuse, innovation_variance, late_position_row, late_velocity_row
-from services.autopilot.estimator.state import GPS, GPS_VELOCITY, HISTORY, corrected
+from services.autopilot.estimator.parameters import Estimator
+from services.autopilot.estimator.state import GPS, GPS_VELOCITY, HISTORY, State, corrected
 from services.autopilot.estimator.watch import judge, repeated
 
 
 @leaf
-def _past(p, s, age):
+def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float]:
     """Position and velocity `age` ticks ago, from the estimate now and the IMU readings since."""
     i, m = s.inertial, s.memory
     age = min(age, i.tick, HISTORY - 1)
@@ -27,12 +28,21 @@ def _past(p, s, age):
 
 
 @leaf
-def _wander_variance(p, axis):
+def _wander_variance(p: Estimator, axis: int) -> float:
     return (p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal) ** 2
 
 
 @kernel
-def update_gps(p, s, latitude_deg, longitude_deg, height, variance, age, valid):
+def update_gps(
+    p: Estimator,
+    s: State,
+    latitude_deg: float,
+    longitude_deg: float,
+    height: float,
+    variance: Vec3,
+    age: int,
+    valid: bool,
+) -> State:
     """State after a position fix.
 
     Args:
@@ -74,7 +84,7 @@ def update_gps(p, s, latitude_deg, longitude_deg, height, variance, age, valid):
 
 
 @kernel
-def update_gps_velocity(p, s, velocity_world, variance, age, valid):
+def update_gps_velocity(p: Estimator, s: State, velocity_world: Vec3, variance: float, age: int, valid: bool) -> State:
     """State after a velocity fix.
 
     Args:

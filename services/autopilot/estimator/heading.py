@@ -4,15 +4,16 @@ import math
 
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.vector import ZERO, apply, subtract
+from dynamics.vector import ZERO, Vec3, apply, subtract
 from services.autopilot.estimator.doubt import doubt
 from services.autopilot.estimator.fuse import clear, fuse, innovation_variance
-from services.autopilot.estimator.state import HEADING, IRON, MAG, THETA, corrected
+from services.autopilot.estimator.parameters import Estimator
+from services.autopilot.estimator.state import HEADING, IRON, MAG, THETA, State, corrected
 from services.autopilot.estimator.watch import judge, repeated
 
 
 @kernel
-def update_magnetometer(p, s, field_body, variance, valid):
+def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: float, valid: bool) -> State:
     """State after a reading of the magnetic field; only its direction in the horizontal plane is used.
 
     Args:

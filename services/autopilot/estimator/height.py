@@ -8,12 +8,13 @@ from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import ZERO
 from services.autopilot.estimator.doubt import doubt
 from services.autopilot.estimator.fuse import clear, fuse, innovation_variance
-from services.autopilot.estimator.state import BARO, BAROMETER, POSITION, SCALE, SONAR, corrected
+from services.autopilot.estimator.parameters import Estimator
+from services.autopilot.estimator.state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
 from services.autopilot.estimator.watch import judge, repeated
 
 
 @kernel
-def _scalar(p, s, source, innovation, variance):
+def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: float) -> State:
     """Gate and take in the row."""
     m = s.memory
     nis = innovation**2 / innovation_variance(m, variance)
@@ -27,7 +28,7 @@ def _scalar(p, s, source, innovation, variance):
 
 
 @kernel
-def update_barometer(p, s, pressure, variance, valid):
+def update_barometer(p: Estimator, s: State, pressure: float, variance: float, valid: bool) -> State:
     """State after a pressure reading.
 
     Args:
@@ -51,7 +52,7 @@ def update_barometer(p, s, pressure, variance, valid):
 
 
 @kernel
-def update_sonar(p, s, distance, variance, valid):
+def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid: bool) -> State:
     """State after an echo.
 
     Args:

@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
+
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
-from dynamics.vector import add, apply, norm, scale, subtract
+from dynamics.vector import Mat3, Vec3, add, apply, norm, scale, subtract
+from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import (
     ACCELEROMETER,
     BAROMETER,
@@ -28,7 +31,7 @@ _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 
 
 @leaf
-def _transform_rows(c, f, r, dt):
+def _transform_rows(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
     """c <- F c, with F = I + A dt: row blocks in an order in which none is overwritten before it is read."""
     for j in range(SIZE):
         for i in range(3):
@@ -45,7 +48,7 @@ def _transform_rows(c, f, r, dt):
 
 
 @leaf
-def _propagate_covariance(c, f, r, dt):
+def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
     """c <- F c F^T."""
     _transform_rows(c, f, r, dt)
     _transform_rows(c.T, f, r, dt)
@@ -55,7 +58,7 @@ def _propagate_covariance(c, f, r, dt):
 
 
 @leaf
-def _fade(c, keep):
+def _fade(c: np.ndarray, keep: float) -> None:
     """First-order decay of the receiver's wander."""
     for i in range(WANDER, WANDER + 3):
         for j in range(SIZE):
@@ -64,7 +67,7 @@ def _fade(c, keep):
 
 
 @leaf
-def _held(p, i, omega, force):
+def _held(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
     """Whether a reading is a spike: it jumps away from a reading that was itself trusted."""
     return not i.held and (
         norm(subtract(omega, i.omega)) > p.jolt_rate or norm(subtract(force, i.force)) > p.jolt_force
@@ -72,7 +75,15 @@ def _held(p, i, omega, force):
 
 
 @kernel
-def predict(p, s, omega_body, specific_force_body, omega_variance, specific_force_variance, valid):
+def predict(
+    p: Estimator,
+    s: State,
+    omega_body: Vec3,
+    specific_force_body: Vec3,
+    omega_variance: float,
+    specific_force_variance: float,
+    valid: bool,
+) -> State:
     """State one interval later.
 
     Args:

@@ -3,7 +3,8 @@
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import rotation_matrix
 from services.autopilot.estimator.fuse import acceleration_row, clear, fuse
-from services.autopilot.estimator.state import GYRO, VELOCITY, corrected
+from services.autopilot.estimator.parameters import Estimator
+from services.autopilot.estimator.state import GYRO, VELOCITY, State, corrected
 
 _VELOCITY_VARIANCE = 0.01**2  # [(m/s)^2] the feet may give a little
 _OMEGA_VARIANCE = 1e-3**2  # [(rad/s)^2]
@@ -11,7 +12,7 @@ _ACCELERATION_VARIANCE = 0.02**2  # [(m/s^2)^2]
 
 
 @kernel
-def update_standstill(p, s, omega_variance, specific_force_variance):
+def update_standstill(p: Estimator, s: State, omega_variance: float, specific_force_variance: float) -> State:
     """State after a look at a vehicle that does not move: no velocity, no rate, no acceleration.
 
     Args:

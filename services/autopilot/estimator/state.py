@@ -12,6 +12,7 @@ import numpy as np
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
 from dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
+from services.autopilot.estimator.parameters import Estimator
 from services.common.ports import StateEstimate
 
 SIZE = 24
@@ -76,7 +77,7 @@ class State(NamedTuple):
 
 
 @leaf
-def level(p, specific_force_body, field_body):
+def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
     """Attitude at rest from gravity and the magnetic field (theory.md, eq. (3.20))."""
     up = scale(1.0 / norm(specific_force_body), specific_force_body)
     across = subtract(field_body, scale(dot(field_body, up), up))
@@ -90,7 +91,7 @@ def level(p, specific_force_body, field_body):
 
 
 @kernel
-def initial(p, position_world, specific_force_body, field_body):
+def initial(p: Estimator, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
     """State of a vehicle that stands still.
 
     Args:
@@ -132,13 +133,13 @@ def initial(p, position_world, specific_force_body, field_body):
 
 
 @leaf
-def three(array, start):
+def three(array: np.ndarray, start: int) -> Vec3:
     """Three neighbouring elements of an array as a vector."""
     return (array[start], array[start + 1], array[start + 2])
 
 
 @kernel
-def corrected(s):
+def corrected(s: State) -> State:
     """The state with the gathered correction added to the estimate (theory.md, eq. (3.25))."""
     n, d = s.nominal, s.memory.correction
     nominal = Nominal(
@@ -158,7 +159,7 @@ def corrected(s):
 
 
 @leaf
-def _deviations(covariance, start):
+def _deviations(covariance: np.ndarray, start: int) -> Vec3:
     return (
         math.sqrt(covariance[start, start]),
         math.sqrt(covariance[start + 1, start + 1]),
@@ -167,7 +168,7 @@ def _deviations(covariance, start):
 
 
 @leaf
-def _deviation_along(covariance, axis_world):
+def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
     """Standard deviation of the attitude error about an axis."""
     total = 0.0
     for i in range(3):
@@ -177,7 +178,7 @@ def _deviation_along(covariance, axis_world):
 
 
 @leaf
-def _health(p, m, position_std, attitude_std):
+def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> tuple[int, int]:
     health = 0
     rejected = 0
     for i in range(len(SOURCES)):
@@ -193,7 +194,7 @@ def _health(p, m, position_std, attitude_std):
 
 
 @kernel
-def estimate(p, s):
+def estimate(p: Estimator, s: State) -> StateEstimate:
     """`StateEstimate` now."""
     n, i, c = s.nominal, s.inertial, s.memory.covariance
     r = rotation_matrix(n.attitude)

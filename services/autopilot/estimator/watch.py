@@ -1,10 +1,12 @@
 """Watching the sources: readings that repeat, readings that are refused."""
 
 from dynamics.kernel import kernel
+from dynamics.vector import Vec3
+from services.autopilot.estimator.state import Memory
 
 
 @kernel
-def repeated(m, source, first, second, noisy, often):
+def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
     """Whether a noisy instrument has repeated the same numbers `often` times in a row: it is frozen.
 
     Args:
@@ -25,7 +27,7 @@ def repeated(m, source, first, second, noisy, often):
 
 
 @kernel
-def judge(m, source, accepted, nis):
+def judge(m: Memory, source: int, accepted: bool, nis: float) -> None:
     """Keep the books on a reading that came."""
     m.refused[source] = 0 if accepted else 1
     m.nis[source] = nis

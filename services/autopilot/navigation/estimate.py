@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
-from cosim.part import GO_ON, LOOK
+from cosim.part import GO_ON, LOOK, Received
 from dynamics.kernel import leaf
 from services.autopilot import estimator
 from services.autopilot.attention import Attention, attention_due
 from services.autopilot.estimator import Estimator
+from services.autopilot.navigation.state import NavigationState
 from services.common.ports import StateEstimate
 
 
@@ -19,7 +20,9 @@ class FilterEstimate(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: FilterEstimate, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[StateEstimate], int]:
     """What the filter says at `tick`."""
     battery, flight = inputs
     e = estimator.estimate(p.filter, s.filter) if s.begun else p.before

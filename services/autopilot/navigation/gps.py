@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from services.autopilot import estimator
 from services.autopilot.estimator import Estimator
@@ -17,7 +17,9 @@ class GpsFusion(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
     """Correct by the reading of the tick."""
     r, x = inputs[0].value, s.filter
     if s.begun:

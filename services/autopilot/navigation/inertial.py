@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3, norm
 from services.autopilot import estimator
@@ -24,7 +24,9 @@ class InertialNavigation(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
     """Begin once the vehicle is level and the compass has been read; then predict to `tick`."""
     imu, magnetometer, flight = inputs
     r, begun, x = imu.value, s.begun, s.filter

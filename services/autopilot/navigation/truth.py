@@ -1,8 +1,8 @@
 """The truth as an estimate without error and without bias."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from cosim.part import GO_ON, LOOK
+from cosim.part import GO_ON, LOOK, Received
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
 from services.autopilot.attention import Attention, attention_due
@@ -16,7 +16,7 @@ class TrueEstimate(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The true state at `tick`; it has no state of its own."""
     truth, battery, flight = inputs
     x = truth.value

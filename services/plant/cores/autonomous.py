@@ -1,9 +1,12 @@
 """A plant that nobody commands: a system of dynamics/vehicles that any integrator marches from tick to tick."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
+from numba import types
 
+from cosim.part import Received
+from dynamics.generate import implements
 from dynamics.integrators import march
 from dynamics.kernel import ByClass, leaf
 from dynamics.tree import finite
@@ -21,7 +24,7 @@ class AutonomousPlant(NamedTuple):
     last: int  # tick of the run
 
 
-def told(p, t, x):
+def told(p: Any, t: float, x: Any) -> tuple:
     """What is told of the state x at time t [s]: a tuple of port values, chosen by the class of the parameters p."""
     raise NotImplementedError("compiled code only")
 
@@ -30,14 +33,14 @@ TOLD = ByClass()
 """The compiled function of `told` by the class of a system's parameters."""
 
 
-@overload(told, jit_options={"forceinline": True})
-def _told(p, t, x):
+@implements(told, inline=True)
+def _told(p: types.Type, t: types.Type, x: types.Type) -> Callable:
     found = TOLD[p.instance_class]
     return lambda p, t, x: found(p, t, x)
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
     """March to `tick`; at tick 0 leave the system where it is."""
     x = s
     if tick > 0:

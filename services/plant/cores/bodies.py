@@ -1,11 +1,13 @@
 """The single bodies of a multirotor of five, with the forces in their hinges."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from numba.extending import overload
+from numba import types
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.effects import _hooks as hooks
+from dynamics.generate import implements
 from dynamics.kernel import leaf
 from dynamics.multibody.five_bodies import FiveBodies
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
@@ -21,20 +23,20 @@ class FiveBodiesView(NamedTuple):
     off: PerRotor  # [V] before the first command
 
 
-def on_se3(x):
+def on_se3(x: Any) -> FiveBodies:
     """The bodies' poses, in whichever coordinates they are."""
     raise NotImplementedError("compiled code only")
 
 
-@overload(on_se3)
-def _on_se3(x):
+@implements(on_se3)
+def _on_se3(x: types.Type) -> Callable:
     if x.instance_class is FiveBodies:
         return lambda x: x
     return lambda x: multirotor_euler.five(x)
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[BodyMotions], int]:
     """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
     actuators = inputs[0]
     command = actuators.value.motor_voltage if actuators.due else p.off

@@ -2,14 +2,16 @@
 
 from typing import Any, NamedTuple
 
+from cosim.part import Received
 from dynamics.generate import each_index
 from dynamics.integrators import march
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.tree import finite
-from dynamics.vector import ZERO
+from dynamics.vector import ZERO, Vec3
 from dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
+    CooperativeLoadState,
     LiftCommand,
     quad_position,
     quad_velocity,
@@ -31,12 +33,14 @@ class CooperativePlant(NamedTuple):
 
 
 @leaf
-def _zero(values, i):
+def _zero(values: tuple, i: int) -> Vec3:
     return ZERO
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
     """March to `tick` under the command given; the load tells of the vehicle's own motion."""
     g = p.formation
     lift = inputs[0].value if inputs[0].due else p.off

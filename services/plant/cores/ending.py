@@ -5,7 +5,7 @@ from dynamics.kernel import leaf
 
 
 @leaf
-def signal(tick, last, sound):
+def signal(tick: int, last: int, sound: bool) -> int:
     """The plant's signal at `tick` of a run whose last tick is `last`."""
     if not sound:
         return FAILED

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from cosim.part import Received
 from dynamics import effects
 from dynamics.kernel import leaf
 from dynamics.noise import Key
@@ -35,7 +36,9 @@ class MultirotorPlantState(NamedTuple):
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryGauge], int]:
     """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is."""
     actuators, status = inputs
     command = actuators.value.motor_voltage if actuators.due else p.off

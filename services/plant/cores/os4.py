@@ -3,13 +3,13 @@
 from dynamics.integrators import rate
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
-from dynamics.vehicles.quadrotor_os4 import Os4Parameters
+from dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
 from services.common.ports import TrueState
 from services.plant.cores.autonomous import TOLD
 
 
 @leaf
-def told(p, t, x):
+def told(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
     """The state, its acceleration, thrusts and torques of the rotors."""
     a, b, c, d = x.rotor_speed
     k, m = p.lift_constant, p.drag_constant

@@ -2,13 +2,13 @@
 
 from dynamics.kernel import leaf
 from dynamics.vector import ZERO
-from dynamics.vehicles.unloading import UnloadingParameters
+from dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
 from services.common.ports import TrueState
 from services.plant.cores.autonomous import TOLD
 
 
 @leaf
-def told(p, t, x):
+def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState]:
     """The pack's motion."""
     return (
         TrueState(

@@ -3,12 +3,12 @@
 import math
 from typing import NamedTuple
 
-from cosim.part import GO_ON
+from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import NO_ROTATION, exp
-from dynamics.vector import ZERO, add, scale
+from dynamics.vector import ZERO, Vec3, add, scale
 from dynamics.vehicles import unloading, unloading_places
-from dynamics.vehicles.unloading import UnloadingParameters
+from dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
 from services.common.ports import BodyMotions
 
 NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_places.ROLLERS)], "ground")
@@ -22,7 +22,7 @@ class UnloadingView(NamedTuple):
 
 
 @leaf
-def _roller(p, i):
+def _roller(p: UnloadingParameters, i: int) -> Vec3:
     """Place of the axis of a roller [m]."""
     forward = (math.cos(p.tilt), 0.0, -math.sin(p.tilt))
     upward = (math.sin(p.tilt), 0.0, math.cos(p.tilt))
@@ -31,13 +31,15 @@ def _roller(p, i):
 
 
 @leaf
-def _on_roller(rollers, i):
+def _on_roller(rollers: tuple[Vec3, ...], i: int) -> Vec3:
     """Force of the pack on a roller [N]."""
     return scale(-1.0, add(add(ZERO, rollers[2 * i]), rollers[2 * i + 1]))
 
 
 @leaf
-def step(p, s, tick, inputs):
+def step(
+    p: UnloadingView, s: UnloadingState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[UnloadingState, tuple[BodyMotions], int]:
     """The motions of the bodies at `tick`; the door lies along z of its frame."""
     c, t = p.carrier, tick * p.interval
     rollers, door, ground, walls = unloading.forces_on_pack(c, t, s)

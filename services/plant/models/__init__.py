@@ -11,7 +11,7 @@ from types import ModuleType
 
 from cosim.scene import Scene
 from dynamics.errors import KeyedError
-from services.common.sections import Vehicle
+from services.common.vehicle import Vehicle
 
 
 def names() -> list[str]:

@@ -14,8 +14,10 @@ from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.noise import Key, stream_key
 from dynamics.vector import ZERO
 from services.common import ports
+from services.common.exchange import Exchange, Rates, ticks
 from services.common.ports import BatteryGauge, BodyMotions, TrueState
-from services.common.sections import Exchange, Rates, Run, Vehicle, airframe, start_pose, ticks
+from services.common.sections import Run
+from services.common.vehicle import Vehicle, airframe, start_pose
 from services.plant.config import Solver, method
 from services.plant.cores.autonomous import AutonomousPlant
 from services.plant.cores.multirotor import MultirotorPlant, MultirotorPlantState
@@ -45,6 +47,20 @@ def bodies_port(scene: Scene, n: int) -> Port:
     return Port(
         ports.BODIES, BodyMotions(zero, (NO_ROTATION,) * n, zero, zero, zero, zero), rate_ticks(scene, "bodies")
     )
+
+
+def needs(scene: Scene, *tables: str) -> None:
+    """KeyedError if a scene lacks one of these optional tables."""
+    for name in tables:
+        if not scene.has(name):
+            raise KeyedError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
+
+
+def can_have(scene: Scene, *tables: str) -> None:
+    """KeyedError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
+    for name in sorted({"effects", "sensors", "autopilot", "trajectory"}.difference(tables)):
+        if scene.has(name) and (scene.section(name).OPTIONAL or scene.tables(name)):
+            raise KeyedError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
 
 
 def autonomous(

@@ -12,11 +12,12 @@ from dynamics.vehicles.cooperative_load import (
     CooperativeLoadState,
     LiftCommand,
 )
+from services.common.exchange import Exchange, Rates
 from services.common.ports import LIFT, TRUTH, RotorWrenches, TrueState
-from services.common.sections import CooperativeLoad, Exchange, Rates, can_have, needs
+from services.common.sections import CooperativeLoad
 from services.plant.config import method
 from services.plant.cores.cooperative_load import CooperativePlant
-from services.plant.models._common import bodies_port, check_system, last_tick, wiring
+from services.plant.models._common import bodies_port, can_have, check_system, last_tick, needs, wiring
 from services.plant.setup import PlantSetup
 
 NOTHING = (0.0, 0.0, 0.0)

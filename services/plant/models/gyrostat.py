@@ -14,8 +14,8 @@ from dynamics.lie.quaternion import Quaternion, exp
 from dynamics.vehicles.gyrostat import GyrostatParameters
 from dynamics.vehicles.rigid_body import RigidBody
 from services.common.ports import TrueState
-from services.common.sections import Triple, can_have, needs
-from services.plant.models._common import autonomous, check_system
+from services.common.sections import Triple
+from services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 Turn = tuple[float, float, float, float]

@@ -10,7 +10,9 @@ from cosim.scene import Scene, Section
 from cosim.setup import ServiceSetup
 from dynamics.errors import KeyedError
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from services.common.sections import Exchange, Run, Vehicle, active, airframe
+from services.common.exchange import Exchange
+from services.common.sections import Run
+from services.common.vehicle import Vehicle, active, airframe
 from services.plant.config import Solver
 from services.plant.cores.bodies import FiveBodiesView
 from services.plant.models import reduced

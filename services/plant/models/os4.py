@@ -10,8 +10,8 @@ from cosim.setup import ServiceSetup
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from services.common.ports import TrueState
-from services.common.sections import Triple, can_have, needs
-from services.plant.models._common import autonomous, check_system
+from services.common.sections import Triple
+from services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]

@@ -6,8 +6,8 @@ from typing import Any
 from cosim.scene import Scene
 from cosim.setup import ServiceSetup
 from dynamics.vehicles import multirotor
-from services.common.sections import active, airframe, needs
-from services.plant.models._common import multirotor_plant
+from services.common.vehicle import active, airframe
+from services.plant.models._common import multirotor_plant, needs
 
 
 def check(scene: Scene) -> None:

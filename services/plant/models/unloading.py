@@ -10,11 +10,12 @@ from cosim.setup import ServiceSetup
 from dynamics.errors import KeyedError
 from dynamics.vehicles import unloading
 from dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
+from services.common.exchange import Exchange
 from services.common.ports import TrueState
-from services.common.sections import Exchange, Triple, can_have, needs
+from services.common.sections import Triple
 from services.plant.cores import unloading_bodies
 from services.plant.cores.unloading_bodies import UnloadingView
-from services.plant.models._common import autonomous, check_system
+from services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]

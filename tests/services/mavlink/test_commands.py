@@ -10,7 +10,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.flavours import ardupilot, px4
 
 NAN = math.nan
-STANDING = 0.35  # [m] the body origin of the delivery drone above the ground
+RESTING_HEIGHT = 0.35  # [m] the body origin of the delivery drone above the ground
 
 
 def asked(bench, kind):
@@ -29,14 +29,14 @@ def test_a_takeoff_without_a_height_climbs_by_the_parameter():
     bench = Bench()
     bench.vehicle.armed = True
     bench.station().command(22, NAN, NAN, NAN, NAN, NAN, NAN, NAN)
-    assert asked(bench, "takeoff")[0] == pytest.approx(2.5 + STANDING)
+    assert asked(bench, "takeoff")[0] == pytest.approx(2.5 + RESTING_HEIGHT)
 
 
 def test_ardupilot_counts_a_takeoff_from_home():
     bench = Bench("mavlink.flavour=ardupilot")
     bench.vehicle.armed = True
     bench.station().command(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0)
-    assert asked(bench, "takeoff")[0] == pytest.approx(12.0 + STANDING)
+    assert asked(bench, "takeoff")[0] == pytest.approx(12.0 + RESTING_HEIGHT)
 
 
 def test_what_a_reposition_does_not_say_stays():

@@ -38,6 +38,9 @@ def test_an_unknown_flavour_names_the_choices():
         flavours.get("px")
 
 
+SCENE = ("cosim.scene", *(f"services.common.{name}" for name in ("sections", "exchange", "vehicle", "modules")))
+
+
 def imports(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom):
@@ -49,7 +52,7 @@ def imports(path):
 def test_the_scene_is_known_to_the_description_alone():
     for path in FOLDER.rglob("*.py"):
         if path.name not in ("resolve.py", "config.py"):
-            found = {n for n in imports(path) if n.startswith(("cosim.scene", "services.common.sections"))}
+            found = {n for n in imports(path) if n.startswith(SCENE)}
             assert not found, path
 
 

@@ -92,7 +92,9 @@ def test_the_command_prints_the_choice(capsys, tmp_path, monkeypatch):
     problem = find("os4_experiment_1")
     few = [way for way in problem.ways if way.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
     monkeypatch.setattr(command, "find", lambda target: problem._replace(ways=few))
-    command.run("os4_experiment_1", [], 1e-3, tmp_path / "a.json", None)
+    found = command.study(command.console(), "os4_experiment_1", [], 1e-3)
+    command.show(command.console(), found)
+    command.write_json(tmp_path / "a.json", found)
     printed = capsys.readouterr().out
     assert "OS4 quadrotor: experiment 1" in printed
     assert "cheapest: " in printed

@@ -8,7 +8,7 @@ import pytest
 from made_up import moved
 from rich.console import Console
 
-from services.common.sections import Effects
+from services.common.vehicle import Effects
 from services.table import load
 from studies.effects import show
 from studies.effects.influence import Influence, influence

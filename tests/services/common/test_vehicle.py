@@ -7,7 +7,8 @@ import pytest
 from dynamics.errors import KeyedError
 from dynamics.lie.quaternion import NO_ROTATION, rotation_matrix
 from messages.topics import IMU, TRUTH
-from services.common.sections import active, airframe, gravity, start_height, start_pose, ticks
+from services.common.exchange import ticks
+from services.common.vehicle import active, airframe, gravity, start_height, start_pose
 from services.table import load
 from tests.cosim.alone import Alone
 

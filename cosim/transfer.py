@@ -1,0 +1,116 @@
+"""What a process takes from the bus and gives to it, tick by tick."""
+
+import time
+
+from cosim.bundle import Bundles, pack_batch
+from cosim.bus import Subscription
+from cosim.graph import Graph, Service
+from cosim.keys import BATCH_KEY, STEP_KEY
+from cosim.process import POLL, Process
+from cosim.schedule import LockStepError, due
+from dynamics.kernel import uncompiled
+from messages.topics import Topic
+
+BATCH = 0.1  # [s] of wall time between two batches
+PAGE = 1024  # ticks after which a batch is handed over in any case
+
+_due = uncompiled(due)
+
+
+class EndOfRun(Exception):
+    """A producer says that there will be no further message."""
+
+
+class Source:
+    """A service that gives something that this one takes."""
+
+    def __init__(self, process: Process, name: str, taken: list[tuple[str, int, int]], graph: Graph):
+        """`taken`: (port, period, delay) of each input that it gives."""
+        self._process, self._name, self._taken, self._graph = process, name, taken, graph
+        self._bundles = Bundles(process.setup.services[name].ports)
+        self._subscription: Subscription = process.bus.subscribe(f"{process.space}/{STEP_KEY}/{name}")
+        self._newest = -1  # tick of the newest bundle taken
+
+    def take(self, tick: int) -> None:
+        """Take bundles up to the newest that is needed at `tick`.
+
+        Raises:
+            EndOfRun: the producer has ended.
+            LockStepError: another bundle came than the one that is due.
+        """
+        needed = max(_due(tick, period, delay) for _, period, delay in self._taken)
+        while self._newest < needed:
+            stamp = self._newest + 1
+            while not self._bundles.due(stamp):
+                stamp += 1
+            get = self._subscription.get
+            time_ns, payload = get(POLL) or self._process.patient(get, lambda: self._describe(needed))
+            if not payload:
+                raise EndOfRun
+            if time_ns != stamp * self._process.setup.interval_ns:
+                raise LockStepError(f"{self._name}: expected the bundle of tick {stamp}, got {time_ns} ns")
+            self._bundles.unpack(payload, self._graph, stamp)
+            self._newest = stamp
+
+    def _describe(self, tick: int) -> str:
+        ports = [port for port, period, delay in self._taken if tick % period == 0]
+        return f"{', '.join(ports)} of tick {tick} from {self._name}"
+
+
+def sources(process: Process, graph: Graph) -> list[Source]:
+    """Who gives what the service of this process takes."""
+    setup = process.setup
+    taken: dict[str, list[tuple[str, int, int]]] = {}
+    for needed in setup.services[process.name].inputs:
+        producer = setup.producers[needed.port]
+        taken.setdefault(producer, []).append((needed.port, setup.port(needed.port).period, needed.delay))
+    return [Source(process, producer, ports, graph) for producer, ports in sorted(taken.items())]
+
+
+class Outlets:
+    """What a service publishes: a bundle a tick to its consumers, batches to recorders, topics to those who listen."""
+
+    def __init__(self, process: Process, service: Service, graph: Graph, hands_over: bool = True):
+        """Declare the publishers; the bundles are somebody else's where it does not hand over."""
+        space, bus = process.space, process.bus
+        self._process, self._service, self._graph = process, service, graph
+        self._bundles = Bundles(process.setup.services[service.name].ports if hands_over else ())
+        self._put_bundle = bus.publisher(f"{space}/{STEP_KEY}/{service.name}") if hands_over else None
+        self._put_batch = bus.publisher(f"{space}/{BATCH_KEY}/{service.name}")
+        self._topics = {topic: process.key(topic) for topic in service.topics}
+        self._puts = {topic: bus.publisher(key) for topic, key in self._topics.items()}
+        self._listened: set[Topic] = set()
+        self._handed = 0  # tick before which all is handed over
+        self._due = 0.0
+        self._interval_ns = process.setup.interval_ns
+
+    def look(self) -> None:
+        """See which topics somebody listens to."""
+        self._listened = {topic for topic, key in self._topics.items() if self._process.bus.has_audience([key])}
+
+    def publish(self, tick: int) -> None:
+        """Hand over what the graph gives at `tick`."""
+        if self._put_bundle and self._bundles.due(tick):
+            self._put_bundle(self._bundles.pack(self._graph, tick), tick * self._interval_ns)
+        if self._listened:
+            for page in self._graph.pages(tick, tick + 1, self._listened, keep=True):
+                for at, payload in zip(page.ticks, page.payloads, strict=True):
+                    self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
+        if tick + 1 - self._handed >= PAGE or time.monotonic() > self._due:
+            self._hand_over(tick + 1)
+            self.look()
+
+    def _hand_over(self, stop: int) -> None:
+        self._due = time.monotonic() + BATCH
+        if stop > self._handed:
+            pages = self._graph.pages(self._handed, stop)
+            self._put_batch(pack_batch(pages, stop), (stop - 1) * self._interval_ns)
+            self._handed = stop
+
+    def end(self, stop: int) -> None:
+        """Hand over what is left of the ticks before `stop`, and say that there will be no more."""
+        self._hand_over(stop)
+        time_ns = stop * self._interval_ns
+        for put in (self._put_bundle, self._put_batch, *self._puts.values()):
+            if put:
+                put(b"", time_ns)

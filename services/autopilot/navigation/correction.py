@@ -1,0 +1,66 @@
+"""The readings of a barometer, a sonar or a magnetometer: each kind of reading has its update of the filter."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from numba import types
+
+from cosim.part import GO_ON, Received
+from dynamics.generate import implements
+from dynamics.kernel import ByClass, leaf
+from services.autopilot import estimator
+from services.autopilot.estimator import Estimator, State
+from services.autopilot.navigation.state import NavigationState
+from services.common.ports import BarometerReading, MagnetometerReading, SonarReading
+
+Reading = BarometerReading | MagnetometerReading | SonarReading
+
+
+class Correction(NamedTuple):
+    """The filter."""
+
+    filter: Estimator
+
+
+@leaf
+def _barometer(p: Estimator, x: State, r: BarometerReading) -> State:
+    return estimator.update_barometer(p, x, r.pressure, r.variance, r.valid)
+
+
+@leaf
+def _magnetometer(p: Estimator, x: State, r: MagnetometerReading) -> State:
+    return estimator.update_magnetometer(p, x, r.field_body, r.variance, r.valid)
+
+
+@leaf
+def _sonar(p: Estimator, x: State, r: SonarReading) -> State:
+    return estimator.update_sonar(p, x, r.range, r.variance, r.valid)
+
+
+UPDATES = ByClass()
+"""The compiled update of the filter by the class of a reading."""
+UPDATES[BarometerReading] = _barometer
+UPDATES[MagnetometerReading] = _magnetometer
+UPDATES[SonarReading] = _sonar
+
+
+def update(p: Estimator, x: State, r: Reading) -> State:
+    """The filter's state after a reading; in compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(update, inline=True)
+def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Callable:
+    found = UPDATES[r.instance_class]
+    return lambda p, x, r: found(p, x, r)
+
+
+@leaf
+def step(
+    p: Correction, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
+    """Correct by the reading of the tick."""
+    x = s.filter
+    if s.begun:
+        x = update(p.filter, x, inputs[0].value)
+    return NavigationState(s.begun, x), (), GO_ON

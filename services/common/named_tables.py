@@ -1,0 +1,45 @@
+"""A table of tables: `[effects.NAME]`, `[sensors.NAME]`."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ConfigDict
+
+from cosim.scene import Files, Scene, Section
+from dynamics.errors import KeyedError
+from services.common import modules, user_code
+
+
+class NamedTables(Section):
+    """A table for each thing of a kind, by its name; one of the user's own has the key `module`."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @property
+    def tables(self) -> Mapping[str, Any]:
+        """The table of each that the scene names."""
+        return self.__pydantic_extra__ or {}
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The modules of the user's own become part of the table `modules`."""
+        entries = tree.get(cls.TABLE, {})
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
+            if isinstance(entry, dict) and isinstance(module := entry.get("module"), str):
+                modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
+
+    def check(self, scene: Scene) -> None:
+        """Every entry is a table."""
+        for name, table in self.tables.items():
+            if not isinstance(table, dict):
+                raise KeyedError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
+
+    def load(self, scene: Scene) -> None:
+        """Import the modules of the user's own. KeyedError where one cannot be imported."""
+        texts = modules.texts(scene)
+        for name, table in self.tables.items():
+            if "module" in table:
+                key = f"{self.TABLE}.{name}.module"
+                if not isinstance(table["module"], str):
+                    raise KeyedError(key, f"got {table['module']!r}", "the name of a module")
+                user_code.loaded(key, table["module"], texts)

@@ -1,0 +1,84 @@
+"""What flies and under which physics: the airframe, the effects, and what follows from both."""
+
+from typing import Any, ClassVar
+
+from pydantic import ConfigDict, Field
+
+from cosim.scene import Files, Scene, Section
+from cosim.scene.files import laid_over, named
+from dynamics import effects
+from dynamics.errors import KeyedError
+from dynamics.lie.quaternion import Quaternion
+from dynamics.vector import Vec3
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.standing import standing_pose
+from services.common.named_tables import NamedTables
+from services.common.sections import SHIPPED
+
+
+class Vehicle(Section):
+    """What flies."""
+
+    TABLE: ClassVar[str] = "vehicle"
+    name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
+    airframe: str | None = None  # one that ships or lies in vehicles/ beside the scene, or the path of a .toml file
+    model: str = "reduced"  # a module of services/plant/models
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The airframe's file becomes the table `airframe`; what the scene says there is laid over it."""
+        if isinstance(name := named(tree, "vehicle", "airframe"), str):
+            path = files.find("vehicle.airframe", "airframe", name, "vehicles", SHIPPED / "vehicles")
+            content = files.toml(VehicleAirframe.TABLE, "vehicle.airframe", path)
+            tree[VehicleAirframe.TABLE] = laid_over(content, tree.get(VehicleAirframe.TABLE, {}))
+
+
+class VehicleAirframe(Airframe, Section):
+    """The airframe: the content of the file that `vehicle.airframe` names."""
+
+    TABLE: ClassVar[str] = "airframe"
+    OPTIONAL: ClassVar[bool] = True
+    FROM_FILE: ClassVar[bool] = True
+    model_config = ConfigDict(strict=False)
+
+
+class Effects(NamedTables):
+    """The physics that the scene calls for: a table for each effect of dynamics/effects, or of the user's own."""
+
+    TABLE: ClassVar[str] = "effects"
+
+    def check(self, scene: Scene) -> None:
+        """Every effect exists, has sound parameters, and suits the vehicle and the others."""
+        super().check(scene)
+        active(scene)
+
+
+def airframe(scene: Scene) -> Airframe:
+    """The airframe of the scene. Raises KeyedError where it names none."""
+    if not scene.has(VehicleAirframe):
+        raise KeyedError("vehicle.airframe", "missing", "the name of an airframe, or the path of a .toml file")
+    return scene[VehicleAirframe]
+
+
+def active(scene: Scene) -> tuple:
+    """Parameters of the scene's effects, sorted by name."""
+    tables = scene[Effects].tables
+    scene[Effects].load(scene)
+    return effects.from_scene(tables, airframe(scene)) if tables else ()
+
+
+def gravity(scene: Scene) -> float:
+    """Gravity at home [m/s^2]: that of whichever effect gives one, 0 without."""
+    return next((e.acceleration_at_home for e in active(scene) if hasattr(e, "acceleration_at_home")), 0.0)
+
+
+def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
+    """(position of the centre of mass [m], attitude) in the world of the vehicle that stands on the ground at home."""
+    contact = airframe(scene).contact
+    ground = next((e.ground for e in active(scene) if hasattr(e, "ground")), None)
+    return standing_pose(contact.feet if contact else (), ground)
+
+
+def start_height(scene: Scene) -> float:
+    """World z of its centre of mass [m]."""
+    return start_pose(scene)[0][2]
