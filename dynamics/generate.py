@@ -11,7 +11,10 @@ from typing import Any
 import numba
 from numba.extending import overload
 
-INLINE = {"forceinline": True}
+from dynamics.kernel import Pipeline
+
+COMPILED: dict[str, Any] = {"pipeline_class": Pipeline}
+INLINE: dict[str, Any] = {**COMPILED, "forceinline": True}
 
 
 def define(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
@@ -67,7 +70,7 @@ def implements(function: Callable, *, inline: bool = False) -> Callable[[Callabl
 def _implement(function: Callable, arguments: str, generate: Callable[..., Callable], inline: bool) -> None:
     # numba compares the argument lists, annotations and all: this one has none, like the implementations
     chosen = define(f"chosen({arguments})", {"generate": generate}, f"return generate({arguments})")
-    overload(function, jit_options=INLINE if inline else {})(chosen)
+    overload(function, jit_options=INLINE if inline else COMPILED)(chosen)
 
 
 def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
@@ -75,7 +78,7 @@ def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
     return tuple(function(common, x, y) for x, y in zip(a, b, strict=True))
 
 
-@overload(each, jit_options=INLINE)
+@implements(each, inline=True)
 def _each(function, common, a, b):
     calls = "".join(f"function(common, a[{i}], b[{i}]), " for i in range(len(a)))
     return define("each(function, common, a, b)", {}, f"return ({calls})")
@@ -86,7 +89,7 @@ def each_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
     return tuple(function(*arguments, i) for i in range(len(count)))
 
 
-@overload(each_index)
+@overload(each_index, jit_options=COMPILED)
 def _each_index(function, count, *arguments):
     given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
     calls = "".join(f"function({given}{i}), " for i in range(len(count)))

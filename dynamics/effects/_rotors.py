@@ -1,9 +1,7 @@
 """Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
 
-from numba.extending import overload
-
 from dynamics.effects._types import PerRotor
-from dynamics.generate import INLINE, define
+from dynamics.generate import define, implements
 from dynamics.vector import Vec3, add
 
 
@@ -12,7 +10,7 @@ def total(a: PerRotor) -> float:
     return sum(a)
 
 
-@overload(total, jit_options=INLINE)
+@implements(total, inline=True)
 def _total(a):
     def pairs(terms):
         half = len(terms) // 2
@@ -26,7 +24,7 @@ def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
     raise NotImplementedError("compiled code only")
 
 
-@overload(total_wrench, jit_options=INLINE)
+@implements(total_wrench, inline=True)
 def _total_wrench(a):
     lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
     return define("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")

@@ -2,8 +2,6 @@
 
 import math
 
-from numba.extending import overload
-
 from dynamics.effects._contact_parameters import (
     FREE,
     SLIDING,
@@ -17,7 +15,7 @@ from dynamics.effects._contact_parameters import (
 from dynamics.effects._feet import above, foot_on, stance_of
 from dynamics.effects._ground import clearance, surface
 from dynamics.effects._hooks import asleep, contact, settle, substeps, wrench
-from dynamics.generate import each
+from dynamics.generate import each, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, norm, scale, subtract
@@ -50,7 +48,7 @@ def _friction(e, memory, foot):
     raise NotImplementedError("compiled code only")
 
 
-@overload(_friction, jit_options={"forceinline": True})
+@implements(_friction, inline=True)
 def _friction_by_law(e, memory, foot):
     if e.instance_class is GroundContact:
 

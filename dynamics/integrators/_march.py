@@ -8,8 +8,7 @@ import sys
 from collections import namedtuple
 from typing import Any
 
-from numba.extending import overload
-
+from dynamics.generate import implements
 from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.tree import finite, flatten
 
@@ -32,7 +31,7 @@ def _rate(p, t, x):
     """Dispatch by the class of p."""
 
 
-@overload(_rate)
+@implements(_rate)
 def _rate_of(p, t, x):
     found = RATES[p.instance_class]
     return lambda p, t, x: found(p, t, x)
@@ -49,7 +48,7 @@ def step(method: Any, p: Any, t: float, x: Any, h: float) -> Any:
     return sys.modules[type(method).__module__].step(rate, p, t, x, h)
 
 
-@overload(step)
+@implements(step)
 def _step(method, p, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     return lambda method, p, t, x, h: one_step(rate, p, t, x, h)

@@ -14,11 +14,13 @@ from dynamics.kernel._by_class import ByClass
 from dynamics.kernel._cache import Statistics, on_compile, statistics
 from dynamics.kernel._decorators import kernel, leaf, uncompiled
 from dynamics.kernel._files import root as cache_folder
+from dynamics.kernel._pipeline import Pipeline
 from dynamics.kernel._sources import digest as source_digest
 from dynamics.kernel._sources import forget as forget_sources
 
 __all__ = [
     "ByClass",
+    "Pipeline",
     "Statistics",
     "cache_folder",
     "forget_sources",

@@ -15,6 +15,7 @@ from numba.core.serialize import dumps
 
 from dynamics.kernel import _files, _sources
 from dynamics.kernel._key import Key, NotKeptError, key
+from dynamics.kernel._pipeline import InnerLibrary, is_nested, restored
 
 
 class Statistics(NamedTuple):
@@ -86,19 +87,23 @@ class KernelCache(_Cache):
             return
         found = self._key(sig, data.codegen) if self._enabled else None
         if found is not None:
-            _files.write(self._folder, f"{self._name}-{found.made_of}", found.sources, dumps((found, data._reduce())))
+            name = self._file(found, isinstance(data.library, InnerLibrary))
+            _files.write(self._folder, name, found.sources, dumps((found, data._reduce())))
 
     def _loaded(self, sig: Any, target_context: Any) -> CompileResult | None:
-        found = self._key(sig, target_context.codegen())
-        content = _files.read(self._folder, f"{self._name}-{found.made_of}", found.sources) if found else None
+        found, inner = self._key(sig, target_context.codegen()), is_nested()
+        content = _files.read(self._folder, self._file(found, inner), found.sources) if found else None
         if content is None:
             return None
         with contextlib.suppress(Exception):  # whatever it is, compiling mends it
             kept, payload = pickle.loads(content)
-            result = CompileResult._rebuild(target_context, *payload)
+            result = restored(target_context, payload) if inner else CompileResult._rebuild(target_context, *payload)
             if kept == found and result.signature.args == sigutils.normalize_signature(sig)[0]:
                 return result
         return None
+
+    def _file(self, found: Key, inner: bool) -> str:
+        return f"{self._name}-{'inner-' if inner else ''}{found.made_of}"
 
     def _key(self, sig: Any, codegen: Any) -> Key | None:
         arguments, returns = sigutils.normalize_signature(sig)

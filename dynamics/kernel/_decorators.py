@@ -3,18 +3,20 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
-from numba.core.dispatcher import Dispatcher
+from numba.core import config
 
 from dynamics.kernel._cache import KernelCache
+from dynamics.kernel._pipeline import KernelDispatcher, Pipeline
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _compile(function: Callable, **options: bool) -> Any:
-    compiled = numba.njit(error_model="numpy", nogil=True, **options)(function)
-    if isinstance(compiled, Dispatcher):  # not so with NUMBA_DISABLE_JIT
-        compiled._cache = KernelCache(compiled)  # type: ignore[attr-defined]
+def _compile(function: Callable, **options: Any) -> Any:
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
+    options = {"nopython": True, "nogil": True, "error_model": "numpy", **options}
+    compiled = KernelDispatcher(py_func=function, targetoptions=options, pipeline_class=Pipeline)
+    compiled._cache = KernelCache(compiled)
     return compiled
 
 

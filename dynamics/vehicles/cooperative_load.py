@@ -6,9 +6,7 @@ equations are theory.md, eqs. (7.17) to (7.21); the constraints are part of the 
 
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
-from dynamics.generate import each_index
+from dynamics.generate import each_index, implements
 from dynamics.integrators import RATES
 from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import Quaternion, rotation_matrix
@@ -68,7 +66,7 @@ def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> 
     return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
 
 
-@overload(command)
+@implements(command)
 def _command(p, t, x):
     drive = p.types[p.fields.index("drive")].instance_class
     if drive is LiftCommand:

@@ -10,12 +10,10 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from numba.extending import overload
-
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._rotors import total
 from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
-from dynamics.generate import each
+from dynamics.generate import each, implements
 from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
 from dynamics.vector import ZERO, Vec3, scale
@@ -188,7 +186,7 @@ def seen(layout: RotorLayout, x: Any) -> Motion:
     raise NotImplementedError("compiled code only")
 
 
-@overload(seen, jit_options={"forceinline": True})
+@implements(seen, inline=True)
 def _seen(layout, x):
     found = FORMS[x.instance_class].seen
     return lambda layout, x: found(layout, x)
@@ -198,7 +196,7 @@ def _accelerations(drive, t, x):
     raise NotImplementedError("compiled code only")
 
 
-@overload(_accelerations, jit_options={"forceinline": True})
+@implements(_accelerations, inline=True)
 def _accelerations_of_form(drive, t, x):
     found = FORMS[x.instance_class].accelerations
     return lambda drive, t, x: found(drive, t, x)
@@ -208,7 +206,7 @@ def _step(method, drive, t, x, h):
     raise NotImplementedError("compiled code only")
 
 
-@overload(_step, jit_options={"forceinline": True})
+@implements(_step, inline=True)
 def _step_inlined(method, drive, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     form = FORMS[x.instance_class]

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba.extending import overload
 from scipy.integrate import solve_ivp
 
 from dynamics import effects, integrators
 from dynamics.effects._types import Motion, body_of
+from dynamics.generate import implements
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import NO_ROTATION, exp, rotation_matrix
 from dynamics.multibody import hold
@@ -59,7 +59,7 @@ def _of_euler(p: Any, x: Any) -> float:
     return _of_five(p, multirotor_euler.five(x))
 
 
-@overload(gap)
+@implements(gap)
 def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
     found = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
     return lambda p, x: found(p, x)
