@@ -1,10 +1,11 @@
 """A vehicle that you step yourself, with motor voltages or with setpoints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.graph import NEVER, Graph, Service
+from cosim.scene import Overrides, Scene, SceneError, Source
 from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
 from services.autopilot.core import NO_TRAJECTORY, ORDER, Order
@@ -55,19 +56,18 @@ class Simulator:
     that the scene's autopilot follows.
     """
 
-    def __init__(self, scene: str | Path, overrides: Mapping[str, Any] | Sequence[str] = (), seed: int | None = None):
+    def __init__(self, scene: Scene | str | Path, overrides: Overrides = (), seed: int | None = None):
         """A vehicle at rest where the scene puts it.
 
         Args:
-            scene: path or name of a scene with an autopilot.
+            scene: path or name of a scene with an autopilot, or a loaded one.
             overrides: values by dotted key, or texts KEY=VALUE.
             seed: of all randomness; None: the scene's.
 
         Raises:
-            SceneError: the scene is not sound.
-            ValueError: nobody steers in it.
+            SceneError: the scene is not sound, or nobody steers in it.
         """
-        self._scene, self._overrides = scene, overrides
+        self._scene = load(scene, overrides)
         self._graph: Graph | None = None
         self._kind = ""
         self._set_up(seed)
@@ -116,14 +116,10 @@ class Simulator:
         return self._observe(graph)
 
     def _set_up(self, seed: int | None) -> None:
-        overrides = dict(self._overrides) if isinstance(self._overrides, Mapping) else list(self._overrides)
-        scene = load(self._scene, overrides)
-        if seed is not None:
-            more: Any = {"run.seed": seed} if isinstance(overrides, dict) else [f"run.seed={seed}"]
-            scene = load(self._scene, overrides | more if isinstance(overrides, dict) else [*overrides, *more])
+        scene = load(self._scene, () if seed is None else {"run.seed": seed})
         self._setup = resolve(scene)
         if "autopilot" not in self._setup.services:
-            raise ValueError(f"{scene.path}: nobody steers there; expected a scene with [autopilot]")
+            raise SceneError("autopilot", "nobody steers there", "a scene with [autopilot]", Source(scene.path))
 
     def _begin(self, kind: str) -> Graph:
         setup = self._setup

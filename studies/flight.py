@@ -76,6 +76,11 @@ class Flight:
         said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
         return cls(said, Origin.of_setup(graph.setup), failure)
 
+    def __repr__(self) -> str:
+        end = self.truth.times[-1] if len(self.truth) else 0.0
+        how = self.failure or ("landed" if self.landed else "not landed")
+        return f"<Flight of {self.metadata.get('scene', self.origin.source)}, {end:.2f} s: {how}>"
+
     @property
     def setup(self) -> Setup:
         """What was flown.

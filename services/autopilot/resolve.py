@@ -29,7 +29,7 @@ from services.common.sections import (
     start_height,
     ticks,
 )
-from services.common.user_code import Modules
+from services.common.user_code import texts_of
 
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR)
 
@@ -87,7 +87,7 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """The code that the key names, tried."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Exchange].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
-    found = rate(name, scene[Modules].texts, vehicle, options)
+    found = rate(name, texts_of(scene), vehicle, options)
     return CustomCode(name, options, ticks(scene, found, f"autopilot.{key}"))
 
 

@@ -9,7 +9,6 @@ from cosim.scene import Files, Scene, Section
 from dynamics.errors import KeyedError
 from services.common import user_code
 from services.common.sections import Exchange, ticks
-from services.common.user_code import Modules
 from services.sensors.registry import parameters
 
 
@@ -43,7 +42,7 @@ class Sensors(Section):
         if len(own) > 1:
             message = f"sensors.{own[0]} is one of the user's own already"
             raise KeyedError(f"sensors.{own[1]}.module", message, "one, which may read several numbers")
-        user_code.load_all(self.TABLE, self.tables, scene[Modules].texts if scene.has(Modules) else {})
+        user_code.load_all(self.TABLE, self.tables, user_code.texts_of(scene))
         for name, table in self.tables.items():
             try:
                 rate = parameters(name, table, scene[Exchange].interval).rate

@@ -1,6 +1,5 @@
 """A controller of the user's in Python, as a part of the graph: asked at its rate while the motors run."""
 
-import math
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -65,8 +64,6 @@ class AskedController(PeriodicPart):
             found = demand(self._controller.step(time, estimate, setpoint))
         except Exception as error:
             raise LockStepError(f"{self._said(error)} at t = {time:.3f} s") from error
-        if not all(map(math.isfinite, (*found.numbers, *found.roll_pitch))):
-            raise LockStepError(f"controller {self._code.name}: a command that is not finite at t = {time:.3f} s")
         graph.put(DEMAND, tick, found)
 
     def _said(self, error: Exception) -> str:

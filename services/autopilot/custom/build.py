@@ -1,5 +1,6 @@
 """The user's controller or estimator, from its name to something that can be asked, with all that can be wrong."""
 
+import copy
 import inspect
 import math
 from collections.abc import Callable, Mapping
@@ -21,7 +22,6 @@ from services.common.user_code import named
 
 CONTROLLER, ESTIMATOR = "autopilot.controller", "autopilot.estimator"
 OUTPUTS = (MotorVoltages, ThrustAndMoments)
-FAULTS = (TypeError, ValueError, NumbaError, ArithmeticError, LookupError, AttributeError)  # of a step that is tried
 
 
 def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
@@ -86,7 +86,7 @@ def _try(key: str, name: str, module: ModuleType, owner: Any, step: Callable[[],
         raise KeyedError(key, f"{name} has no step", "the method `step`")
     try:
         step()
-    except FAULTS as error:
+    except Exception as error:
         raise KeyedError(key, f"{name}: {_told(error, module)}") from error
 
 
@@ -112,11 +112,15 @@ def is_compiled(found: Any) -> bool:
 def constructor(
     key: str, module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]
 ) -> Callable[[], Any]:
-    """Makes a new one of what `key` names; KeyedError where that is refused."""
+    """Makes a new one of what `key` names: of a class, or as a copy of an object; KeyedError where that is refused."""
+    if options and not inspect.isclass(found):
+        raise KeyedError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
+
+    cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
 
     def construct() -> Any:
         try:
-            return found(vehicle, **options)
+            return cls(vehicle, **options) if cls else copy.deepcopy(found)
         except Exception as error:
             raise _refused(key, error, module) from error
 
