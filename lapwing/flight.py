@@ -9,8 +9,8 @@ from cosim.graph import pages_of
 from cosim.log import LogWriter
 from cosim.provenance import attachments, metadata
 from cosim.recording import Recording
-from messages.topics import TOPICS
 from studies import flight as studied
+from studies.flight import topic_of
 from studies.report import write
 
 
@@ -30,10 +30,9 @@ class Flight(studied.Flight):
             except OSError as fault:
                 raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
             return target
-        setup, known = self.setup, {topic.key(self.vehicle): topic for topic in TOPICS}
-        said = []
+        setup, said = self.setup, []
         for name in self.topics:
-            topic = known.get(f"/{self.vehicle}/{name}") or known[f"/{name}"]
+            topic = topic_of(name)
             said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
         pages = pages_of(said)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)

@@ -12,7 +12,7 @@ from cosim.log import LogReader
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
-from messages.topics import TOPICS, Topic
+from messages.topics import Topic, topic_named
 from studies import tracking
 from studies.origin import Origin
 from studies.port_columns import columns_of
@@ -101,9 +101,10 @@ class Flight:
         if self.origin.recorded:
             return self.metadata.get("digest", "")
         digest = Digest()
-        for topic in TOPICS:
-            if topic.recorded and topic.deterministic and self.has(_short(topic)):
-                for time_ns, payload in self.topic(_short(topic)).payloads():
+        for name in self.topics:
+            topic = topic_of(name)
+            if topic.recorded and topic.deterministic:
+                for time_ns, payload in self.topic(name).payloads():
                     digest.update(topic.key(self.vehicle), time_ns, payload)
         return digest.hexdigest()
 
@@ -225,6 +226,14 @@ class Flight:
             raise ImportError("to_dataframe: pandas is not installed; pip install pandas") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def topic_of(name: str) -> Topic:
+    """The topic whose name without the vehicle's is given; ValueError if there is none."""
+    try:
+        return topic_named(f"{{vehicle}}/{name}")
+    except ValueError:
+        return topic_named(name)
 
 
 def _short(topic: Topic) -> str:

@@ -38,10 +38,9 @@ class Sensors(Section):
         for name, table in self.tables.items():
             if not isinstance(table, dict):
                 raise KeyedError(f"sensors.{name}", f"got {table!r}", f"a table [sensors.{name}]")
-        own = [name for name, table in self.tables.items() if "module" in table]
-        if len(own) > 1:
-            message = f"sensors.{own[0]} is one of the user's own already"
-            raise KeyedError(f"sensors.{own[1]}.module", message, "one, which may read several numbers")
+        for name, table in self.tables.items():
+            if "module" in table and not name.isidentifier():
+                raise KeyedError(f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _")
         user_code.load_all(self.TABLE, self.tables, user_code.texts_of(scene))
         for name, table in self.tables.items():
             try:
