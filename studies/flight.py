@@ -110,27 +110,27 @@ class Flight:
 
     @property
     def truth(self) -> TopicView:
-        """The true state."""
+        """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
         return self.topic("truth")
 
     @property
     def setpoint(self) -> TopicView:
-        """Where the vehicle ought to be, as the autopilot follows it."""
+        """Where the vehicle ought to be, as the autopilot follows it: position, velocity, acceleration, yaw, phase."""
         return self.topic("setpoint")
 
     @property
     def actuators(self) -> TopicView:
-        """What the autopilot commands."""
+        """What the autopilot commands: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
         return self.topic("actuators")
 
     @property
     def estimate(self) -> TopicView:
-        """What the estimator tells."""
+        """What the estimator tells, and its standard deviations: position, position_std, velocity, ..."""
         return self.topic("estimate")
 
     @property
     def status(self) -> TopicView:
-        """What the autopilot is doing."""
+        """What the autopilot is doing: phase, armed, landed, finished, warnings."""
         return self.topic("status")
 
     @property

@@ -165,3 +165,12 @@ def test_mistakes_are_scene_errors_of_one_line(wrong, said):
 def test_a_distribution_that_cannot_be_drawn_from_is_refused_where_it_is_made(wrong):
     with pytest.raises(ValueError, match="expected"):
         wrong()
+
+
+def test_a_plot_is_a_figure_and_a_file(tmp_path):
+    flight = lapwing.fly("hover", {"run.duration": 0.5})
+    figure = flight.plot(tmp_path / "flight.png")
+    assert len(figure.axes) == 4
+    assert (tmp_path / "flight.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: No such file"):
+        flight.plot(tmp_path / "none" / "flight.png")
