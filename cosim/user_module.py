@@ -94,6 +94,7 @@ def _imports(file: Path) -> list[str]:
     return sorted(found)
 
 
+FAULTS = (Exception, SystemExit)  # what a user's code may raise, and a run ends with one line
 _laid_down: set[str] = set()  # folders on `sys.path` with the texts of set-ups
 
 

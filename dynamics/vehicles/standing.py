@@ -20,7 +20,7 @@ from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState
 
 ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
 CONVERGED = 1e-12  # change of the slope between two iterations
-BALANCED, TOLERATED = 1e-12, 1e-9  # force that is not balanced, over the weight: sought, and found at least
+BALANCED, TOLERATED = 1e-12, 1e-8  # force that is not balanced, over the weight: sought, and found at least
 NUDGE = 1e-8  # [m] for slopes of the forces
 LEVEL = (0.0, 0.0)
 

@@ -33,6 +33,13 @@ TOPICS_HEAD = """\
 [messages/msg](../messages/msg), SI. A sensor of the user's own has the topic `own_sensor/NAME`, by its name in the
 scene."""
 
+CONTROLLER = """\
+Named in a scene, or given to `lapwing.fly(scene, controller=MyController, controller_options={"stiffness": 4.0})`.
+[examples](../examples) has a linear-quadratic regulator and a geometric controller on SE(3)."""
+
+ESTIMATOR = """\
+Named in a scene, or given to `lapwing.fly(scene, estimator=MyEstimator)`."""
+
 SECTION = re.compile(r"^(Args|Returns|Raises|Attributes|Yields):$")
 FUNCTIONS = ("load", "fly", "read", "campaign", "normal", "uniform", "choice")
 CLASSES = ("Flight", "Simulator", "Observation", "Scene", "SceneError", "LockStepError")
@@ -56,8 +63,8 @@ def api() -> str:
         "Functions": [_function(f"lapwing.{name}", getattr(lapwing, name)) for name in FUNCTIONS],
         "Classes": [*(_class(f"lapwing.{name}", getattr(lapwing, name), SHOWN.get(name)) for name in CLASSES)],
         "Topics of a flight": [_class("TopicView", TopicView, VIEW), TOPICS_HEAD, _topics()],
-        "Your own controller": [_prose(inspect.getdoc(controllers)), *_tuples(controllers)],
-        "Your own estimator": [_prose(inspect.getdoc(estimators)), *map(_fields_of, READINGS)],
+        "Your own controller": [CONTROLLER, _prose(inspect.getdoc(controllers)), *_tuples(controllers)],
+        "Your own estimator": [ESTIMATOR, _prose(inspect.getdoc(estimators)), *map(_fields_of, READINGS)],
     }
     contents = "\n".join(f"- [{title}](#{title.lower().replace(' ', '-')})" for title in chapters)
     body = "\n\n".join(f"## {title}\n\n" + "\n\n".join(parts) for title, parts in chapters.items())
@@ -100,7 +107,8 @@ def _type(hint: Any) -> str:
 def _signature(name: str, function: Any, method: bool) -> str:
     signature = inspect.signature(function)
     parameters = [p for k, p in enumerate(signature.parameters.values()) if not (method and k == 0)]
-    texts, starred = [], False
+    texts: list[str] = []
+    starred = False
     for p in parameters:
         if p.kind is p.KEYWORD_ONLY and not starred:
             texts, starred = [*texts, "*"], True

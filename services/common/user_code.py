@@ -132,7 +132,7 @@ def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
         return user_module.load(module, texts)
     except SyntaxError as error:
         raise KeyedError(key, f"{module}.py, line {error.lineno}: {error.msg}") from error
-    except Exception as error:
+    except user_module.FAULTS as error:
         raise KeyedError(key, f"{module}: {type(error).__name__}: {error}") from error
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 from numba.core.errors import NumbaError
 
-from cosim.user_module import blame
+from cosim.user_module import FAULTS, blame
 from dynamics.errors import KeyedError
 from services.autopilot.custom.demand import demand
 from services.autopilot.law import Airframe
@@ -86,7 +86,7 @@ def _try(key: str, name: str, module: ModuleType, owner: Any, step: Callable[[],
         raise KeyedError(key, f"{name} has no step", "the method `step`")
     try:
         step()
-    except Exception as error:
+    except FAULTS as error:
         raise KeyedError(key, f"{name}: {_told(error, module)}") from error
 
 
@@ -97,7 +97,7 @@ def _rate(key: str, name: str, p: Any) -> float:
     return float(rate)
 
 
-def _told(error: Exception, module: ModuleType) -> str:
+def _told(error: BaseException, module: ModuleType) -> str:
     if isinstance(error, NumbaError):
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         return f"cannot be compiled: {lines[1] if len(lines) > 1 else lines[0]}"
@@ -121,7 +121,7 @@ def constructor(
     def construct() -> Any:
         try:
             return cls(vehicle, **options) if cls else copy.deepcopy(found)
-        except Exception as error:
+        except FAULTS as error:
             raise _refused(key, error, module) from error
 
     return construct
@@ -131,7 +131,7 @@ def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Map
     """Parameters and first state of a compiled controller; KeyedError where they cannot be made."""
     try:
         p, s = found(vehicle, **options)
-    except Exception as error:
+    except FAULTS as error:
         raise _refused(CONTROLLER, error, module) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
         expected = "a NamedTuple of its own module, which has `step` too"
@@ -139,7 +139,7 @@ def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Map
     return p, s
 
 
-def _refused(key: str, error: Exception, module: ModuleType) -> KeyedError:
+def _refused(key: str, error: BaseException, module: ModuleType) -> KeyedError:
     """Options that do not fit, or whatever else a constructor complains of."""
     options = isinstance(error, TypeError) and "argument" in str(error)
     return KeyedError(f"{key}_options" if options else key, blame(error, module))
