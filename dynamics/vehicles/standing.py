@@ -145,9 +145,8 @@ def _anchors(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Any, ...] | 
             continue
         if math.hypot(nx, ny) > e.static * nz:
             return None
-        pull = (
-            _press(e, depth) / e.tangential_stiffness
-        )  # straight up = press along the normal and -n_xy press across it
+        # straight up is: press along the normal, and across it what has -n_x press, -n_y press along x and y
+        pull = _press(e, depth) / e.tangential_stiffness
         found.append((position[0] + arm[0] - pull * nx, position[1] + arm[1] - pull * ny, STICKING, 0.0))
     return tuple(found)
 
