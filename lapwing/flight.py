@@ -4,21 +4,34 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from cosim.graph import pages_of
 from cosim.log import LogWriter
 from cosim.provenance import attachments, metadata
 from cosim.recording import Recording
-from messages.topics import TOPICS
 from studies import flight as studied
+from studies.flight import topic_of
 from studies.report import write
+from studies.report.picture import drawn
+from studies.report.style import DPI, styled
 
 
 class Flight(studied.Flight):
-    """What was said in a flight, topic by topic, and what that comes to; see `studies.flight.Flight`."""
+    """What was said in a flight, topic by topic, and what that comes to.
+
+    `flight.truth.position` is an array by time, shape (n, 3) [m] in the world frame, `flight.truth.times` its times
+    [s]; `flight.topic("gps/fix")` is any topic.
+
+    Attributes:
+        vehicle: its name.
+        failure: why the flight ended before its time: a state that is not sound, an error in a user's controller; ""
+            where it did not, or where a log does not say.
+        origin: where it comes from: a log or a set-up.
+    """
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight as an MCAP log; its path.
+        """Write the flight as an MCAP log, which Foxglove, PlotJuggler and `lapwing` open; its path.
 
         Raises:
             ValueError: the log cannot be written.
@@ -30,10 +43,9 @@ class Flight(studied.Flight):
             except OSError as fault:
                 raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
             return target
-        setup, known = self.setup, {topic.key(self.vehicle): topic for topic in TOPICS}
-        said = []
+        setup, said = self.setup, []
         for name in self.topics:
-            topic = known.get(f"/{self.vehicle}/{name}") or known[f"/{name}"]
+            topic = topic_of(name)
             said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
         pages = pages_of(said)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
@@ -42,10 +54,37 @@ class Flight(studied.Flight):
         return target
 
     def report(self, path: str | Path | None = None) -> Path:
-        """Write the report, an HTML page; its path, by default beside the log.
+        """Write the report, an HTML page with all plots.
+
+        Args:
+            path: of the page; by default beside the log, or SCENE.html here for a flight in memory.
+
+        Returns:
+            The page's path.
 
         Raises:
             ValueError: it cannot be written.
         """
         source = Path(self.origin.source)
         return write(self, Path(path) if path else source.with_suffix(".html"))
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The displacements over time beside their references, and the path in space.
+
+        Args:
+            path: where to write the picture, too: .png, .svg or .pdf.
+
+        Returns:
+            The matplotlib figure; a notebook shows it.
+
+        Raises:
+            ValueError: the picture cannot be written.
+        """
+        with styled():
+            figure = drawn(self)
+            if path is not None:
+                try:
+                    figure.savefig(path, dpi=DPI)
+                except OSError as fault:
+                    raise ValueError(f"{path}: cannot be written: {fault.strerror or fault}") from None
+        return figure

@@ -38,12 +38,12 @@ class TopicView:
 
     @property
     def position(self) -> np.ndarray:
-        """The field `position`, or that of the pose [m]."""
+        """The field `position`, or that of the pose [m], world, shape (n, 3)."""
         return self._of_pose("position", slice(0, 3))
 
     @property
     def orientation(self) -> np.ndarray:
-        """The field `orientation`, or that of the pose: unit quaternions x, y, z, w."""
+        """The field `orientation`, or that of the pose: unit quaternions x, y, z, w, shape (n, 4)."""
         return self._of_pose("orientation", slice(3, 7))
 
     @cached_property

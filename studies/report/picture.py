@@ -14,18 +14,23 @@ from studies.report.plots import displacements, path
 from studies.report.style import DPI, WIDTH, styled
 
 
+def drawn(flight: Flight) -> Figure:
+    """The picture, within the report's style."""
+    figure = Figure(figsize=(1.15 * WIDTH, 4.6), layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.35, 1.0))
+    axes = np.array([[figure.add_subplot(grid[row, 0])] for row in range(3)])
+    for axis in axes[:-1, 0]:
+        axis.tick_params(labelbottom=False)
+    displacements.on_axes(axes, flight)
+    axes[-1, 0].set_xlabel("time [s]")
+    path.space(figure.add_subplot(grid[:, 1], projection="3d"), flight)
+    return figure
+
+
 def draw(flight: Flight, target: Path) -> None:
     """Write the picture as PNG."""
     with styled():
-        figure = Figure(figsize=(1.15 * WIDTH, 4.6), layout="constrained")
-        grid = figure.add_gridspec(3, 2, width_ratios=(1.35, 1.0))
-        axes = np.array([[figure.add_subplot(grid[row, 0])] for row in range(3)])
-        for axis in axes[:-1, 0]:
-            axis.tick_params(labelbottom=False)
-        displacements.on_axes(axes, flight)
-        axes[-1, 0].set_xlabel("time [s]")
-        path.space(figure.add_subplot(grid[:, 1], projection="3d"), flight)
-        figure.savefig(target, dpi=DPI, metadata={"Software": None})
+        drawn(flight).savefig(target, dpi=DPI, metadata={"Software": None})
 
 
 if __name__ == "__main__":
