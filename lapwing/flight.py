@@ -41,11 +41,16 @@ class Flight(studied.Flight):
             Recording(writer, setup).write(pages, last)
         return target
 
-    def report(self, path: str | Path | None = None) -> Path:
-        """Write the report, an HTML page; its path, by default beside the log.
+    def report(self, path: str | Path | None = None, beside: studied.Flight | None = None) -> Path:
+        """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png); its path.
+
+        Args:
+            path: of the report, by default an .html beside the log.
+            beside: another flight, laid over this one in every plot.
 
         Raises:
-            ValueError: it cannot be written.
+            ValueError: it cannot be written, or the name has another ending.
         """
         source = Path(self.origin.source)
-        return write(self, Path(path) if path else source.with_suffix(".html"))
+        flights = [self] if beside is None else [self, beside]
+        return write(flights, Path(path) if path else source.with_suffix(".html"))
