@@ -1,6 +1,7 @@
 """Plots in a browser: the figures of plotly.js as JSON. The library's script is all that is taken of its package."""
 
 import json
+import math
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ PIXELS = 100  # an inch on the page
 _GAP_X, _GAP_Y = 78.0, 26.0  # [pixel] between panels, for the labels of the right one and the title of the lower one
 _GAP_X_LABEL = 30.0  # [pixel] more below a panel that names its own x
 _PAGE = 900.0  # [pixel] typical width of the panels together
+_LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
 _MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
 _FONT = {"family": "system-ui, sans-serif", "size": 12, "color": "#333"}
 _GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
@@ -92,7 +94,14 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
         y |= {"scaleanchor": f"x{number}", "scaleratio": 1}
         x["constrain"] = y["constrain"] = "domain" if panel.x_range else "range"
     if any(isinstance(mark, Stretch) for mark in panel.marks):
-        y |= {"autorange": "reversed", "type": "category", "ticks": "", "showgrid": False, "fixedrange": True}
+        y |= {
+            "autorange": "reversed",
+            "type": "category",
+            "ticks": "",
+            "showgrid": False,
+            "fixedrange": True,
+            "automargin": True,
+        }
     if panel.timed:
         if timed:
             x["matches"] = timed[0].replace("axis", "")
@@ -159,8 +168,9 @@ def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
 
 def _top(plot: Plot) -> int:
     """Room [pixel] above the panels: for a legend, and for titles and names of phases."""
-    named = any(getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks)
-    return (26 if named else 6) + (18 if plot.phases or any(panel.title for panel in plot.panels) else 0)
+    names = {getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks} - {""}
+    lines = math.ceil(sum(_LETTER * len(name) + _SYMBOL for name in names) / _PAGE)
+    return 6 + 22 * lines + (18 if plot.phases or any(panel.title for panel in plot.panels) else 0)
 
 
 def _share(parts: tuple[float, ...], gap: float, first: int, count: int) -> list[float]:

@@ -5,8 +5,10 @@ import numpy as np
 from studies.report.plot import Band, Mark, Panel, Plot, Stretch
 from studies.report.style import BOUND, COLOURS, FLOWN
 
-# Of the second flight, by the colour of the first; what is not here keeps its colour and is dotted all the same.
-SECOND = {FLOWN: BOUND, BOUND: "#F0A070", **dict(zip(COLOURS[1:4], ("#7A5200", "#66C2A5", "#7B3F61"), strict=True))}
+# Colours of the first and of the second flight, by those of one alone; what is not here keeps its colour.
+FIRST = {BOUND: FLOWN}
+SECOND = {FLOWN: BOUND, **dict(zip(COLOURS[1:4], ("#7A5200", "#66C2A5", "#7B3F61"), strict=True))}
+LANE = 0.32  # [inch] of a timeline
 
 
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
@@ -26,9 +28,8 @@ def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
         caption += f" Phases are those of {labels[0]}."
     if others:
         caption += f" Only in {labels[1]}, and not shown: {', '.join(p.y_label for p in others.values())}."
-    height = max(first.height, second.height)
-    if any(isinstance(mark, Stretch) for panel in panels for mark in panel.marks):  # a lane for each flight
-        height = first.height + second.height - 1.0
+    added = sum(len(_lanes(panel)) for panel in panels) - sum(len(_lanes(panel)) for panel in first.panels)
+    height = max(first.height, second.height) + LANE * added
     return first._replace(panels=tuple(panels), span=span, caption=caption, height=height)
 
 
@@ -37,14 +38,16 @@ def _key(panel: Panel) -> tuple:
 
 
 def _both(panel: Panel, other: Panel, labels: tuple[str, str]) -> Panel:
+    ours, others = _lanes(panel), _lanes(other)
     shared = [mark for mark in other.marks if any(_same(mark, own) for own in panel.marks)]
-    mine = [m if any(_same(m, s) for s in shared) else _named(m, labels[0]) for m in panel.marks]
-    theirs = [_recoloured(_named(m, labels[1])) for m in other.marks if not any(m is s for s in shared)]
+    shared = [m for m in shared if not isinstance(m, Stretch) or ours[m.lane] == others[m.lane]]
+    mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid") for m in panel.marks]
+    theirs = [_of(m, labels[1], SECOND, "dot") for m in other.marks if not any(m is s for s in shared)]
     ranges = [p.y_range for p in (panel, other) if p.y_range]
     y_range = (min(low for low, _ in ranges), max(high for _, high in ranges)) if len(ranges) == 2 else None
     title, note = (
-        a if a == b else "; ".join(f"{label}: {text}" for label, text in zip(labels, (a, b), strict=True) if text)
-        for a, b in ((panel.title, other.title), (panel.note, other.note))
+        a if a == b else between.join(f"{label}: {text}" for label, text in zip(labels, (a, b), strict=True) if text)
+        for a, b, between in ((panel.title, other.title, "; "), (panel.note, other.note, "\n"))
     )
     return panel._replace(marks=(*mine, *theirs), y_range=y_range, title=title, note=note)
 
@@ -57,12 +60,19 @@ def _same(one: Mark, other: Mark) -> bool:
     )
 
 
-def _named(mark: Mark, label: str) -> Mark:
+def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
+    """The bars of each lane of a timeline."""
+    found: dict[str, list[Stretch]] = {}
+    for mark in panel.marks:
+        if isinstance(mark, Stretch):
+            found.setdefault(mark.lane, []).append(mark)
+    return found
+
+
+def _of(mark: Mark, label: str, colours: dict[str, str], dash: str) -> Mark:
+    """The mark with its flight's name and looks; whose lines are dashed stay so."""
     if isinstance(mark, Stretch):
         return mark._replace(lane=f"{mark.lane}, {label}")
-    return mark._replace(name=f"{mark.name}, {label}" if mark.name else label)
-
-
-def _recoloured(mark: Mark) -> Mark:
-    mark = mark._replace(colour=SECOND.get(mark.colour, mark.colour))
-    return mark if isinstance(mark, (Stretch, Band)) or mark.dash != "solid" else mark._replace(dash="dot")
+    mark = mark._replace(name=f"{mark.name}, {label}" if mark.name else label)
+    mark = mark._replace(colour=colours.get(mark.colour, mark.colour))
+    return mark if isinstance(mark, Band) or mark.dash != "solid" else mark._replace(dash=dash)

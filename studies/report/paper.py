@@ -69,28 +69,33 @@ def figure(plot: Plot) -> Figure:
     """The plot as a figure of `WIDTH`; to be called, and saved, within `styled`."""
     made = Figure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
     grid = made.add_gridspec(len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths)
-    shown: set[str] = set()
+    named: dict[str, Any] = {}
     first: Axes | None = None
     for index, panel in enumerate(plot.panels):
         place = grid[panel.row : panel.row + panel.rows, panel.column : panel.column + panel.columns]
         if panel.z_label:
-            _space(made.add_subplot(place, projection="3d"), panel)
-            continue
-        axes = made.add_subplot(place, sharex=first if panel.timed else None)
-        _flat(axes, panel, shown)
-        if panel.timed:
+            axes = made.add_subplot(place, projection="3d")
+            _space(axes, panel)
+        else:
+            axes = made.add_subplot(place, sharex=first if panel.timed else None)
+            _flat(axes, plot, panel)
+        handles, names = axes.get_legend_handles_labels()
+        named = dict(zip(names, handles, strict=True)) | named
+        if panel.timed and not panel.z_label:
             first = first or axes
             bottom = index in lowest(plot)
             axes.tick_params(labelbottom=bottom)
             axes.set_xlabel(f"time [{plot.unit}]" if bottom else "")
             _over_time(axes, plot, panel)
+    if named:
+        made.legend(named.values(), named.keys(), loc="outside upper left", ncols=min(len(named), 6), fontsize=8.5)
     return made
 
 
-def _flat(axes: Axes, panel: Panel, shown: set[str]) -> None:
+def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
     lanes = list(dict.fromkeys(m.lane for m in panel.marks if isinstance(m, Stretch)))
     for mark in panel.marks:
-        _draw(axes, mark, panel, lanes)
+        _draw(axes, mark, plot, panel, lanes)
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
     if panel.log_x:
         axes.set_xscale("log")
@@ -110,13 +115,9 @@ def _flat(axes: Axes, panel: Panel, shown: set[str]) -> None:
     if panel.note:
         looks: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "color": "#555555"}
         axes.text(0.02, 0.97, panel.note, transform=axes.transAxes, **looks)
-    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    if handles.keys() - shown:  # what another panel of the plot explains needs no second legend
-        axes.legend(handles.values(), handles.keys(), loc="upper right", ncols=min(len(handles), 4), fontsize=8.5)
-        shown |= handles.keys()
 
 
-def _draw(axes: Axes, mark: Mark, panel: Panel, lanes: list[str]) -> None:
+def _draw(axes: Axes, mark: Mark, plot: Plot, panel: Panel, lanes: list[str]) -> None:
     name = getattr(mark, "name", "") or None
     if isinstance(mark, Level):
         axes.axhline(mark.y, color=mark.colour, linewidth=mark.width, linestyle=_DASHES[mark.dash], label=name)
@@ -127,7 +128,8 @@ def _draw(axes: Axes, mark: Mark, panel: Panel, lanes: list[str]) -> None:
     elif isinstance(mark, Stretch):
         lane = lanes.index(mark.lane)
         axes.broken_barh([(mark.start, mark.end - mark.start)], (lane - 0.4, 0.8), color=mark.colour, alpha=0.6)
-        axes.text((mark.start + mark.end) / 2, lane, mark.text, ha="center", va="center", fontsize=8, clip_on=True)
+        if _fits(mark.text, mark.end - mark.start, plot, panel):
+            axes.text((mark.start + mark.end) / 2, lane, mark.text, ha="center", va="center", fontsize=8)
     else:
         line = drawn(mark, panel.timed)
         if line.fill:
@@ -145,7 +147,6 @@ def _space(axes: Any, panel: Panel) -> None:
     axes.zaxis.set_rotate_label(False)  # it would stand on its head
     axes.set_zlabel(panel.z_label, rotation=90)
     axes.view_init(elev=24, azim=-128)
-    axes.legend(loc="upper left")
 
 
 def _looks(line: Line) -> dict[str, Any]:
@@ -163,12 +164,17 @@ def _looks(line: Line) -> dict[str, Any]:
 def _over_time(axes: Axes, plot: Plot, panel: Panel) -> None:
     """Shade every other phase, and name the phases over the panels of the first row where there is room."""
     span = plot.span or axes.get_xlim()
-    room = 115 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second of time
     for index, (name, start, end) in enumerate(plot.phases):
         if index % 2:
             axes.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
-        if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
+        if panel.row == 0 and not panel.title and _fits(name, end - start, plot, panel):
             looks: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 8, "color": "#555555"}
             axes.text((start + end) / 2, 1.02, name, transform=axes.get_xaxis_transform(), **looks)
     axes.set_xlim(span)
     axes.grid(visible=False, axis="x")
+
+
+def _fits(text: str, lasts: float, plot: Plot, panel: Panel) -> bool:
+    """Whether there is room for a text over a stretch of time: about 115 letters a figure."""
+    start, end = plot.span or (0.0, lasts)
+    return len(text) <= 115 * panel.columns / len(plot.widths) * lasts / (end - start)

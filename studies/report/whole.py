@@ -3,7 +3,7 @@
 import numpy as np
 
 from studies.flight import AXES, Flight
-from studies.report.plot import Level, Line, Panel, Plot, reference
+from studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
 DEGREES = 180.0 / np.pi  # of 1 rad
 
@@ -38,7 +38,12 @@ def three_axes(flight: Flight, first: int, flown: np.ndarray, unit: str, scale: 
         unit: of the plots.
         scale: of 1 m or 1 rad in `unit`.
         caption: of the plot.
+
+    Raises:
+        NotRecordedError: nothing to be seen, they stay as they are.
     """
+    if len(flown) > 1 and not np.ptp(flown, axis=0).any():
+        raise NotRecordedError("it never changes")
     t, n, panels = flight.truth.times, len(flight.reference), []
     followed = bool(flight.armed.any())
     for row, name in enumerate(AXES[first : first + 3]):
@@ -49,8 +54,8 @@ def three_axes(flight: Flight, first: int, flown: np.ndarray, unit: str, scale: 
         if followed:
             rmse = scale * flight.rmse[name]
             error = Line(t[:n][flight.armed], scale * flight.errors[name], width=1.0)
-            bounds = Level(rmse, "± root mean square"), Level(-rmse, "± root mean square")
-            said = f"root mean square {rmse:.4f} {unit}"
+            bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
+            said = f"RMSE {rmse:.4f} {unit}"
             panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=said, row=row, column=1))
     if followed:
         caption += " On the right reference minus truth while the motors are armed."

@@ -5,14 +5,13 @@ from studies.report.plot import Plot
 from studies.report.whole import DEGREES, three_axes
 
 ORDER = 20
-TITLE = "Attitude and its error"
+TITLE = "Attitude"
 NEEDS = ("truth",)
 
 
 def draw(flight: Flight) -> Plot:
     """One row for each angle."""
-    said = (
-        "Attitude as roll, pitch and yaw. The reference of roll and pitch is what the inner loops follow; "
-        "that of yaw is the setpoint."
-    )
+    said = "Attitude as roll, pitch and yaw."
+    if len(flight.reference):
+        said += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."
     return three_axes(flight, 3, DEGREES * flight.truth.attitude, "°", DEGREES, said)

@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.flight import Flight
 from studies.report.plot import Line, Panel, Plot, reference
-from studies.report.style import COLOURS
+from studies.report.style import BOUND, COLOURS
 from studies.report.whole import over
 
 ORDER = 35
@@ -26,7 +26,7 @@ def draw(flight: Flight) -> Plot:
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
     thrust = flight.topic("lift").thrust
     panels = (
-        Panel((Line(t, np.where(error > 0.0, error, np.nan)),), "load error [m]", log_y=True),
+        Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
         Panel(_each(t, angle), "link from vertical [°]", row=1),
         Panel(_each(flight.times("lift"), thrust), "thrust [N]", row=2),
         side(places, wanted),
@@ -40,7 +40,10 @@ def draw(flight: Flight) -> Plot:
 
 def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
     """The load's path and the links seen along y."""
-    marks = [Line(places[:, 0, 0], places[:, 0, 2], "load"), reference(wanted[:, 0], wanted[:, 2], name="wanted path")]
+    marks = [
+        Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
+        reference(wanted[:, 0], wanted[:, 2], name="wanted path"),
+    ]
     some = places[np.linspace(0, len(places) - 1, INSTANTS).astype(int)]
     for i in range(places.shape[1] - 1):
         quad, colour = some[:, 1 + i], COLOURS[i % len(COLOURS)]

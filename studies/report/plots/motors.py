@@ -58,17 +58,17 @@ def limits(flight: Flight) -> tuple[tuple[Level | Line, ...], str]:
         return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
     marks = (*_stretches(t, low, 0.0), *_stretches(t, high, highest))
     return (*levels, *marks), (
-        f"Thick: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for {lasted:.2f} s, "
+        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for {lasted:.2f} s, "
         f"{100.0 * lasted / max(step[flying[:, 0]].sum(), 1e-9):.2g} % of that time."
     )
 
 
 def _stretches(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
-    """Thick pieces along the limit, at most one mark: start, end and a gap for each stretch of any motor."""
+    """One line along the limit, at most: start, end and a gap for each stretch in which any motor is there."""
     any_motor = np.concatenate([[False], at_limit.any(axis=1), [False]])
     edges = np.flatnonzero(any_motor[1:] != any_motor[:-1])
     if not len(edges):
         return ()
     starts, ends = t[edges[::2]], t[(edges[1::2]).clip(max=len(t) - 1)]
     x = np.column_stack([starts, ends, np.full(len(starts), np.nan)]).ravel()
-    return (Line(x, np.where(np.isnan(x), np.nan, limit), "at a limit", BOUND, 5.0),)
+    return (Line(x, np.where(np.isnan(x), np.nan, limit), "at a limit", BOUND, 4.0, marker="square", size=6.0),)

@@ -1,7 +1,9 @@
 """The path in space, and seen from above."""
 
+import numpy as np
+
 from studies.flight import Flight
-from studies.report.plot import Line, Panel, Plot, reference
+from studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
 
 ORDER = 40
 TITLE = "Path"
@@ -10,7 +12,10 @@ NEEDS = ("truth",)
 
 def draw(flight: Flight) -> Plot:
     """The path in 3D on the left, its plan view on the right."""
-    said = "The flown path beside the reference, in space (left) and from above, north up (right)."
+    if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
+        raise NotRecordedError("it never leaves its place")
+    beside = " beside the reference" if len(flight.reference) else ""
+    said = f"The flown path{beside}, in space (left) and from above, north up (right)."
     return Plot((space(flight), plan(flight)), said, 4.9, (1.0,), (1.0, 1.0))
 
 

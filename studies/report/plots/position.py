@@ -5,7 +5,7 @@ from studies.report.plot import Plot
 from studies.report.whole import three_axes
 
 ORDER = 10
-TITLE = "Position and its error"
+TITLE = "Position"
 NEEDS = ("truth",)
 
 
