@@ -1,6 +1,7 @@
 """The report against a flight made by formula: its figures are known without the code under test."""
 
 import base64
+import importlib
 import json
 import math
 import shutil
@@ -16,7 +17,7 @@ from cosim.log import LogWriter
 from cosim.provenance import attachments as attachments_of
 from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
 from studies.flight import AXES, Flight
-from studies.report import picture, plots, write
+from studies.report import browser, picture, plots, write
 from studies.report.overlay import overlay
 from studies.report.plots import estimator, motors, position, propulsion
 from studies.report.style import POINTS
@@ -223,10 +224,21 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout.strip() == b"[]"
 
 
-@pytest.mark.parametrize(("ending", "start"), [(".pdf", b"%PDF"), (".png", b"\x89PNG\r\n\x1a\n")])
-def test_the_same_plots_on_paper(log, tmp_path, ending, start):
-    path = write(Flight.read(log), tmp_path / f"circle{ending}")
-    assert path.read_bytes().startswith(start)
+def test_the_same_plots_on_paper(log, page, tmp_path):
+    pdf = write(Flight.read(log), tmp_path / "circle.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF")
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots)
+
+
+def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monkeypatch):
+    script = tmp_path / "plotly" / "package_data" / "plotly.min.js"
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    with pytest.raises(ValueError, match="pip install plotly"):
+        browser.script()
+    script.parent.mkdir(parents=True)
+    script.write_text("Plotly = {}")
+    importlib.invalidate_caches()
+    assert browser.script() == "Plotly = {}"
 
 
 def test_another_ending_is_refused(log, tmp_path):
