@@ -107,7 +107,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
             x["matches"] = timed[0].replace("axis", "")
         x |= {"showgrid": False, "zeroline": False, "showticklabels": bottom, "ticks": "outside" if bottom else ""}
         x["title"]["text"] = f"time [{plot.unit}]" if bottom else ""
-        x["unifiedhovertitle"] = {"text": f"%{{x}} {plot.unit}"}
+        x["unifiedhovertitle"] = {"text": f"%{{x:.6~g}} {plot.unit}"}
         if plot.span:
             x["range"] = list(plot.span)
         timed.append(f"xaxis{number}")
