@@ -1,10 +1,12 @@
 """How a flight ended, and what flew, for the head of the page."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from studies.flight import Flight
 
 LONG = 60  # letters of an effect's keys that are still listed
+MANY = 12  # keys in which two scenes differ that are listed
 
 
 class Verdict(NamedTuple):
@@ -26,7 +28,7 @@ def verdict(flight: Flight) -> Verdict:
     if flight.landed:
         return Verdict("good", f"Landed: upright, at rest and on the ground at {lasted}")
     if flight.finished:
-        return Verdict("bad", f"Not landed: the autopilot ended the mission at {lasted}, but not upright and at rest")
+        return Verdict("bad", f"Not landed: the mission is over at {lasted}, the vehicle not upright or not at rest")
     return Verdict("bad", f"Not landed: the mission was not over at {lasted}")
 
 
@@ -36,11 +38,12 @@ def facts(flight: Flight) -> dict[str, str]:
     t = flight.truth.times
     vehicle, autopilot = scene.get("vehicle", {}), scene.get("autopilot", {})
     kind = vehicle.get("airframe") or vehicle.get("model", "")
+    mass = scene.get("airframe", {}).get("mass", {}).get("total")
     steered = "autopilot" in flight.origin.scene and flight.has("actuators")
     found = {
         "scene": said.get("scene", ""),
         "log": flight.origin.source if flight.origin.recorded else "",
-        "vehicle": f"{flight.vehicle}, {kind}" if kind else flight.vehicle,
+        "vehicle": ", ".join(filter(None, (flight.vehicle, kind, f"{mass:g} kg" if mass else ""))),
         "effects": "; ".join(_with_keys(name, keys) for name, keys in scene.get("effects", {}).items()),
         "sensors": "; ".join(_with_keys(name, keys) for name, keys in scene.get("sensors", {}).items()),
         "estimator": str(autopilot.get("estimator", "")) if steered else "",
@@ -56,6 +59,25 @@ def facts(flight: Flight) -> dict[str, str]:
         "digest": flight.digest or "none: the log has no end",
     }
     return {name: value for name, value in found.items() if value}
+
+
+def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """The keys of two scenes whose values differ, and both values; of many the first, and how many more."""
+    first, second = dict(_leaves(one)), dict(_leaves(other))
+    keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
+    found = {key: (_short(first.get(key, "")), _short(second.get(key, ""))) for key in keys[:MANY]}
+    if len(keys) > MANY:
+        found[f"{len(keys) - MANY} more"] = ("", "")
+    return found
+
+
+def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted key and value of all that is no table; an empty table, such as an effect without keys, is "yes"."""
+    for key, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", "yes" if isinstance(value, dict) else value
 
 
 def _gains(scene: dict[str, Any]) -> str:

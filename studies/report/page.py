@@ -8,7 +8,7 @@ from jinja2 import Environment, FileSystemLoader
 
 from studies.flight import AXES, Flight
 from studies.report.browser import script
-from studies.report.outcome import facts, verdict
+from studies.report.outcome import differences, facts, verdict
 from studies.report.sections import Section, labels, sections
 from studies.report.whole import DEGREES
 
@@ -38,6 +38,7 @@ def flight_page(flights: Sequence[Flight]) -> str:
         labels=names if len(flights) > 1 else (),
         verdicts=[verdict(flight) for flight in flights],
         facts={key: [one.get(key, "") for one in told] for key in dict.fromkeys(k for one in told for k in one)},
+        differences=differences(*scenes) if len(scenes) == 2 else {},
         accuracy=accuracy(flights, published.get("rmse", {})),
         heads=heads + ([published.get("source", "published")] if published.get("rmse") else []),
         sections=sections(flights),

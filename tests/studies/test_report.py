@@ -18,6 +18,7 @@ from cosim.provenance import attachments as attachments_of
 from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
 from studies.flight import AXES, Flight
 from studies.report import browser, picture, plots, write
+from studies.report.outcome import MANY, differences
 from studies.report.overlay import overlay
 from studies.report.plots import estimator, motors, position, propulsion
 from studies.report.style import POINTS
@@ -262,6 +263,15 @@ def test_what_differs_in_two_flights_has_their_names(log, tmp_path):
     assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
     assert both.panels[1].title == "a: RMSE 0.1000 m; b: RMSE 0.9000 m"
     assert [mark.name for mark in both.panels[2].marks] == ["flown", "reference"]
+
+
+def test_the_keys_in_which_two_scenes_differ():
+    one = {"effects": {"gravity": {}, "wind": {"sigma": 1.0}}, "run": {"seed": 1}}
+    other = {"effects": {"wind": {"sigma": 2.0}}, "run": {"seed": 1}}
+    assert differences(one, other) == {"effects.gravity": ("yes", ""), "effects.wind.sigma": ("1", "2")}
+    many = differences({str(k): k for k in range(MANY + 3)}, {})
+    assert len(many) == MANY + 1
+    assert "3 more" in many
 
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
