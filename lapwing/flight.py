@@ -2,9 +2,9 @@
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from cosim.graph import pages_of
 from cosim.log import LogWriter
@@ -13,8 +13,10 @@ from cosim.recording import Recording
 from studies import flight as studied
 from studies.flight import topic_of
 from studies.report import write
-from studies.report.picture import drawn
-from studies.report.style import DPI, styled
+from studies.report.overview import overview
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Flight(studied.Flight):
@@ -53,22 +55,24 @@ class Flight(studied.Flight):
             Recording(writer, setup).write(pages, last)
         return target
 
-    def report(self, path: str | Path | None = None) -> Path:
-        """Write the report, an HTML page with all plots.
+    def report(self, path: str | Path | None = None, beside: studied.Flight | None = None) -> Path:
+        """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
 
         Args:
-            path: of the page; by default beside the log, or SCENE.html here for a flight in memory.
+            path: of the report; by default an .html beside the log, or SCENE.html here for a flight in memory.
+            beside: another flight, laid over this one in every plot.
 
         Returns:
-            The page's path.
+            The report's path.
 
         Raises:
-            ValueError: it cannot be written.
+            ValueError: it cannot be written, or the name has another ending.
         """
         source = Path(self.origin.source)
-        return write(self, Path(path) if path else source.with_suffix(".html"))
+        flights = [self] if beside is None else [self, beside]
+        return write(flights, Path(path) if path else source.with_suffix(".html"))
 
-    def plot(self, path: str | Path | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None) -> "Figure":
         """The displacements over time beside their references, and the path in space.
 
         Args:
@@ -80,11 +84,13 @@ class Flight(studied.Flight):
         Raises:
             ValueError: the picture cannot be written.
         """
+        from studies.report.paper import figure, styled  # matplotlib takes half a second to import
+
         with styled():
-            figure = drawn(self)
+            drawn = figure(overview(self))
             if path is not None:
                 try:
-                    figure.savefig(path, dpi=DPI)
+                    drawn.savefig(path)
                 except OSError as fault:
                     raise ValueError(f"{path}: cannot be written: {fault.strerror or fault}") from None
-        return figure
+        return drawn
