@@ -5,8 +5,8 @@ A bundle is the rows of the service's ports that are due at the tick, in the ord
 little-endian float64, nothing between them. A service that gives nothing at a tick sends none. An empty bundle says
 that there will be no other.
 
-A batch is the tick before which all messages have been handed over (int64), then pages: index in the topic table
-(uint16), number of messages and size of a payload (uint32 each), the ticks (int64 each), the payloads.
+A batch is the tick before which all messages have been handed over (int64), then pages: length of the topic's
+name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
 """
 
 import struct
@@ -19,7 +19,7 @@ from cosim.schedule import Port, due
 from cosim.wire import Page
 from dynamics.kernel import uncompiled
 from dynamics.rows import width
-from messages.topics import TOPICS
+from messages.topics import topic_named
 
 _PAGE = struct.Struct("<HII")
 _STOP = struct.Struct("<q")
@@ -69,7 +69,8 @@ def pack_batch(pages: Iterable[Page], stop: int) -> bytes:
     for page in pages:
         payloads = np.ascontiguousarray(page.payloads)
         size = payloads.nbytes // len(page.ticks)
-        parts += [_PAGE.pack(TOPICS.index(page.topic), len(page.ticks), size), page.ticks.tobytes(), payloads.tobytes()]
+        name = page.topic.name.encode()
+        parts += [_PAGE.pack(len(name), len(page.ticks), size), name, page.ticks.tobytes(), payloads.tobytes()]
     return b"".join(parts)
 
 
@@ -83,13 +84,15 @@ def unpack_batch(payload: bytes) -> tuple[int, list[Page]]:
         (stop,) = _STOP.unpack_from(payload)
         place, pages = _STOP.size, []
         while place < len(payload):
-            index, n, size = _PAGE.unpack_from(payload, place)
+            length, n, size = _PAGE.unpack_from(payload, place)
             place += _PAGE.size
+            topic = topic_named(payload[place : place + length].decode())
+            place += length
             ticks = np.frombuffer(payload, "<i8", n, place)
             place += 8 * n
             payloads = np.frombuffer(payload, np.uint8, n * size, place).reshape(n, size)
             place += n * size
-            pages.append(Page(TOPICS[index], ticks, payloads))
+            pages.append(Page(topic, ticks, payloads))
         return stop, pages
     except (struct.error, ValueError, IndexError) as error:
         raise BundleError(f"a batch of {len(payload)} bytes: {error}") from None

@@ -7,7 +7,7 @@ from cosim.log import LogWriter
 from cosim.setup import Setup
 from cosim.wire import Page
 from messages import WallTime, header
-from messages.topics import TOPICS, WALL_TIME, Topic
+from messages.topics import TOPICS, WALL_TIME, Topic, place
 
 WALL_PERIOD = 0.5  # [s] between two messages of wall time
 
@@ -18,7 +18,6 @@ class Recording:
     def __init__(self, writer: LogWriter, setup: Setup):
         """Into `writer`, the messages of the run `setup`."""
         self._writer, self._setup = writer, setup
-        self._index = {topic: i for i, topic in enumerate(TOPICS)}
         self._started = time.monotonic()
         self._next_wall = 0.0
         self.newest: dict[Topic, bytes] = {}
@@ -29,7 +28,7 @@ class Recording:
         interval = self._setup.interval_ns
         parts = []
         for page in pages:
-            order = page.ticks * len(TOPICS) + self._index[page.topic]
+            order = page.ticks * (len(TOPICS) + 1) + place(page.topic)
             name = page.topic.key(self._setup.vehicle)
             parts.append((name, page.topic.message, page.ticks * interval, page.payloads, order))
             self.newest[page.topic] = page.payloads[-1].tobytes()

@@ -94,6 +94,7 @@ def _imports(file: Path) -> list[str]:
     return sorted(found)
 
 
+FAULTS = (Exception, SystemExit)  # what a user's code may raise, and a run ends with one line
 _laid_down: set[str] = set()  # folders on `sys.path` with the texts of set-ups
 
 
@@ -114,7 +115,7 @@ def load(name: str, texts: Mapping[str, str]) -> ModuleType:
 def install(texts: Mapping[str, str]) -> None:
     """Let imports find the modules that a set-up carries; what was imported from other texts is forgotten."""
     plain = {n: text for n, text in texts.items() if "." not in n}
-    stale = [n for n in plain if n in sys.modules and _text(sys.modules[n]) not in (None, plain[n])]
+    stale = [n for n in plain if n in sys.modules and source(sys.modules[n]) not in (None, plain[n])]
     for n in plain if stale else ():
         sys.modules.pop(n, None)  # those that import a stale one are stale, too
     if stale:
@@ -130,7 +131,7 @@ def install(texts: Mapping[str, str]) -> None:
         importlib.invalidate_caches()
 
 
-def _text(module: ModuleType) -> str | None:
+def source(module: ModuleType) -> str | None:
     """Source of a module that has a file of its own; None where it is a package."""
     file = Path(getattr(module, "__file__", None) or "__init__.py")
     with suppress(OSError, UnicodeDecodeError):
@@ -155,7 +156,8 @@ def _lay_down(texts: Mapping[str, str]) -> str:
 
 def blame(error: BaseException, module: ModuleType) -> str:
     """What an exception says, with the last line of the module on its way."""
-    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == module.__file__]
-    where = f" ({Path(str(module.__file__)).name}, line {lines[-1]})" if lines else ""
+    file = getattr(module, "__file__", None)  # what is typed at a prompt has none
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""
     said = str(error).strip().partition("\n")[0]
     return f"{type(error).__name__}{': ' if said else ''}{said}{where}"

@@ -1,4 +1,4 @@
-"""Make a folder of installed packages small: drop tests, headers, build tools, foreign dialects, and symbols.
+"""Make a folder of installed packages small: drop tests, headers, what nobody imports, foreign dialects, symbols.
 
 Used by the Dockerfile:  python3 slim.py SITE_PACKAGES...
 """
@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
-BUILD_TOOLS = ("lxml",)  # pymavlink needs it to make dialects, not to speak them
+# pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read.
+NOT_IMPORTED = ("lxml", "narwhals")
+PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
 DIALECTS = {"__init__", "minimal", "standard", "common", "ardupilotmega", "all"}
 ELF64_LITTLE = b"\x7fELF\x02\x01"
 PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr
@@ -48,15 +50,29 @@ def remove(folder: Path) -> int:
     return saved
 
 
+def keep(folder: Path, file: Path) -> int:
+    """Remove all of a folder but one file. Returns the bytes saved."""
+    others = [path for path in folder.rglob("*") if path.is_file() and path != folder / file]
+    saved = sum(path.stat().st_size for path in others)
+    for path in others:
+        path.unlink()
+    for path in sorted((path for path in folder.rglob("*") if path.is_dir()), reverse=True):
+        if not any(path.iterdir()):
+            path.rmdir()
+    return saved
+
+
 def slim(packages: Path) -> int:
     """Slim one folder of packages. Returns the bytes saved."""
     saved = 0
     for folder in sorted(packages.rglob("tests"), reverse=True):
         if folder.is_dir():
             saved += remove(folder)
-    for folder in [packages / name for name in BUILD_TOOLS]:
+    for folder in [packages / name for name in NOT_IMPORTED]:
         if folder.is_dir():
             saved += remove(folder)
+    if (packages / "plotly").is_dir():
+        saved += keep(packages / "plotly", PLOTLY_SCRIPT)
     for path in [path for path in packages.rglob("*.*") if path.suffix in UNUSED]:
         saved += path.stat().st_size
         path.unlink()

@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,16 +10,30 @@ from cosim.graph import pages_of
 from cosim.log import LogWriter
 from cosim.provenance import attachments, metadata
 from cosim.recording import Recording
-from messages.topics import TOPICS
 from studies import flight as studied
+from studies.flight import topic_of
 from studies.report import write
+from studies.report.overview import overview
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Flight(studied.Flight):
-    """What was said in a flight, topic by topic, and what that comes to; see `studies.flight.Flight`."""
+    """What was said in a flight, topic by topic, and what that comes to.
+
+    `flight.truth.position` is an array by time, shape (n, 3) [m] in the world frame, `flight.truth.times` its times
+    [s]; `flight.topic("gps/fix")` is any topic.
+
+    Attributes:
+        vehicle: its name.
+        failure: why the flight ended before its time: a state that is not sound, an error in a user's controller; ""
+            where it did not, or where a log does not say.
+        origin: where it comes from: a log or a set-up.
+    """
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight as an MCAP log; its path.
+        """Write the flight as an MCAP log, which Foxglove, PlotJuggler and `lapwing` open; its path.
 
         Raises:
             ValueError: the log cannot be written.
@@ -30,10 +45,9 @@ class Flight(studied.Flight):
             except OSError as fault:
                 raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
             return target
-        setup, known = self.setup, {topic.key(self.vehicle): topic for topic in TOPICS}
-        said = []
+        setup, said = self.setup, []
         for name in self.topics:
-            topic = known.get(f"/{self.vehicle}/{name}") or known[f"/{name}"]
+            topic = topic_of(name)
             said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
         pages = pages_of(said)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
@@ -41,11 +55,42 @@ class Flight(studied.Flight):
             Recording(writer, setup).write(pages, last)
         return target
 
-    def report(self, path: str | Path | None = None) -> Path:
-        """Write the report, an HTML page; its path, by default beside the log.
+    def report(self, path: str | Path | None = None, beside: studied.Flight | None = None) -> Path:
+        """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
+
+        Args:
+            path: of the report; by default an .html beside the log, or SCENE.html here for a flight in memory.
+            beside: another flight, laid over this one in every plot.
+
+        Returns:
+            The report's path.
 
         Raises:
-            ValueError: it cannot be written.
+            ValueError: it cannot be written, or the name has another ending.
         """
         source = Path(self.origin.source)
-        return write(self, Path(path) if path else source.with_suffix(".html"))
+        flights = [self] if beside is None else [self, beside]
+        return write(flights, Path(path) if path else source.with_suffix(".html"))
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """The displacements over time beside their references, and the path in space.
+
+        Args:
+            path: where to write the picture, too: .png, .svg or .pdf.
+
+        Returns:
+            The matplotlib figure; a notebook shows it.
+
+        Raises:
+            ValueError: the picture cannot be written.
+        """
+        from studies.report.paper import figure, styled  # matplotlib takes half a second to import
+
+        with styled():
+            drawn = figure(overview(self))
+            if path is not None:
+                try:
+                    drawn.savefig(path)
+                except OSError as fault:
+                    raise ValueError(f"{path}: cannot be written: {fault.strerror or fault}") from None
+        return drawn

@@ -1,12 +1,17 @@
 """A vehicle that you step yourself, with motor voltages or with setpoints."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from cosim.graph import NEVER, Graph, Service
+from cosim.scene import Overrides, Scene, SceneError, Source
 from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
+from dynamics.rows import to_row, width
 from services.autopilot.core import NO_TRAJECTORY, ORDER, Order
 from services.common import ports
 from services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
@@ -19,7 +24,7 @@ KEEP = 64  # ticks that can be looked at
 class Observation(NamedTuple):
     """What is known after a step."""
 
-    time: float  # [s]
+    time: float  # [s] simulation time
     truth: TrueState  # SI, world ENU, body FLU
     sensors: dict[str, Any]  # the newest reading of each sensor, by its name
     estimate: StateEstimate | None  # of the autopilot; None where motor voltages are given, which need none
@@ -42,6 +47,18 @@ class Given:
         return NEVER
 
 
+def _sound(setpoint: Reference) -> Reference:
+    """A setpoint with numbers where they are expected; ValueError for anything else."""
+    try:
+        found = Reference(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
+        row = to_row(found)
+    except (TypeError, ValueError):
+        row = np.empty(0)
+    if not isinstance(setpoint, Reference) or len(row) != width(Reference()) or not np.isfinite(row).all():
+        raise ValueError(f"setpoint: expected a Reference of finite numbers, got {setpoint!r}")
+    return found
+
+
 class Simulator:
     """One vehicle of a scene, from tick to tick.
 
@@ -55,19 +72,18 @@ class Simulator:
     that the scene's autopilot follows.
     """
 
-    def __init__(self, scene: str | Path, overrides: Mapping[str, Any] | Sequence[str] = (), seed: int | None = None):
+    def __init__(self, scene: Scene | str | Path, overrides: Overrides = (), seed: int | None = None):
         """A vehicle at rest where the scene puts it.
 
         Args:
-            scene: path or name of a scene with an autopilot.
+            scene: path or name of a scene with an autopilot, or a loaded one.
             overrides: values by dotted key, or texts KEY=VALUE.
             seed: of all randomness; None: the scene's.
 
         Raises:
-            SceneError: the scene is not sound.
-            ValueError: nobody steers in it.
+            SceneError: the scene is not sound, or nobody steers in it.
         """
-        self._scene, self._overrides = scene, overrides
+        self._scene = load(scene, overrides)
         self._graph: Graph | None = None
         self._kind = ""
         self._set_up(seed)
@@ -90,16 +106,18 @@ class Simulator:
         """Go on for some ticks under one command.
 
         Args:
-            motor_voltages: [V] of each motor, in the order of the airframe.
-            setpoint: where the vehicle ought to be; exactly one of both.
-            ticks: how many; one is `setup.interval` seconds.
+            motor_voltages: [V] of each motor, in the order of the airframe; shape (4,) of a quadrotor.
+            setpoint: where the vehicle ought to be, a `lapwing.Reference`; exactly one of both.
+            ticks: how many, at least 1; one is `setup.interval` seconds.
 
         Raises:
-            ValueError: none or both are given, the other than before, or not a voltage for each motor.
+            ValueError: none or both are given, the other than before, other than a finite number for each.
             LockStepError: the state is no longer finite.
         """
         if (motor_voltages is None) == (setpoint is None):
             raise ValueError("step: expected motor_voltages or setpoint, and not both")
+        if not isinstance(ticks, int) or ticks < 1:
+            raise ValueError(f"step: expected ticks = 1, 2, ..., got {ticks!r}")
         kind = "setpoint" if motor_voltages is None else "motor_voltages"
         if self._graph is None:
             self._graph, self._kind = self._begin(kind), kind
@@ -107,23 +125,20 @@ class Simulator:
             raise ValueError(f"step: expected {self._kind} as before; reset() to go over to {kind}")
         graph = self._graph
         if setpoint is not None:
-            graph.put(ORDER, graph.tick, Order(False, setpoint, armed=True))
+            graph.put(ORDER, graph.tick, Order(False, _sound(setpoint), armed=True))
+        voltages = () if motor_voltages is None else self._voltages(motor_voltages)
         stop = min(graph.tick + ticks, self._setup.last_tick + 1)
         while graph.tick < stop and not graph.ended:
             if motor_voltages is not None:
-                self._command(graph, tuple(map(float, motor_voltages)))
+                self._command(graph, voltages)
             graph.advance(stop if motor_voltages is None else graph.tick + 1)
         return self._observe(graph)
 
     def _set_up(self, seed: int | None) -> None:
-        overrides = dict(self._overrides) if isinstance(self._overrides, Mapping) else list(self._overrides)
-        scene = load(self._scene, overrides)
-        if seed is not None:
-            more: Any = {"run.seed": seed} if isinstance(overrides, dict) else [f"run.seed={seed}"]
-            scene = load(self._scene, overrides | more if isinstance(overrides, dict) else [*overrides, *more])
+        scene = load(self._scene, () if seed is None else {"run.seed": seed})
         self._setup = resolve(scene)
         if "autopilot" not in self._setup.services:
-            raise ValueError(f"{scene.path}: nobody steers there; expected a scene with [autopilot]")
+            raise SceneError("autopilot", "nobody steers there", "a scene with [autopilot]", Source(scene.path))
 
     def _begin(self, kind: str) -> Graph:
         setup = self._setup
@@ -140,10 +155,18 @@ class Simulator:
             services.append(Service("trajectory", [Given(setup.port(ports.TRAJECTORY))], []))
         return Graph(setup, [*services, autopilot], KEEP)
 
+    def _voltages(self, given: Sequence[float]) -> tuple[float, ...]:
+        n = len(self._setup.port(ports.ACTUATORS).like.motor_voltage)
+        try:
+            found = tuple(map(float, given))
+        except (TypeError, ValueError):
+            found = ()
+        if len(found) != n or not all(map(math.isfinite, found)):
+            raise ValueError(f"motor_voltages: expected {n} finite numbers [V], got {given!r}")
+        return found
+
     def _command(self, graph: Graph, voltages: tuple[float, ...]) -> None:
         like: MotorCommand = self._setup.port(ports.ACTUATORS).like
-        if len(voltages) != len(like.motor_voltage):
-            raise ValueError(f"motor_voltages: expected {len(like.motor_voltage)} of them, got {len(voltages)}")
         command = like._replace(motor_voltage=voltages, armed=True)
         delay = next(i.delay for i in self._setup.services["plant"].inputs if i.port == ports.ACTUATORS)
         if graph.tick >= delay:

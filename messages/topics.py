@@ -1,6 +1,7 @@
 """The topic table: every topic, its type, its rate, and whether it is recorded and reproducible. Declared only here."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from messages.types import (
@@ -71,6 +72,32 @@ ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
 OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
 COMMAND_ACKS = Topic("{vehicle}/answers", CommandAcks, rate="rates.operator")
-OWN_SENSOR = Topic("{vehicle}/own_sensor", Reading)  # at its own rate
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
+_PLACES = {topic: place for place, topic in enumerate(TOPICS)}
+_NAMED = {topic.name: topic for topic in TOPICS}
+_OWN_SENSOR = "{vehicle}/own_sensor/"
+
+
+@cache
+def own_sensor(name: str) -> Topic:
+    """The topic of a sensor of the user's own, at its own rate; by its name in the scene."""
+    return Topic(f"{_OWN_SENSOR}{name}", Reading)
+
+
+def topic_named(name: str) -> Topic:
+    """The topic of this name, "{vehicle}/imu" or "clock".
+
+    Raises:
+        ValueError: there is none.
+    """
+    if name.startswith(_OWN_SENSOR):
+        return own_sensor(name.removeprefix(_OWN_SENSOR))
+    if name not in _NAMED:
+        raise ValueError(f"no topic {name}")
+    return _NAMED[name]
+
+
+def place(topic: Topic) -> int:
+    """Where it stands among the messages of a tick: in the order of the table, sensors of the user's own behind it."""
+    return _PLACES.get(topic, len(TOPICS))

@@ -5,13 +5,14 @@ import importlib.util
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
+from operator import index
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import services
 from cosim import scene as scenes
-from cosim.scene import Overrides, Scene, Vocabulary
+from cosim.scene import Overrides, Scene, SceneError, Vocabulary
 from cosim.setup import Setup
 from services.common import exchange, modules, sections, vehicle
 from services.common.exchange import Exchange
@@ -35,17 +36,19 @@ def vocabulary() -> Vocabulary:
     return Vocabulary.of(tables, models.check)
 
 
-def load(scene: str | Path, overrides: Overrides = ()) -> Scene:
+def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """Read a scene and all that it names, override, and validate.
 
     Args:
-        scene: path of its TOML file, or the name of one that ships.
+        scene: path of its TOML file, or the name of one that ships; or one that is loaded, to which more is to be done.
         overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key; of any
             key that the scene resolves to: "airframe.mass.total=9.5".
 
     Raises:
         SceneError: what is wrong with which key, and what would be right.
     """
+    if isinstance(scene, Scene):
+        return scenes.again(scene, overrides, vocabulary()) if overrides else scene
     return scenes.load(scene, overrides, vocabulary(), sections.SHIPPED)
 
 
@@ -60,7 +63,14 @@ def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
 
 
 def reseed(setup: Setup, seed: int) -> Setup:
-    """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again."""
+    """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again.
+
+    Raises:
+        SceneError: no such seed.
+    """
+    if not hasattr(seed, "__index__") or not 0 <= (number := index(seed)) < 2**63:
+        raise SceneError("run.seed", f"got {seed!r}", "a whole number from 0 to 2^63 - 1")
+    seed = number
     services_of = dict(setup.services)
     for name, given in services_of.items():
         module = importlib.import_module(f"{entry(name).package}.resolve")
@@ -76,7 +86,15 @@ def resolve(scene: Scene, plan: tuple[Any, ...] = ()) -> Setup:
     Args:
         scene: what to fly.
         plan: operator commands that the autopilot gets at the first tick.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
     """
+    with scene.located():
+        return _resolve(scene, plan)
+
+
+def _resolve(scene: Scene, plan: tuple[Any, ...]) -> Setup:
     exchange, run = scene[Exchange], scene[Run]
     found: dict[str, Any] = {}
     beside: dict[str, Any] = {}

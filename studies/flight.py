@@ -12,7 +12,7 @@ from cosim.log import LogReader
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
-from messages.topics import TOPICS, Topic
+from messages.topics import Topic, topic_named
 from studies import tracking
 from studies.origin import Origin
 from studies.port_columns import columns_of
@@ -76,6 +76,11 @@ class Flight:
         said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
         return cls(said, Origin.of_setup(graph.setup), failure)
 
+    def __repr__(self) -> str:
+        end = self.truth.times[-1] if len(self.truth) else 0.0
+        how = self.failure or ("landed" if self.landed else "not landed")
+        return f"<Flight of {self.metadata.get('scene', self.origin.source)}, {end:.2f} s: {how}>"
+
     @property
     def setup(self) -> Setup:
         """What was flown.
@@ -96,35 +101,36 @@ class Flight:
         if self.origin.recorded:
             return self.metadata.get("digest", "")
         digest = Digest()
-        for topic in TOPICS:
-            if topic.recorded and topic.deterministic and self.has(_short(topic)):
-                for time_ns, payload in self.topic(_short(topic)).payloads():
+        for name in self.topics:
+            topic = topic_of(name)
+            if topic.recorded and topic.deterministic:
+                for time_ns, payload in self.topic(name).payloads():
                     digest.update(topic.key(self.vehicle), time_ns, payload)
         return digest.hexdigest()
 
     @property
     def truth(self) -> TopicView:
-        """The true state."""
+        """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
         return self.topic("truth")
 
     @property
     def setpoint(self) -> TopicView:
-        """Where the vehicle ought to be, as the autopilot follows it."""
+        """Where the vehicle ought to be, as the autopilot follows it: position, velocity, acceleration, yaw, phase."""
         return self.topic("setpoint")
 
     @property
     def actuators(self) -> TopicView:
-        """What the autopilot commands."""
+        """What the autopilot commands: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
         return self.topic("actuators")
 
     @property
     def estimate(self) -> TopicView:
-        """What the estimator tells."""
+        """What the estimator tells, and its standard deviations: position, position_std, velocity, ..."""
         return self.topic("estimate")
 
     @property
     def status(self) -> TopicView:
-        """What the autopilot is doing."""
+        """What the autopilot is doing: phase, armed, landed, finished, warnings."""
         return self.topic("status")
 
     @property
@@ -220,6 +226,14 @@ class Flight:
             raise ImportError("to_dataframe: pandas is not installed; pip install pandas") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def topic_of(name: str) -> Topic:
+    """The topic whose name without the vehicle's is given; ValueError if there is none."""
+    try:
+        return topic_named(f"{{vehicle}}/{name}")
+    except ValueError:
+        return topic_named(name)
 
 
 def _short(topic: Topic) -> str:

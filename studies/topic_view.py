@@ -20,6 +20,7 @@ class TopicView:
     def __init__(self, times_ns: np.ndarray, columns: Mapping[str, Any]):
         """Of simulation times [ns], int64, shape (n,), and columns by dotted field name (messages/history.py)."""
         self._times_ns, self._columns = times_ns, columns
+        self._texts: dict[str, np.ndarray] = {}  # read once: each is made text by text
 
     def payloads(self) -> Iterator[tuple[int, bytes]]:
         """Time [ns] and CDR of each message; of columns that were made from messages only."""
@@ -38,12 +39,12 @@ class TopicView:
 
     @property
     def position(self) -> np.ndarray:
-        """The field `position`, or that of the pose [m]."""
+        """The field `position`, or that of the pose [m], world, shape (n, 3)."""
         return self._of_pose("position", slice(0, 3))
 
     @property
     def orientation(self) -> np.ndarray:
-        """The field `orientation`, or that of the pose: unit quaternions x, y, z, w."""
+        """The field `orientation`, or that of the pose: unit quaternions x, y, z, w, shape (n, 4)."""
         return self._of_pose("orientation", slice(3, 7))
 
     @cached_property
@@ -73,13 +74,17 @@ class TopicView:
         Raises:
             KeyError: there is no such field, or not in every message.
         """
+        if name in self._texts:
+            return self._texts[name]
         column = self._columns[name]
         if isinstance(column, np.ndarray):
             return column
-        if not any(isinstance(value, tuple) for value in column):
-            return np.array(column)
-        found = np.empty(len(column), object)
-        found[:] = column
+        if any(isinstance(value, tuple) for value in column):
+            found = np.empty(len(column), object)
+            found[:] = column
+        else:
+            found = np.array(column)
+        self._texts[name] = found
         return found
 
     def __getattr__(self, name: str) -> np.ndarray:

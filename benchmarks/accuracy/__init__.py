@@ -9,7 +9,8 @@ from benchmarks.accuracy.other_simulators import installed
 from studies.accuracy.measure import Point, measure
 from studies.accuracy.plot import COLOURS, MARKERS
 from studies.accuracy.systems import problems
-from studies.report.style import DPI, styled
+from studies.report.paper import styled
+from studies.report.style import DPI
 
 CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
 LEVELS = [10.0**-k for k in range(2, 11)]

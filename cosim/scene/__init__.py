@@ -7,7 +7,7 @@ read are in `services/common`. They are handed over as a `Vocabulary`. A service
 
 from cosim.scene.errors import SceneError, Source
 from cosim.scene.files import Files
-from cosim.scene.load import from_resolved, load, parse
+from cosim.scene.load import again, from_resolved, load, parse
 from cosim.scene.overrides import Overrides
 from cosim.scene.scene import Scene, Section, Vocabulary
 
@@ -19,6 +19,7 @@ __all__ = [
     "Section",
     "Source",
     "Vocabulary",
+    "again",
     "from_resolved",
     "load",
     "parse",

@@ -3,6 +3,7 @@
 import copy
 import difflib
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_in
 from cosim.scene.scene import Scene, Section, Vocabulary
 from dynamics.errors import KeyedError
 from dynamics.validation import fault
+
+SCENE_FILE = "scene.toml"  # the scene's own text among its sources
 
 
 def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shipped: Path) -> Scene:
@@ -35,18 +38,31 @@ def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shippe
 
 def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
     """`load` of a scene's text; `path` says what it is called and what lies beside it."""
-    tree, files, given = parse_toml(text, path), Files(path.parent), parsed(overrides)
-    files.sources["scene.toml"] = text.encode()
-    try:
+    return _parse(path, text, parsed(overrides), vocabulary)
+
+
+def again(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
+    """A loaded scene with more overrides, of which the later ones hold; the files that it names are read again.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+        ValueError: it was not read from a file.
+    """
+    if scene.given is None or SCENE_FILE not in scene.sources:
+        raise ValueError(f"{scene.path}: not as it was read from a file; it takes no overrides")
+    return _parse(scene.path, scene.sources[SCENE_FILE].decode(), [*scene.given, *parsed(overrides)], vocabulary)
+
+
+def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary) -> Scene:
+    tree, files = parse_toml(text, path), Files(path.parent)
+    files.sources[SCENE_FILE] = text.encode()
+    locate = partial(source_of, path=path, text=text, overrides=tuple(o.key for o in given), files=files)
+    scene = Scene(path, {}, vocabulary, files.sources, tuple(given), locate)
+    with scene.located():
         _resolve(tree, given, vocabulary, files)
         tables = _tables(tree, vocabulary)
-        scene = Scene(path, tables, vocabulary, files.sources, tuple(o.text for o in given))
+        scene = Scene(path, tables, vocabulary, files.sources, tuple(given), locate)
         _check(scene, tables, vocabulary)
-    except SceneError:
-        raise
-    except KeyedError as error:
-        source = source_of(error.key, path, text, (o.key for o in given), files)
-        raise SceneError(error.key, error.message, error.expected, source) from None
     return scene
 
 
@@ -56,12 +72,10 @@ def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) ->
     Raises:
         SceneError: it is no longer a sound scene.
     """
-    try:
+    with Scene(Path(name), {}, vocabulary).located():
         tables = _tables(tree, vocabulary)
         scene = Scene(Path(name), tables, vocabulary)
         _check(scene, tables, vocabulary)
-    except KeyedError as error:
-        raise SceneError(error.key, error.message, error.expected, Source(Path(name))) from None
     return scene
 
 

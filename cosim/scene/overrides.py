@@ -22,7 +22,11 @@ class Override(NamedTuple):
 
 def parsed(overrides: Overrides) -> list[Override]:
     """Every override; SceneError for one that is not KEY=VALUE."""
+    if isinstance(overrides, str):
+        raise SceneError("", f"got {overrides!r}", 'overrides as a dictionary or a list: ["KEY=VALUE"]')
     if isinstance(overrides, Mapping):
+        if strange := [key for key in overrides if not isinstance(key, str)]:
+            raise SceneError("", f"got {strange[0]!r}", "the keys of overrides as texts")
         return [Override(key, _plain(value), f"{key}={value!r}") for key, value in overrides.items()]
     return [_parsed(text) for text in overrides]
 

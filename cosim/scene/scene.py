@@ -1,13 +1,17 @@
 """A validated scene, the tables that it consists of, and the vocabulary of tables that there are."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
+from cosim.scene.errors import SceneError, Source
 from cosim.scene.files import Files
+from cosim.scene.overrides import Override
+from dynamics.errors import KeyedError
 
 
 class Section(BaseModel):
@@ -74,11 +78,13 @@ class Scene:
         tables: Mapping[type[Section], Section],
         vocabulary: Vocabulary,
         sources: Mapping[str, bytes] | None = None,
-        overrides: tuple[str, ...] = (),
+        given: tuple[Override, ...] | None = None,
+        locate: Callable[[str], Source] | None = None,
     ):
         self.path = path  # where it was read from
         self.sources = dict(sources or {})  # every file that was read, by what it says: airframe.toml
-        self.overrides = overrides  # KEY=VALUE, as given
+        self.given = given  # overrides; None where the scene is more than its file and these
+        self._locate = locate  # who gave a key its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
 
@@ -98,7 +104,26 @@ class Scene:
     def replaced(self, section: Section) -> "Scene":
         """The same scene with this table in the place of its own; not checked against the others."""
         tables = {**self._tables, type(section): section}
-        return Scene(self.path, tables, self._vocabulary, self.sources, self.overrides)
+        return Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate)
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """What is found wrong with a key of the scene within the context is told with who gave it its value."""
+        try:
+            yield
+        except SceneError:
+            raise
+        except KeyedError as error:
+            source = self._locate(error.key) if self._locate else Source(self.path)
+            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
+
+    def __repr__(self) -> str:
+        return f"<Scene {self.name}{''.join(f', {override}' for override in self.overrides)}>"
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """KEY=VALUE, as given."""
+        return tuple(override.text for override in self.given or ())
 
     @property
     def name(self) -> str:

@@ -1,45 +1,154 @@
-"""How a vehicle stands on the ground: at rest on its feet, before anything moves."""
+"""How a vehicle stands on the ground: on which feet, and at rest on their springs before anything moves."""
 
 import itertools
 import math
 from collections.abc import Sequence
+from types import ModuleType
+from typing import Any
 
-from dynamics.effects._ground import Ground, surface
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion, from_matrix
-from dynamics.vector import Mat3, Vec3, apply
+import numpy as np
+
+from dynamics.effects import _ground
+from dynamics.effects._contact_parameters import FREE, STICKING, GroundContact, GroundContactSmooth
+from dynamics.effects._ground import Ground
+from dynamics.kernel import uncompiled
+from dynamics.lie import quaternion
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from dynamics.vector import Mat3, Vec3
+from dynamics.vector import apply as compiled_apply
+from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState
 
 ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
 CONVERGED = 1e-12  # change of the slope between two iterations
+BALANCED, TOLERATED = 1e-12, 1e-8  # force that is not balanced, over the weight: sought, and found at least
+NUDGE = 1e-8  # [m] for slopes of the forces
 LEVEL = (0.0, 0.0)
 
+Pose = tuple[Vec3, Quaternion]  # position of the centre of mass [m] in the world, attitude
 
-def standing_pose(feet: Sequence[Vec3], ground: Ground | None) -> tuple[Vec3, Quaternion]:
+# thousands of calls, each cheaper than handing its arguments to machine code
+apply, surface = uncompiled(compiled_apply), uncompiled(_ground.surface)
+from_matrix, rotation_matrix = uncompiled(quaternion.from_matrix), uncompiled(quaternion.rotation_matrix)
+
+
+def standing_pose(feet: Sequence[Vec3], ground: Ground | None) -> Pose:
     """Where a vehicle stands whose centre of mass is over the world's origin, heading along world x.
 
-    It is tilted as the ground under its feet, and the lowest foot touches without pressing. Between bumps that is the
-    plane through the three points of the ground that would carry it.
+    It is tilted so that three feet around its centre of mass touch without pressing and no other is below the ground;
+    equal feet on a plane all touch. Where there are no such three, it is not tilted, and will fall over.
 
     Args:
         feet: points that may touch [m], body coordinates.
         ground: None for level ground at height 0.
-
-    Returns:
-        Position of the centre of mass [m] in the world, attitude.
     """
     if not feet:
         return (0.0, 0.0, 0.0), NO_ROTATION
-    if ground is None or (ground.slope == LEVEL and ground.bump_height == 0.0):
-        return (0.0, 0.0, -min(z for _, _, z in feet)), NO_ROTATION
-    slope = ground.slope
+    ground = ground or Ground(LEVEL, 0.0, 0.0, (0.0, 0.0, 1.0))
+    slope = LEVEL
     for _ in range(ITERATIONS):
         R_world_body = _aligned(slope)
         arms = [apply(R_world_body, foot) for foot in feet]
-        heights = [surface(ground, x, y)[0] for x, y, _ in arms]
-        before, slope = slope, _carrying([(x, y, h) for (x, y, _), h in zip(arms, heights, strict=True)]) or slope
-        if math.dist(before, slope) < CONVERGED:
+        lifts = [surface(ground, x, y)[0] - z for x, y, z in arms]  # [m] of the vehicle, at which that foot touches
+        change = _carrying([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or LEVEL
+        if math.hypot(*change) < CONVERGED:
             break
-    rise = max(height - arm[2] for arm, height in zip(arms, heights, strict=True))
-    return (0.0, 0.0, rise), from_matrix(R_world_body)
+        slope = (slope[0] + change[0], slope[1] + change[1])
+    return (0.0, 0.0, max(lifts)), NO_ROTATION if slope == LEVEL else from_matrix(R_world_body)
+
+
+def at_rest(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
+    """The state of a vehicle that stands still: the springs of its feet carry it, and their friction holds it.
+
+    Where the ground is too steep for the friction, or the feet do not stand around the centre of mass, it is the state
+    in which the vehicle begins to slide or to fall.
+
+    Args:
+        form: module that makes the state: `dynamics.vehicles.multirotor` or one with more bodies.
+        p: the vehicle.
+        pose: where it stands, from `standing_pose`.
+        gravity: [m/s^2].
+    """
+    position, attitude = pose
+    k = next((k for k, e in enumerate(p.effects) if isinstance(e, GroundContact | GroundContactSmooth)), None)
+    if k is None or gravity <= 0.0:
+        return form.initial_state(p, position, attitude)
+    position, attitude = _balanced(p.effects[k], p.body.mass * gravity, position, attitude)
+    state = form.initial_state(p, position, attitude)
+    anchors = _anchors(p.effects[k], position, attitude)
+    return state._replace(memory=(*state.memory[:k], anchors or state.memory[k], *state.memory[k + 1 :]))
+
+
+def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pose:
+    """Where springs and weight [N] balance, near a pose: Newton's method on height and slopes; that pose if nowhere."""
+    R = rotation_matrix(attitude)
+    x = np.array([position[2], R[6] / R[0], R[7] / R[4] - R[6] * R[1] / (R[0] * R[4])])  # height, slopes of the body
+    x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring beyond its onset
+    residual = _springs(e, weight, x)
+    for _ in range(ITERATIONS):
+        if np.linalg.norm(residual) < BALANCED * weight:
+            break
+        growth = np.array([_springs(e, weight, x + change) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
+        try:
+            step = np.linalg.solve(growth, -residual)
+        except np.linalg.LinAlgError:  # fewer than three feet press
+            return position, attitude
+        shares = 0.5 ** np.arange(20.0)
+        trials = (x + share * step for share in shares)
+        nearer = (t for t in trials if np.linalg.norm(_springs(e, weight, t)) < np.linalg.norm(residual))
+        if (better := next(nearer, None)) is None:
+            break  # as near as numbers allow
+        x, residual = better, _springs(e, weight, better)
+    if not np.linalg.norm(residual) < TOLERATED * weight:
+        return position, attitude
+    slope = (float(x[1]), float(x[2]))
+    level = NO_ROTATION if attitude == NO_ROTATION and math.hypot(*slope) < CONVERGED else None
+    return (0.0, 0.0, float(x[0])), level or from_matrix(_aligned(slope))
+
+
+def _springs(e: Any, weight: float, x: np.ndarray) -> np.ndarray:
+    """Vertical force [N] of the feet less the weight, and its moments about the centre of mass [N m].
+
+    `x`: height [m] and slopes of the vehicle. A foot that friction holds pushes straight up.
+    """
+    R_world_body = _aligned((float(x[1]), float(x[2])))
+    found = np.array([-weight, 0.0, 0.0])
+    for foot in e.feet:
+        arm = apply(R_world_body, foot)
+        depth, normal = _depth(e, arm, float(x[0]))
+        if depth > 0.0:
+            found += _press(e, depth) / normal[2] * np.array([1.0, arm[0], arm[1]])
+    return found
+
+
+def _depth(e: Any, arm: Vec3, height: float) -> tuple[float, Vec3]:
+    """(how deep a foot is in the ground [m], the ground's normal), as in `dynamics.effects._feet`."""
+    ground, _, normal = surface(e.ground, arm[0], arm[1])
+    return (ground - (height + arm[2])) * normal[2], normal
+
+
+def _press(e: Any, depth: float) -> float:
+    """Normal force [N] of a foot at rest."""
+    onset = min(depth * e.inverse_width, 1.0)
+    return onset * onset * (3.0 - 2.0 * onset) * e.stiffness * depth
+
+
+def _anchors(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Any, ...] | None:
+    """The memory of feet whose friction holds them; None where it is too weak, or remembers nothing."""
+    if not isinstance(e, GroundContact):
+        return None
+    found = []
+    for foot in e.feet:
+        arm = apply(rotation_matrix(attitude), foot)
+        depth, (nx, ny, nz) = _depth(e, arm, position[2])
+        if depth <= 0.0:
+            found.append((0.0, 0.0, FREE, 0.0))
+            continue
+        if math.hypot(nx, ny) > e.static * nz:
+            return None
+        # straight up is: press along the normal, and across it what has -n_x press, -n_y press along x and y
+        pull = _press(e, depth) / e.tangential_stiffness
+        found.append((position[0] + arm[0] - pull * nx, position[1] + arm[1] - pull * ny, STICKING, 0.0))
+    return tuple(found)
 
 
 def _aligned(slope: tuple[float, float]) -> Mat3:

@@ -33,6 +33,15 @@ def reference(out: Out = None) -> None:
 
 
 @docs.command()
+def api(out: Out = None) -> None:
+    """The Python interface: signatures, units, shapes, errors (Markdown)."""
+    from lapwing.docs.api import api
+
+    with user_errors():
+        _put(api(), out)
+
+
+@docs.command()
 def schema(
     of: Annotated[Kind, typer.Option(help="the kind of file")] = Kind.scene,
     out: Out = None,

@@ -70,3 +70,15 @@ def check_plot(path: Path | None) -> None:
     if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"--plot {path}: expected a name that ends in .png, .svg or .pdf")
     check_writable(path)
+
+
+def check_report(option: str, path: Path | None) -> None:
+    """Refuse a report that cannot be written, or whose name has an ending that no report has."""
+    if path is not None:
+        from studies.report import check_format
+
+        try:
+            check_format(path)
+        except ValueError as error:
+            raise ValueError(f"{option} {error}") from None
+    check_writable(path)

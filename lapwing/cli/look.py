@@ -82,12 +82,23 @@ def warm(
 
 
 @app.command()
-def report(log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]) -> None:
-    """Write an HTML report with plots beside a log."""
+def report(
+    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="another one, laid over the first in every plot")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="where to write it [beside the first log, .html]")
+    ] = None,
+) -> None:
+    """Write a report of a log, or of two laid over each other: a page for a browser, or plots on paper."""
+    from lapwing.cli.files import check_distinct, check_report
     from lapwing.flight import Flight
 
     with user_errors():
-        typer.echo(Flight.read(log).report())
+        check_distinct({"FILE": log, "the second FILE": other, "--out": out})
+        check_report("--out", out)
+        typer.echo(Flight.read(log).report(out, Flight.read(other) if other else None))
 
 
 @app.command()

@@ -8,7 +8,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided, warn_of_gains
 from lapwing.cli.errors import user_errors
-from lapwing.cli.files import check_distinct, check_writable, left_as_it_was, log_path
+from lapwing.cli.files import check_distinct, check_report, check_writable, left_as_it_was, log_path
 from lapwing.cli.links import check_links
 from lapwing.cli.options import (
     Insecure,
@@ -39,6 +39,9 @@ def run(
     ] = "processes",
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures of the run as JSON")] = None,
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="the MCAP log [recordings/SCENE_TIME.mcap]")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="the report [beside the log, .html]")
+    ] = None,
     space: Space = "lapwing",
     peers: Peers = None,
     open_: Annotated[
@@ -82,9 +85,10 @@ def run(
         setup = resolve(loaded, commands)
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if mavlink else None)
         table = None if peers is None else parse_peers(peers, [*needed(setup), WATCHER])
-        check_distinct({"SCENE": scene, "--log": log, "--json": json})
+        check_distinct({"SCENE": scene, "--log": log, "--json": json, "--report": report})
         path = log_path(loaded, log, exists=table is not None)
         check_writable(json)
+        check_report("--report", report)
         given = Participation(
             name=WATCHER,
             setup=setup,
@@ -100,7 +104,7 @@ def run(
             insecure=insecure,
             external=parse_external(external or [], setup),
         )
-        _conclude(loaded, given, path, _fly(given, path), json)
+        _conclude(loaded, given, path, _fly(given, path), json, report)
 
 
 def _fly(given: "Participation", log: Path) -> "Elapsed":
@@ -124,7 +128,9 @@ def _fly(given: "Participation", log: Path) -> "Elapsed":
         return fly_processes(given, display, [MAVLINK] if given.mavlink else [])
 
 
-def _conclude(scene: "Scene", given: "Participation", log: Path, elapsed: "Elapsed", json: Path | None) -> None:
+def _conclude(
+    scene: "Scene", given: "Participation", log: Path, elapsed: "Elapsed", json: Path | None, report: Path | None
+) -> None:
     from rich.console import Console
 
     from lapwing.cli import summary
@@ -142,7 +148,7 @@ def _conclude(scene: "Scene", given: "Participation", log: Path, elapsed: "Elaps
         "rmse": flown.rmse,
         "landed": flown.landed,
         "log": str(log),
-        "report": str(flown.report()),
+        "report": str(flown.report(report)),
     }
     if json:
         summary.write_json(json, result)

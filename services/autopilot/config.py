@@ -45,8 +45,8 @@ class Autopilot(Section):
             if key == "estimator" and isinstance(code, str) and ":" not in code:
                 if code not in ESTIMATORS:
                     raise KeyedError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
-            elif isinstance(code, str):
-                modules.embed(tree, files, where, user_code.parted(where, code)[0])
+            elif isinstance(code, str) and (module := user_code.parted(where, code)[0]) != user_code.MEMORY:
+                modules.embed(tree, files, where, module)
         if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
             path = files.folder / file
             text = files.text("autopilot.parameters", "autopilot.parameters", path)

@@ -17,9 +17,8 @@ from services.autopilot.gains import GainSet
 from services.autopilot.law import Airframe
 from services.autopilot.motor import Motor
 from services.autopilot.setup import AutopilotSetup, CustomCode
-from services.common import parameters, ports
+from services.common import modules, parameters, ports
 from services.common.exchange import Exchange, Rates, ticks
-from services.common.modules import Modules
 from services.common.ports import AutopilotStatus, MotorCommand, Reference
 from services.common.sections import follows_trajectory
 from services.common.vehicle import Effects, airframe, gravity, start_height
@@ -80,7 +79,7 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """The code that the key names, tried."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Exchange].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
-    found = rate(name, scene[Modules].texts, vehicle, options)
+    found = rate(name, modules.texts(scene), vehicle, options)
     return CustomCode(name, options, ticks(scene, found, f"autopilot.{key}"))
 
 

@@ -76,8 +76,8 @@ class MagnetometerReading(NamedTuple):
 class GpsReading(NamedTuple):
     """One reading of a satellite receiver: where the antenna was `age` seconds ago."""
 
-    latitude_deg: float = 0.0
-    longitude_deg: float = 0.0
+    latitude_deg: float = 0.0  # [deg] north
+    longitude_deg: float = 0.0  # [deg] east
     height: float = 0.0  # [m] over the ellipsoid
     position_variance: Vec3 = ZERO  # [m^2] east, north, up: white and wandering error together
     velocity_world: Vec3 = ZERO  # [m/s]
@@ -139,7 +139,7 @@ class StateEstimate(NamedTuple):
     """What the estimator tells. Standard deviations are those of its own error."""
 
     position_world: Vec3 = ZERO  # [m]
-    attitude: Quaternion = NO_ROTATION
+    attitude: Quaternion = NO_ROTATION  # (w, x, y, z), body to world
     velocity_world: Vec3 = ZERO  # [m/s]
     omega_body: Vec3 = ZERO  # [rad/s], bias taken off
     acceleration_world: Vec3 = ZERO  # [m/s^2], dv/dt

@@ -23,6 +23,7 @@ class Vehicle(Section):
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
     airframe: str | None = None  # one that ships or lies in vehicles/ beside the scene, or the path of a .toml file
     model: str = "reduced"  # a module of services/plant/models
+    mass: float | None = Field(default=None, gt=0.0)  # [kg] with payload, in the place of airframe.mass.total
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
@@ -31,6 +32,18 @@ class Vehicle(Section):
             path = files.find("vehicle.airframe", "airframe", name, "vehicles", SHIPPED / "vehicles")
             content = files.toml(VehicleAirframe.TABLE, "vehicle.airframe", path)
             tree[VehicleAirframe.TABLE] = laid_over(content, tree.get(VehicleAirframe.TABLE, {}))
+        mass, frame = named(tree, "vehicle", "mass"), tree.get(VehicleAirframe.TABLE)
+        if mass is not None and isinstance(frame, dict):
+            tree[VehicleAirframe.TABLE] = laid_over(frame, {"mass": {"total": mass}})
+
+    def check(self, scene: Scene) -> None:
+        """The mass is that of the airframe."""
+        if self.mass is None:
+            return
+        if not scene.has(VehicleAirframe):
+            raise KeyedError("vehicle.mass", "there is no airframe whose mass it could be; leave it out")
+        if (total := airframe(scene).mass.total) != self.mass:
+            raise KeyedError("vehicle.mass", f"{self.mass:g} kg, and airframe.mass.total = {total:g} kg", "one of them")
 
 
 class VehicleAirframe(Airframe, Section):

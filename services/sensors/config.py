@@ -22,10 +22,9 @@ class Sensors(NamedTables):
     def check(self, scene: Scene) -> None:
         """Every sensor exists, its parameters are sound, and its rate divides the exchange rate."""
         super().check(scene)
-        own = [name for name, table in self.tables.items() if "module" in table]
-        if len(own) > 1:
-            message = f"sensors.{own[0]} is one of the user's own already"
-            raise KeyedError(f"sensors.{own[1]}.module", message, "one, which may read several numbers")
+        for name, table in self.tables.items():
+            if "module" in table and not name.isidentifier():
+                raise KeyedError(f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _")
         self.load(scene)
         for name, table in self.tables.items():
             try:

@@ -50,7 +50,7 @@ def wires(setup: Setup, sonar: SonarWiring | None) -> list[Wire]:
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
     own = [
-        Wire(topic.OWN_SENSOR, port.name, port.period, _own, partial(_own_sample, frame, port))
+        Wire(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
         for port in setup.services["sensors"].ports
         if port.name not in {name for _, name, _, _ in known}
     ]

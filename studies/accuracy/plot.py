@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from studies.accuracy.apart import Part
 from studies.accuracy.measure import Point
-from studies.report.style import DPI, styled
+from studies.report.paper import styled
+from studies.report.style import DPI
 
 # Okabe and Ito's palette, then the same again with other markers and dashes
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")

@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.campaign.study import Campaign, Spread
-from studies.report.style import AXIS_COLOURS, DPI, FLOWN, REFERENCE, WIDTH, styled
+from studies.report.paper import styled
+from studies.report.style import AXIS_COLOURS, DPI, FLOWN, REFERENCE, WIDTH
 from studies.tracking import AXES
 
 THIRD = 1.0 / 3.0  # of the published error: what a well-tuned flight is to stay below

@@ -10,7 +10,8 @@ from rich.table import Table
 
 from studies.effects.influence import Influence
 from studies.effects.study import Row, Study
-from studies.report.style import BOUND, DPI, FLOWN, WIDTH, styled
+from studies.report.paper import styled
+from studies.report.style import BOUND, DPI, FLOWN, WIDTH
 
 LEAST = 1e-6  # [m] shorter bars are drawn as long as this
 

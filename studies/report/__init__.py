@@ -1,8 +1,9 @@
-"""The report of a flight: one HTML page with plots, beside its log.
+"""The report of a flight: a page whose plots are drawn in the reader's browser, or the same plots on paper.
 
-Each plot is a file of `studies.report.plots`; adding one is adding a file.
+Each plot is a file of `studies.report.plots`; adding one is adding a file. It says what is to be seen (`plot`);
+`browser` and `paper` draw it.
 """
 
-from studies.report.page import write
+from studies.report.write import check_format, write
 
-__all__ = ["write"]
+__all__ = ["check_format", "write"]

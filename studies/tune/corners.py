@@ -9,9 +9,10 @@ from cosim.scene import Scene
 from cosim.setup import Setup
 from dynamics import effects
 from dynamics.vehicles import multirotor
+from dynamics.vehicles.standing import at_rest
 from services.autopilot.gains import GainSet
 from services.common.parameters import of_gains
-from services.common.vehicle import Effects, airframe, start_pose
+from services.common.vehicle import Effects, airframe, gravity, start_pose
 from studies.campaign.figures import Figures, figures
 from studies.campaign.setup import TOPICS
 from studies.fly import fly
@@ -58,7 +59,7 @@ def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
     acting = tuple(_stronger(e, corner.thrust) for e in effects.from_scene(scene[Effects].tables, frame))
     p = multirotor.parameters(frame, acting)
     plant = setup.services["plant"].parameters
-    start = plant.start._replace(vehicle=multirotor.initial_state(p, *start_pose(scene)))
+    start = plant.start._replace(vehicle=at_rest(multirotor, p, start_pose(scene), gravity(scene)))
     return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
 
 

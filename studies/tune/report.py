@@ -2,13 +2,15 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
-from matplotlib.figure import Figure
 
-from studies.report.page import Section, png, render
-from studies.report.style import BOUND, FLOWN, REFERENCE, WIDTH, styled
+from studies.report.page import render
+from studies.report.plot import Level, Line, Panel, Plot
+from studies.report.sections import Section
+from studies.report.style import BOUND, FLOWN, QUIET, REFERENCE
 from studies.tune.design import DELAY
 from studies.tune.show import tables
 from studies.tune.study import Judged, Tuned
@@ -20,20 +22,19 @@ SHOWN = {
     "yaw": "yaw",
     "pitch": "pitch (inner)",
     "x": "x (outer)",
-    "x_plant_input": "x, loop broken at the plant input",
+    "x_plant_input": "x, at the plant input",
 }
-LOOKS = ((REFERENCE, (0, (4, 3))), (FLOWN, "-"))  # of before and after
+LOOKS = ((REFERENCE, "dash"), (FLOWN, "solid"))  # of before and after
 
 
 def write(path: Path, found: Tuned) -> None:
     """Write the page."""
     both = (found.before, found.after)
     loops = [systems(j.parameters, found.assumed, found.tick, DELAY) for j in both]
-    with styled():
-        sections = [
-            Section("bode", "Open loops", png(_bode(both, loops)), _BODE),
-            Section("steps", "Steps of the setpoint", png(_steps(both, loops)), _STEPS),
-        ]
+    sections = [
+        Section("bode", "Open loops", _bode(both, loops)),
+        Section("steps", "Steps of the setpoint", _steps(both, loops)),
+    ]
     page = render(
         "tuning.html", title=f"{found.scene}: gains", tables=list(tables(found)), sections=sections, gains=found.gains
     )
@@ -42,52 +43,49 @@ def write(path: Path, found: Tuned) -> None:
 
 _BODE = (
     "From the error to what answers it, with the motors' lag and the delay of sampling. Dots: where the gain is one; "
-    "the phase margin is what is left above -180 degrees there."
+    "the phase margin is what is left above -180 degrees there. Shown are gains of 0.001 to 1000 and phases of -360 to "
+    "-30 degrees; what lies beyond is found by dragging an axis."
 )
 _STEPS = "Linear, about hover, nothing fed forward: what feedback alone makes of a unit step."
 
 
-def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Figure:
-    figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
-    panels = figure.subplots(2, len(SHOWN), sharex=True, sharey="row")
+def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+    panels = []
     for column, (name, title) in enumerate(SHOWN.items()):
-        top, bottom = panels[:, column]
-        for judged, systems_of, (colour, dashes) in zip(both, loops, LOOKS, strict=True):
+        sizes: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
+        phases: list[Line | Level] = [Level(-180.0, colour=BOUND, dash="solid")]
+        for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
             response = control.frequency_response(systems_of[name], OMEGA)
-            size, phase = response.magnitude, np.degrees(np.unwrap(response.phase))
+            phase = np.degrees(np.unwrap(response.phase))
             at = judged.margins[name].crossover
             phase -= 360.0 * math.ceil(np.interp(math.log(at), np.log(OMEGA), phase) / 360.0)  # in (-360, 0] there
-            top.loglog(OMEGA, size, color=colour, linestyle=dashes, label=judged.name)
-            bottom.semilogx(OMEGA, phase, color=colour, linestyle=dashes)
-            top.plot(at, 1.0, "o", color=colour, markersize=4)
-            bottom.plot(at, np.interp(math.log(at), np.log(OMEGA), phase), "o", color=colour, markersize=4)
-        top.axhline(1.0, color="#666666", linewidth=0.8)
-        bottom.axhline(-180.0, color=BOUND, linewidth=1.0)
-        top.set_title(title)
-        top.set_ylim(1e-3, 1e3)
-        bottom.set_ylim(-360.0, -30.0)
-        bottom.set_yticks(np.arange(-360, -59, 60))
-        bottom.set_xlabel("frequency [rad/s]")
-    panels[0, 0].set_ylabel("gain")
-    panels[1, 0].set_ylabel("phase [deg]")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return figure
+            sizes.append(Line(OMEGA, np.asarray(response.magnitude), judged.name, colour, dash=dash))
+            phases.append(Line(OMEGA, phase, judged.name, colour, dash=dash))
+            crossing = float(np.interp(math.log(at), np.log(OMEGA), phase))
+            for marks, y in ((sizes, 1.0), (phases, crossing)):
+                marks.append(Line(np.array([at]), np.array([y]), colour=colour, marker="circle", joined=False))
+        place: dict[str, Any] = {"column": column, "timed": False, "log_x": True}
+        label = ("gain", "phase [°]") if column == 0 else ("", "")
+        panels.append(Panel(tuple(sizes), label[0], title=title, log_y=True, y_range=(1e-3, 1e3), **place))
+        panels.append(Panel(tuple(phases), label[1], "frequency [rad/s]", row=1, y_range=(-360.0, -30.0), **place))
+    return Plot(tuple(panels), _BODE, 5.4, (1.0, 1.0), (1.0,) * len(SHOWN))
 
 
-def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Figure:
-    figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
-    panels = figure.subplots(1, len(AXES), sharey=True)
-    for panel, (axis, loop) in zip(panels, AXES.items(), strict=True):
-        for judged, systems_of, (colour, dashes) in zip(both, loops, LOOKS, strict=True):
+def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+    panels = []
+    for column, (axis, loop) in enumerate(AXES.items()):
+        marks: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
+        said = []
+        for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
             seconds = 1.5 if axis == "yaw" else 4.0
             if loop in judged.shortfalls and judged.shortfalls[loop] == "unstable":
+                said.append(f"{judged.name}: unstable")
                 continue
             found = step(systems_of[loop], seconds)
-            said = f"{judged.name}: {found.rise:.2g} s, {100.0 * found.overshoot:.0f} % over"
-            panel.plot(found.time, found.value, color=colour, linestyle=dashes, label=said)
-        panel.axhline(1.0, color="#666666", linewidth=0.8)
-        panel.set_title(axis)
-        panel.set_xlabel("time [s]")
-        panel.legend(loc="lower right", fontsize=7.5)
-    panels[0].set_ylabel("response to a unit step")
-    return figure
+            said.append(f"{judged.name}: {found.rise:.2g} s, {100.0 * found.overshoot:.0f} % over")
+            marks.append(Line(np.asarray(found.time), np.asarray(found.value), judged.name, colour, dash=dash))
+        label = "response to a unit step" if column == 0 else ""
+        top = 1.35 * max([1.0, *(float(mark.y.max()) for mark in marks if isinstance(mark, Line))])  # room for the note
+        place: dict[str, Any] = {"column": column, "timed": False, "y_range": (-0.05, top)}
+        panels.append(Panel(tuple(marks), label, "time [s]", title=axis, note="\n".join(said), **place))
+    return Plot(tuple(panels), _STEPS, 3.4, widths=(1.0,) * len(AXES))

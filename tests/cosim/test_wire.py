@@ -12,7 +12,7 @@ from cosim.wire import Wire, due_ticks, encode
 from dynamics.rows import from_row, to_row
 from messages import Setpoint, header
 from messages.records import stamp_columns
-from messages.topics import OWN_SENSOR, SETPOINT, TOPICS, WALL_TIME
+from messages.topics import SETPOINT, TOPICS, WALL_TIME
 from services.autopilot.commander.request import Status as Words
 from services.processes import create_all
 from services.table import load, resolve
@@ -85,7 +85,7 @@ def test_every_topic_of_a_scene_is_its_values_one_by_one(path):
 
 def test_the_scenes_that_ship_speak_on_every_topic():
     spoken = {topic for path in SCENES for service in create_all(resolve(load(path))) for topic in service.topics}
-    assert spoken == set(TOPICS) - {WALL_TIME, OWN_SENSOR}
+    assert spoken == set(TOPICS) - {WALL_TIME}
 
 
 class Named(NamedTuple):

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import lapwing
+from lapwing.docs.api import api
 from lapwing.docs.reference import reference
 from lapwing.docs.schema import SCHEMAS
 
@@ -14,6 +16,23 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def test_the_scene_reference_is_current():
     assert (DOCS / "reference.md").read_text() == reference(), "lapwing docs reference --out docs/reference.md"
+
+
+def test_the_api_reference_is_current():
+    assert (DOCS / "api.md").read_text() == api(), "lapwing docs api --out docs/api.md"
+
+
+def test_the_api_reference_says_all_that_can_be_imported_with_its_units_and_errors():
+    page = api()
+    for name in lapwing.__all__:
+        assert f"### lapwing.{name}\n" in page or f"### {name}\n" in page, name
+    said = (
+        "- `controller`: ",
+        "| `volts` | `tuple[float, float, float, float]` | V |",
+        "shape (n, 6)",
+        "- `SceneError`: ",
+    )
+    assert all(words in page for words in said)
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)

@@ -5,9 +5,10 @@ import json
 import pytest
 
 
-def test_a_page_is_shown_or_written(lapwing, tmp_path):
-    assert lapwing("docs", "reference", "--out", tmp_path / "page.md") == (0, "", "")
-    assert lapwing("docs", "reference") == (0, (tmp_path / "page.md").read_text(), "")
+@pytest.mark.parametrize("page", ["reference", "api"])
+def test_a_page_is_shown_or_written(lapwing, tmp_path, page):
+    assert lapwing("docs", page, "--out", tmp_path / "page.md") == (0, "", "")
+    assert lapwing("docs", page) == (0, (tmp_path / "page.md").read_text(), "")
 
 
 @pytest.mark.parametrize("kind", ["scene", "airframe", "gains"])

@@ -1,21 +1,29 @@
 """The report against a flight made by formula: its figures are known without the code under test."""
 
 import base64
+import importlib
+import json
 import math
+import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 
 import made_up
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from cosim.log import LogWriter
 from cosim.provenance import attachments as attachments_of
 from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
 from studies.flight import AXES, Flight
-from studies.report import picture, plots, write
-from studies.report.plots import estimator, propulsion
-from studies.report.style import POINTS, line, phases
+from studies.report import browser, picture, plots, write
+from studies.report.outcome import MANY, differences
+from studies.report.overlay import overlay
+from studies.report.plots import estimator, motors, position, propulsion
+from studies.report.style import POINTS
+from studies.report.thin import thin
+from studies.report.whole import phases
 
 RATE, SECONDS = 50, 6.0
 OFFSET = (0.1, -0.2, 0.05, 0.01, -0.02, 0.03)  # reference minus truth, so the errors are these numbers
@@ -41,7 +49,7 @@ def rotation(roll, pitch, yaw):
     )
 
 
-def messages(std=0.05, rotors=4, reference=True):
+def messages(std=0.05, rotors=4, reference=True, east=0.0):
     """Topic and message, tick by tick: a circle whose angles swing; the motors are armed from 1 s on."""
     for tick in range(int(RATE * SECONDS) + 1):
         t = tick / RATE
@@ -49,7 +57,7 @@ def messages(std=0.05, rotors=4, reference=True):
         position = (math.cos(t), math.sin(t), 1.0 + 0.1 * t)
         angles = (0.1 * math.sin(t), 0.1 * math.cos(t), 0.2 * t)
         speed = (300.0 + 50.0 * math.sin(t),) * rotors
-        pose = Pose(Point(*position), rotation(*angles))
+        pose = Pose(Point(position[0] + east, *position[1:]), rotation(*angles))
         truth = VehicleState(stamp, pose)._replace(
             rotor_speed=speed,
             motor_voltage=tuple(0.1 * w for w in speed),
@@ -94,11 +102,11 @@ def log(tmp_path_factory):
 
 
 class Page(HTMLParser):
-    """What a browser would find: texts, images, addresses; unclosed elements are an error."""
+    """What a browser would find: texts, plots, addresses; unclosed elements are an error."""
 
     def __init__(self, path):
         super().__init__()
-        self.images, self.addresses, self.texts, self.tags, self.ids = {}, [], [], [], []
+        self.plots, self.addresses, self.texts, self.tags, self.ids = {}, [], [], [], []
         self._open = []
         self.feed(path.read_text(encoding="utf-8"))
         self.close()
@@ -110,16 +118,16 @@ class Page(HTMLParser):
         if tag == "section":
             self.ids.append(found["id"])
         self.addresses += [v for k, v in attrs if k in ("src", "href", "srcset", "data", "action")]
-        if tag == "img":
-            self.images[self.ids[-1]] = found["src"]
-        if tag not in ("meta", "img", "link"):
-            self._open.append(tag)
+        if tag not in ("meta", "link"):
+            self._open.append("json" if found.get("type") == "application/json" else tag)
 
     def handle_endtag(self, tag):
-        assert self._open.pop() == tag
+        assert self._open.pop() in (tag, "json")
 
     def handle_data(self, data):
-        if data.strip():
+        if self._open[-1:] == ["json"]:
+            self.plots[self.ids[-1]] = json.loads(data)
+        elif data.strip() and self._open[-1] not in ("script", "style"):
             self.texts.append(data.strip())
 
     def after(self, text):
@@ -137,27 +145,157 @@ def page(log):
     return Page(report(log))
 
 
-def test_every_plot_is_on_the_page_in_its_order_as_png(page):
+def values(array):
+    """The numbers of a typed array as plotly.js reads it."""
+    assert array["dtype"] == "f4"
+    return np.frombuffer(base64.b64decode(array["bdata"], validate=True), "<f4")
+
+
+def test_every_plot_is_on_the_page_in_its_order(page):
     of_multirotors = [m for m in plots.modules() if "reduced" in getattr(m, "MODELS", ("reduced",))]
     names = [module.__name__.rpartition(".")[2] for module in of_multirotors]
     assert page.ids == names
-    assert list(page.images) == names
-    assert names[0] == "displacements"
-    for source in page.images.values():
-        kind, data = source.split(",")
-        assert kind == "data:image/png;base64"
-        assert base64.b64decode(data, validate=True).startswith(b"\x89PNG\r\n\x1a\n")
+    assert list(page.plots) == names
+    assert names[:2] == ["timeline", "position"]
+
+
+def test_a_plot_carries_what_was_flown(log, page):
+    x = page.plots["position"]["data"][0]
+    flown = Flight.read(log)
+    assert x["name"] == "flown"
+    assert values(x["x"]) == pytest.approx(flown.truth.times)
+    assert values(x["y"]) == pytest.approx(flown.truth.position[:, 0], abs=1e-6)
+
+
+def test_axes_over_time_are_linked_and_say_their_unit(page):
+    for name in ("timeline", "position", "attitude", "motors", "estimator", "air"):
+        plot = page.plots[name]
+        first, *others = plot["timed"]
+        assert all(plot["layout"][axis]["matches"] == first.replace("axis", "") for axis in others)
+        assert "time [s]" in [plot["layout"][axis]["title"]["text"] for axis in plot["timed"]]
+    assert page.plots["propulsion"]["timed"] == []
+
+
+def test_angles_are_in_degrees(page):
+    titles = [
+        axis["title"]["text"] for key, axis in page.plots["attitude"]["layout"].items() if key.startswith("yaxis")
+    ]
+    assert titles == ["roll [°]", "roll error [°]", "pitch [°]", "pitch error [°]", "yaw [°]", "yaw error [°]"]
+    error = page.plots["attitude"]["data"][2]
+    assert values(error["y"]) == pytest.approx(math.degrees(OFFSET[3]), rel=1e-5)
+
+
+def test_the_path_turns_in_space(page):
+    trace = page.plots["path"]["data"][0]
+    assert trace["type"] == "scatter3d"
+    assert values(trace["z"])[-1] == pytest.approx(1.0 + 0.1 * SECONDS)
+
+
+def test_the_timeline_says_who_did_what_when(page):
+    bars = [(b["y"][0], b["text"][0], b["base"][0], b["x"][0]) for b in page.plots["timeline"]["data"]]
+    assert ("phase", "climb", 0.0, 3.0) in bars
+    assert [bar[:2] for bar in bars if bar[0] == "landed"] == [("landed", "landed")]
+    assert any("Never in this flight: mode, armed, failsafe" in text for text in page.texts)
+
+
+def test_motors_at_a_limit_are_marked(log):
+    flown = Flight.read(log)
+    flown.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
+    marks, said = motors.limits(flown)
+    assert "limit of its voltage (0 or 34 V) in the air, in all for " in said
+    stretch = marks[-1]
+    assert stretch.name == "at a limit"
+    assert np.isnan(stretch.x[2::3]).all()
+    # 0.1 (300 + 50 sin t) > 34 from arcsin 0.8, before it is armed, to pi less that
+    assert stretch.x[:2] == pytest.approx((1.0, math.pi - math.asin(0.8)), abs=1.0 / RATE)
 
 
 def test_the_page_needs_nothing_from_elsewhere(page):
-    assert page.addresses == list(page.images.values())
-    assert not {"script", "link", "iframe"} & set(page.tags)
+    assert page.addresses == []
+    assert not {"link", "iframe", "img"} & set(page.tags)
     assert not any("url(" in text or "@import" in text for text in page.texts)
 
 
+def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
+    code = (
+        "import sys; from pathlib import Path; from studies.flight import Flight; from studies.report import write;"
+        f"write(Flight.read({str(log)!r}), Path({str(log.with_suffix('.html'))!r}));"
+        "print([name for name in ('matplotlib', 'plotly') if name in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout.strip() == b"[]"
+
+
+def test_the_same_plots_on_paper(log, page, tmp_path):
+    pdf = write(Flight.read(log), tmp_path / "circle.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF")
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots)
+
+
+def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monkeypatch):
+    script = tmp_path / "plotly" / "package_data" / "plotly.min.js"
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    with pytest.raises(ValueError, match="pip install plotly"):
+        browser.script()
+    script.parent.mkdir(parents=True)
+    script.write_text("Plotly = {}")
+    importlib.invalidate_caches()
+    assert browser.script() == "Plotly = {}"
+
+
+def test_another_ending_is_refused(log, tmp_path):
+    with pytest.raises(ValueError, match=r"circle\.txt: expected a name that ends in \.html, \.pdf or \.png"):
+        write(Flight.read(log), tmp_path / "circle.txt")
+
+
+def test_two_flights_lie_over_each_other(log, tmp_path):
+    other = record(tmp_path / "weak.mcap", messages(rotors=0))
+    page = Page(write([Flight.read(log), Flight.read(other)], tmp_path / "both.html"))
+    names = [trace["name"] for trace in page.plots["position"]["data"]]
+    assert names == ["flown", "reference", "", "± RMSE", "± RMSE"] * 3  # the same flight: nothing to tell apart
+    assert any("Of circle alone (weak: the vehicle has no motors)." in text for text in page.texts)
+    assert any(text.startswith("weak: Landed") for text in page.texts)
+
+
+def test_what_differs_in_two_flights_has_their_names(log, tmp_path):
+    other = record(tmp_path / "moved.mcap", messages(east=1.0))  # it followed the same reference
+    one, two = (position.draw(Flight.read(path)) for path in (log, other))
+    both = overlay(one, two, ("a", "b"))
+    assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
+    assert both.panels[1].title == "a: RMSE 0.1000 m; b: RMSE 0.9000 m"
+    assert [mark.name for mark in both.panels[2].marks] == ["flown", "reference"]
+
+
+def test_the_keys_in_which_two_scenes_differ():
+    one = {"effects": {"gravity": {}, "wind": {"sigma": 1.0}}, "run": {"seed": 1}}
+    other = {"effects": {"wind": {"sigma": 2.0}}, "run": {"seed": 1}}
+    assert differences(one, other) == {"effects.gravity": ("yes", ""), "effects.wind.sigma": ("1", "2")}
+    many = differences({str(k): k for k in range(MANY + 3)}, {})
+    assert len(many) == MANY + 1
+    assert "3 more" in many
+
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_a_browser_draws_the_page_without_a_complaint(log, tmp_path):
+    page = report(log)
+    text = page.read_text(encoding="utf-8")
+    listen = 'window.addEventListener("error", (e) => document.body.setAttribute("complaint", e.message));'
+    page = tmp_path / "told.html"
+    page.write_text(text.replace("<body>", f"<body><script>{listen}</script>", 1), encoding="utf-8")
+    quiet = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
+    words = (CHROMIUM, *quiet, "--window-size=1200,9000", "--virtual-time-budget=30000", "--dump-dom", page.as_uri())
+    drawn = subprocess.run(words, check=True, capture_output=True, text=True, timeout=300).stdout
+    assert "complaint=" not in drawn
+    assert drawn.count('data-drawn="yes"') == text.count('<figure class="plot">')
+    assert drawn.count("main-svg") >= 2 * text.count('<figure class="plot">')
+
+
 def test_errors_are_the_offsets_that_were_flown(log, page):
-    for axis, unit, offset in zip(AXES, ("m", "m", "m", "rad", "rad", "rad"), OFFSET, strict=True):
-        assert page.after(f"{axis} [{unit}]") == f"{abs(offset):.4f}"
+    for index, (axis, offset) in enumerate(zip(AXES, OFFSET, strict=True)):
+        unit, scale = ("m", 1.0) if index < 3 else ("°", 180.0 / math.pi)
+        assert page.after(f"{axis} [{unit}]") == f"{scale * abs(offset):.4f}"
         assert Flight.read(log).rmse[axis] == pytest.approx(abs(offset), rel=1e-9)
         assert Flight.read(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
     assert page.after(page.after("x [m]")) == "0.2373"
@@ -221,14 +359,13 @@ def test_a_truncated_log_gives_a_report_too(log, tmp_path):
     assert page.after("digest") == "none: the log has no end"
     assert 0.0 < float(page.after("duration").removesuffix(" s")) < SECONDS
     assert page.after("x [m]") == "0.1000"
-    assert "displacements" in page.images
+    assert "position" in page.plots
 
 
 def test_what_is_missing_is_said(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
-    assert set(page.images) == {"displacements", "angles", "path", "air"}
-    assert "Left out: the log has no topic setpoint, actuators." in text
+    assert set(page.plots) == {"timeline", "position", "attitude", "path", "air"}
     assert "Left out: the vehicle has no motors." in text
     assert "Left out: the estimate states no uncertainty (it is the truth)." in text
     assert "No reference in this log" in text
@@ -237,7 +374,7 @@ def test_what_is_missing_is_said(tmp_path):
 def test_a_single_sample_is_enough(tmp_path):
     page = Page(report(record(tmp_path / "short.mcap", list(messages())[:5])))
     assert page.after("duration") == "0.00 s"
-    assert "displacements" in page.images
+    assert "position" in page.plots
 
 
 @pytest.mark.parametrize(
@@ -286,9 +423,7 @@ def test_thinning_a_line_keeps_its_peaks_and_ends(count):
     t = np.linspace(0.0, 1.0, count)
     y = np.sin(50.0 * t)
     y[count // 3], y[-2] = 9.0, -9.0
-    axes = Figure().add_subplot()
-    line(axes, t, y)
-    drawn_t, drawn_y = axes.lines[0].get_data()
+    drawn_t, drawn_y = thin(t, y)
     assert len(drawn_t) <= POINTS + 2
     assert (np.diff(drawn_t) > 0.0).all()
     assert (drawn_t[0], drawn_t[-1]) == (0.0, 1.0)

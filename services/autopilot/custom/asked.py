@@ -1,12 +1,11 @@
 """A controller of the user's in Python, as a part of the graph: asked at its rate while the motors run."""
 
-import math
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
 from cosim.schedule import KEPT, LockStepError, Port
-from cosim.user_module import blame
+from cosim.user_module import FAULTS, blame
 from dynamics.kernel import uncompiled
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
 from services.autopilot.custom.demand import DEMAND, Demand, demand
@@ -63,11 +62,9 @@ class AskedController(PeriodicPart):
         try:
             self._controller = self._controller or self._construct()
             found = demand(self._controller.step(time, estimate, setpoint))
-        except Exception as error:
+        except FAULTS as error:
             raise LockStepError(f"{self._said(error)} at t = {time:.3f} s") from error
-        if not all(map(math.isfinite, (*found.numbers, *found.roll_pitch))):
-            raise LockStepError(f"controller {self._code.name}: a command that is not finite at t = {time:.3f} s")
         graph.put(DEMAND, tick, found)
 
-    def _said(self, error: Exception) -> str:
+    def _said(self, error: BaseException) -> str:
         return f"controller {self._code.name}: {blame(error, self._module)}"

@@ -1,5 +1,6 @@
 """The user's controller or estimator, from its name to something that can be asked, with all that can be wrong."""
 
+import copy
 import inspect
 import math
 from collections.abc import Callable, Mapping
@@ -9,7 +10,7 @@ from typing import Any
 import numba
 from numba.core.errors import NumbaError
 
-from cosim.user_module import blame
+from cosim.user_module import FAULTS, blame
 from dynamics.errors import KeyedError
 from services.autopilot.custom.demand import demand
 from services.autopilot.law import Airframe
@@ -21,7 +22,6 @@ from services.common.user_code import named
 
 CONTROLLER, ESTIMATOR = "autopilot.controller", "autopilot.estimator"
 OUTPUTS = (MotorVoltages, ThrustAndMoments)
-FAULTS = (TypeError, ValueError, NumbaError, ArithmeticError, LookupError, AttributeError)  # of a step that is tried
 
 
 def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
@@ -97,7 +97,7 @@ def _rate(key: str, name: str, p: Any) -> float:
     return float(rate)
 
 
-def _told(error: Exception, module: ModuleType) -> str:
+def _told(error: BaseException, module: ModuleType) -> str:
     if isinstance(error, NumbaError):
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         return f"cannot be compiled: {lines[1] if len(lines) > 1 else lines[0]}"
@@ -112,12 +112,16 @@ def is_compiled(found: Any) -> bool:
 def constructor(
     key: str, module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]
 ) -> Callable[[], Any]:
-    """Makes a new one of what `key` names; KeyedError where that is refused."""
+    """Makes a new one of what `key` names: of a class, or as a copy of an object; KeyedError where that is refused."""
+    if options and not inspect.isclass(found):
+        raise KeyedError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
+
+    cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
 
     def construct() -> Any:
         try:
-            return found(vehicle, **options)
-        except Exception as error:
+            return cls(vehicle, **options) if cls else copy.deepcopy(found)
+        except FAULTS as error:
             raise _refused(key, error, module) from error
 
     return construct
@@ -127,7 +131,7 @@ def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Map
     """Parameters and first state of a compiled controller; KeyedError where they cannot be made."""
     try:
         p, s = found(vehicle, **options)
-    except Exception as error:
+    except FAULTS as error:
         raise _refused(CONTROLLER, error, module) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
         expected = "a NamedTuple of its own module, which has `step` too"
@@ -135,7 +139,7 @@ def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Map
     return p, s
 
 
-def _refused(key: str, error: Exception, module: ModuleType) -> KeyedError:
+def _refused(key: str, error: BaseException, module: ModuleType) -> KeyedError:
     """Options that do not fit, or whatever else a constructor complains of."""
     options = isinstance(error, TypeError) and "argument" in str(error)
     return KeyedError(f"{key}_options" if options else key, blame(error, module))

@@ -1,5 +1,6 @@
 """What a controller of the user's asks for, and its way to the motors."""
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
@@ -27,19 +28,32 @@ class Demand(NamedTuple):
 
 
 def demand(output: Any) -> Demand:
-    """The demand of a `MotorVoltages` or `ThrustAndMoments`; TypeError of anything else."""
+    """The demand of a `MotorVoltages` or `ThrustAndMoments`.
+
+    Raises:
+        TypeError: anything else, or other than numbers in it.
+        ValueError: a number is not finite.
+    """
     if isinstance(output, MotorVoltages):
-        a, b, c, d = map(float, output.volts)
-        return Demand(True, (a, b, c, d), _two(output.roll_pitch))
-    if isinstance(output, ThrustAndMoments):
-        x, y, z = map(float, output.moments_body)
-        return Demand(False, (float(output.thrust), x, y, z), _two(output.roll_pitch))
-    raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
+        to_motors, numbers = True, _numbers("volts", output.volts, 4)
+    elif isinstance(output, ThrustAndMoments):
+        to_motors, moments = False, _numbers("moments_body", output.moments_body, 3)
+        numbers = (*_numbers("thrust", (output.thrust,), 1), *moments)
+    else:
+        raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
+    return Demand(to_motors, numbers, _numbers("roll_pitch", output.roll_pitch, 2))
 
 
-def _two(roll_pitch: Iterable[float]) -> tuple[float, float]:
-    roll, pitch = map(float, roll_pitch)
-    return roll, pitch
+def _numbers(what: str, given: Iterable[float], n: int) -> Any:
+    try:
+        found = tuple(map(float, given))
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != n:
+        raise TypeError(f"step returned {what} = {' '.join(repr(given).split())}, expected {n} number{'s' * (n > 1)}")
+    if not all(map(math.isfinite, found)):
+        raise ValueError(f"step returned {what} = {found}, which is not finite")
+    return found
 
 
 @implements(demand, inline=True)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from cosim.part import GO_ON, LOOK, Received
 from cosim.schedule import KEPT, Input, LockStepError, Port
-from cosim.user_module import blame
+from cosim.user_module import FAULTS, blame
 from dynamics.kernel import leaf
 from services.autopilot.attention import Attention, attention_due
 from services.autopilot.custom.periodic import PeriodicPart
@@ -38,7 +38,7 @@ class AskedEstimator(PeriodicPart):
         try:
             self._estimator = self._estimator or self._construct()
             estimate = checked_estimate(self._estimator.step(time, readings))
-        except Exception as error:
+        except FAULTS as error:
             said = blame(error, self._module)
             raise LockStepError(f"estimator {self._code.name}: {said} at t = {time:.3f} s") from error
         self._graph.put(HELD, tick, estimate)

@@ -13,11 +13,12 @@ from dynamics.integrators import check_start
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.noise import Key, stream_key
 from dynamics.vector import ZERO
+from dynamics.vehicles.standing import at_rest
 from services.common import ports
 from services.common.exchange import Exchange, Rates, ticks
 from services.common.ports import BatteryGauge, BodyMotions, TrueState
 from services.common.sections import Run
-from services.common.vehicle import Vehicle, airframe, start_pose
+from services.common.vehicle import Vehicle, airframe, gravity, start_pose
 from services.plant.config import Solver, method
 from services.plant.cores.autonomous import AutonomousPlant
 from services.plant.cores.multirotor import MultirotorPlant, MultirotorPlantState
@@ -94,8 +95,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceSetup:
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
     settle = round(scene[Run].settle * exchange.rate)
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
-    position, attitude = start_pose(scene)
-    start = MultirotorPlantState(form.initial_state(p, position, attitude), last_tick(scene))
+    start = MultirotorPlantState(at_rest(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay = exchange.loop_delay
     return ServiceSetup(

@@ -3,46 +3,46 @@
 from collections import Counter
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from studies.flight import Flight
-from studies.report.style import BOUND, FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
+from studies.report.plot import Band, Line, NotRecordedError, Panel, Plot
+from studies.report.style import STEERED
+from studies.report.whole import DEGREES, over
 from studies.topic_view import TopicView
 
 ORDER = 70
 TITLE = "Estimator: error and 3-sigma bounds"
 NEEDS = ("truth", "estimate")
 MODELS = STEERED
-_COLUMNS = (("position", "m", "xyz"), ("velocity", "m/s", "xyz"), ("attitude", "rad", "xyz"))
+_COLUMNS = (("position", "m", 1.0), ("velocity", "m/s", 1.0), ("attitude", "°", DEGREES))
 
 
-def draw(flight: Flight) -> tuple[Figure, str]:
+def draw(flight: Flight) -> Plot:
     """Errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row for each axis."""
     error, sigma = errors(flight), deviations(flight.estimate)
     if not sigma.any():
         raise NotRecordedError("the estimate states no uncertainty (it is the truth)")
-    figure, axes = rows(3, columns=3, height=1.8)
-    t = flight.estimate.stamps
-    for column, (quantity, unit, names) in enumerate(_COLUMNS):
-        axes[0, column].set_title(f"{quantity} error [{unit}]")
-        for row, name in enumerate(names):
-            axis, index = axes[row, column], 3 * column + row
-            axis.fill_between(t, -3 * sigma[:, index], 3 * sigma[:, index], color=BOUND, alpha=0.16, linewidth=0)
-            line(axis, t, error[:, index], color=FLOWN, linewidth=0.8)
-            axis.set_ylabel(name, rotation=0)
-            # A touch-down's short peak must not flatten the flight: the scale leaves out 3 % of the samples.
-            scale = 1.3 * max(np.quantile(np.abs(error[:, index]), 0.97), np.quantile(3 * sigma[:, index], 0.95), 1e-12)
-            axis.set_ylim(-scale, scale)
-            peak = f"largest {np.abs(error[:, index]).max():.2g}"
-            axis.text(0.02, 0.97, peak, transform=axis.transAxes, ha="left", va="top", fontsize=8, color="#555555")
-    shade_phases(axes, flight)
     inside = np.mean(np.abs(error) <= 3 * sigma)
-    return figure, (
+    t, panels, cut = flight.estimate.stamps, [], 0
+    for column, (quantity, unit, scale) in enumerate(_COLUMNS):
+        for row, name in enumerate("xyz"):
+            off, bound = (scale * values[:, 3 * column + row] for values in (error, 3 * sigma))
+            # A touch-down's short peak must not flatten the flight: the scale leaves out 3 % of the samples.
+            half = 1.3 * max(np.quantile(np.abs(off), 0.97), np.quantile(bound, 0.95), 1e-12)
+            largest = np.abs(off).max()
+            cut += int(np.sum(np.abs(off) > half))
+            beyond = f"largest {largest:.2g} {unit}" + (", beyond this scale" if largest > half else "")
+            marks = Band(t, -bound, bound, "3 sigma"), Line(t, off, "estimate minus truth", width=1.0)
+            label = f"{quantity} {name} [{unit}]"
+            panels.append(Panel(marks, label, note=beyond, row=row, column=column, y_range=(-half, half)))
+    said = f"{cut} samples lie beyond the scales of their panels" if cut else "Nothing lies beyond the scales"
+    caption = (
         "Estimate minus truth at the estimate's own time, within three standard deviations as the estimator says "
-        f"(shaded); {100 * inside:.1f} % of the errors lie inside. "
-        "The scale leaves out the largest 3 %. Attitude as rotation vector in the body frame. " + refusals(flight)
+        f"(shaded); {100 * inside:.1f} % of the errors lie inside. {said}. "
+        "Attitude as rotation vector in the body frame. " + refusals(flight)
     )
+    return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, (1.0,) * 3, **over(flight))
 
 
 def deviations(estimate: TopicView) -> np.ndarray:

@@ -1,64 +1,64 @@
 """Quadrotors that carry a load: how well it follows its path, how the links hang, and the view from the side."""
 
+from typing import Any
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from studies.flight import Flight
-from studies.report.style import AXIS_COLOURS, BOUND, DASHED, FLOWN, WIDTH
+from studies.report.plot import Line, Panel, Plot, reference
+from studies.report.style import BOUND, COLOURS
+from studies.report.whole import over
 
 ORDER = 35
 TITLE = "Load, links and quadrotors"
 NEEDS = ("truth", "bodies", "lift")
 MODELS = ("cooperative_load",)
-COLOURS = (*AXIS_COLOURS, BOUND)
 INSTANTS = 11  # pictures of the links
 
 
-def draw(flight: Flight) -> tuple[Figure, str]:
-    """Three plots over time on the left, the view from the side on the right."""
+def draw(flight: Flight) -> Plot:
+    """Three panels over time on the left, the view from the side on the right."""
     t = flight.times("bodies")
     places = flight.topic("bodies").position
     wanted = _wanted(flight, t)
     error = np.linalg.norm(places[:, 0] - wanted, axis=1)
-    figure = Figure(figsize=(WIDTH, 6.4), layout="constrained")
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.2, 1.0))
-    axes = [figure.add_subplot(grid[i, 0]) for i in range(3)]
-    axes[0].semilogy(t, error, color=FLOWN)
-    axes[0].set_ylabel("load error [m]")
     links = places[:, :1] - places[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
     thrust = flight.topic("lift").thrust
-    for i in range(links.shape[1]):
-        colour = COLOURS[i % len(COLOURS)]
-        axes[1].plot(t, angle[:, i], color=colour, label=f"link {i + 1}")
-        axes[2].plot(flight.times("lift"), thrust[:, i], color=colour, label=f"quadrotor {i + 1}")
-    axes[1].set_ylabel("link from vertical [°]")
-    axes[2].set(ylabel="thrust [N]", xlabel="time [s]")
-    for axis in axes:
-        axis.margins(x=0.0)
-    for axis in axes[1:]:
-        axis.legend(loc="best", ncols=2)
-    side(figure.add_subplot(grid[:, 1]), places, wanted)
-    return figure, (
+    panels = (
+        Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
+        Panel(_each(t, angle), "link from vertical [°]", row=1),
+        Panel(_each(flight.times("lift"), thrust), "thrust [N]", row=2),
+        side(places, wanted),
+    )
+    said = (
         "Distance of the load from its path, the links' angles in the x-z plane and the thrusts; on the right the "
         f"whole from the side at {INSTANTS} instants. At the end the load is {error[-1]:.2g} m from its path."
     )
+    return Plot(panels, said, 7.2, (1.0,) * 3, (1.2, 1.0), **over(flight))
 
 
-def side(axes: Axes, places: np.ndarray, wanted: np.ndarray) -> None:
+def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
     """The load's path and the links seen along y."""
-    axes.plot(places[:, 0, 0], places[:, 0, 2], color=FLOWN, label="load")
-    axes.plot(wanted[:, 0], wanted[:, 2], label="wanted path", **DASHED)
-    for k in np.linspace(0, len(places) - 1, INSTANTS).astype(int):
-        load = places[k, 0]
-        for i, quad in enumerate(places[k, 1:]):
-            colour = COLOURS[i % len(COLOURS)]
-            axes.plot((quad[0], load[0]), (quad[2], load[2]), color=colour, linewidth=0.7)
-            axes.plot(quad[0], quad[2], marker="s", markersize=4, color=colour)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="x [m]", ylabel="z up [m]")
-    axes.legend(loc="best")
+    marks = [
+        Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
+        reference(wanted[:, 0], wanted[:, 2], name="wanted path"),
+    ]
+    some = places[np.linspace(0, len(places) - 1, INSTANTS).astype(int)]
+    for i in range(places.shape[1] - 1):
+        quad, colour = some[:, 1 + i], COLOURS[i % len(COLOURS)]
+        gap = np.full(len(some), np.nan)
+        x = np.column_stack([quad[:, 0], some[:, 0, 0], gap]).ravel()
+        z = np.column_stack([quad[:, 2], some[:, 0, 2], gap]).ravel()
+        marks.append(Line(x, z, colour=colour, width=0.7))
+        marks.append(Line(quad[:, 0], quad[:, 2], f"quadrotor {i + 1}", colour, marker="square", joined=False))
+    place: dict[str, Any] = {"row": 0, "column": 1, "rows": 3}
+    return Panel(tuple(marks), "z up [m]", "x [m]", timed=False, equal=True, **place)
+
+
+def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
+    """A line for each quadrotor of values of shape (n, quadrotors)."""
+    return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
 
 
 def _wanted(flight: Flight, t: np.ndarray) -> np.ndarray:

@@ -1,39 +1,74 @@
-"""Speed, voltage and power of each motor over time (the paper's Figures 24 to 26)."""
+"""Speed, voltage and power of the motors over time (the paper's Figures 24 to 26)."""
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from studies.flight import Flight
-from studies.report.style import FLOWN, STEERED, NotRecordedError, line, rows, shade_phases
+from studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
+from studies.report.style import BOUND, COLOURS, STEERED
+from studies.report.whole import over
 
 ORDER = 50
 TITLE = "Motors: speed, voltage and power"
 NEEDS = ("truth",)
 MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
+NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
 
 
-def draw(flight: Flight) -> tuple[Figure, str]:
-    """One row for each quantity, one column for each motor."""
-    t = flight.truth.times
-    quantities = (
-        ("propeller speed [rpm]", flight.truth.rotor_speed * RPM),
-        ("voltage [V]", flight.truth.motor_voltage),
-        ("electrical power [W]", flight.truth.motor_power),
-    )
-    count = quantities[0][1].shape[-1]
-    if count == 0:
+def draw(flight: Flight) -> Plot:
+    """One panel for each quantity, one line for each motor."""
+    truth, t = flight.truth, flight.truth.times
+    if truth.rotor_speed.shape[-1] == 0:
         raise NotRecordedError("the vehicle has no motors")
-    figure, axes = rows(3, columns=count, sharey="row")
-    for row, (label, values) in zip(axes, quantities, strict=True):
-        row[0].set_ylabel(label)
-        for axis, of_motor in zip(row, values.T, strict=True):
-            line(axis, t, of_motor, color=FLOWN, linewidth=0.9)
-    for motor, axis in enumerate(axes[0]):
-        axis.set_title(f"motor {motor + 1}")
-    shade_phases(axes, flight)
-    energy = float(np.sum(np.diff(t) * quantities[2][1].sum(axis=1)[:-1])) / 3600.0
-    return (
-        figure,
-        f"Speed of each propeller, voltage and electrical power of its motor. Energy drawn: {energy:.1f} W h.",
+    quantities = (
+        ("propeller speed [rpm]", truth.rotor_speed * RPM),
+        ("voltage [V]", truth.motor_voltage),
+        ("electrical power [W]", truth.motor_power),
     )
+    panels = [Panel(motors(t, values), label) for label, values in quantities]
+    marks, said = limits(flight)
+    panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
+    energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / 3600.0
+    caption = f"Speed of each propeller, voltage and electrical power of its motor. Energy drawn: {energy:.1f} W h. "
+    return Plot(caption=caption + said, **column(panels, 2.2, **over(flight)))
+
+
+def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
+    """A line for each motor of values of shape (n, motors)."""
+    return tuple(
+        Line(t, of_motor, f"motor {k + 1}", COLOURS[k % len(COLOURS)], 1.0) for k, of_motor in enumerate(values.T)
+    )
+
+
+def limits(flight: Flight) -> tuple[tuple[Level | Line, ...], str]:
+    """The limits of the voltage, the stretches in which a motor is at one, and a sentence on them."""
+    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    if highest is None:
+        return (), "The log does not say what limits the voltage."
+    levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")
+    if not len(flight.armed):
+        return levels, f"Limits of the voltage: 0 and {highest:g} V."
+    n = len(flight.armed)
+    t, voltage = flight.truth.times[:n], flight.truth.motor_voltage[:n]
+    flying = (flight.armed & ~flight.truth.ground_contact[:n])[:, None]
+    low, high = flying & (voltage < NEAR * highest), flying & (voltage > (1.0 - NEAR) * highest)
+    step = np.diff(t, append=t[-1])
+    lasted = step[(low | high).any(axis=1)].sum()
+    if not lasted:
+        return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
+    marks = (*_stretches(t, low, 0.0), *_stretches(t, high, highest))
+    return (*levels, *marks), (
+        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for {lasted:.2f} s, "
+        f"{100.0 * lasted / max(step[flying[:, 0]].sum(), 1e-9):.2g} % of that time."
+    )
+
+
+def _stretches(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
+    """One line along the limit, at most: start, end and a gap for each stretch in which any motor is there."""
+    any_motor = np.concatenate([[False], at_limit.any(axis=1), [False]])
+    edges = np.flatnonzero(any_motor[1:] != any_motor[:-1])
+    if not len(edges):
+        return ()
+    starts, ends = t[edges[::2]], t[(edges[1::2]).clip(max=len(t) - 1)]
+    x = np.column_stack([starts, ends, np.full(len(starts), np.nan)]).ravel()
+    return (Line(x, np.where(np.isnan(x), np.nan, limit), "at a limit", BOUND, 4.0, marker="square", size=6.0),)

@@ -1,65 +1,40 @@
 """The path in space, and seen from above."""
 
-from typing import Any
-
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from studies.flight import Flight
-from studies.report.style import DASHED, FLOWN, POINTS, WIDTH
+from studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
 
 ORDER = 40
 TITLE = "Path"
 NEEDS = ("truth",)
 
 
-def draw(flight: Flight) -> tuple[Figure, str]:
+def draw(flight: Flight) -> Plot:
     """The path in 3D on the left, its plan view on the right."""
-    figure = Figure(figsize=(WIDTH, 4.9), layout="constrained")
-    space(figure.add_subplot(1, 2, 1, projection="3d"), flight)
-    plan(figure.add_subplot(1, 2, 2), flight)
-    return figure, "The flown path beside the reference, in space (left) and from above, north up (right)."
+    if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
+        raise NotRecordedError("it never leaves its place")
+    beside = " beside the reference" if len(flight.reference) else ""
+    said = f"The flown path{beside}, in space (left) and from above, north up (right)."
+    return Plot((space(flight), plan(flight)), said, 4.9, (1.0,), (1.0, 1.0))
 
 
-def space(axes: Axes3D, flight: Flight) -> None:
-    """Draw into a 3D plot; the three axes have one scale."""
-    reference, position = _paths(flight)
-    axes.plot(*position.T, color=FLOWN, linewidth=2.0, label="flown")
-    if len(reference):
-        axes.plot(*reference.T, label="reference", **DASHED)
-    low, high = position.min(axis=0), position.max(axis=0)
-    half = 0.55 * max((high - low).max(), 0.5)
-    middle = 0.5 * (low + high)
-    axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
-    floor = min(low[2], 0.0)
-    axes.set_zlim(floor, floor + 2 * half)
-    axes.set_box_aspect((1, 1, 1), zoom=0.88)
-    axes.set(xlabel="x east [m]", ylabel="y north [m]")
-    axes.zaxis.set_rotate_label(False)  # it would stand on its head
-    axes.set_zlabel("z up [m]", rotation=90)
-    axes.view_init(elev=24, azim=-128)
-    axes.legend(loc="upper left")
+def space(flight: Flight) -> Panel:
+    """The path in space; the three axes have one scale."""
+    x, y, z = flight.truth.position.T
+    marks = [Line(x, y, "flown", width=2.0, z=z)]
+    if len(flight.reference):
+        east, north, up = flight.reference.T[:3]
+        marks.append(reference(east, north)._replace(z=up))
+    return Panel(tuple(marks), "y north [m]", "x east [m]", z_label="z up [m]", timed=False)
 
 
-def plan(axes: Axes, flight: Flight) -> None:
-    """Draw what is seen from above."""
-    reference, position = _paths(flight)
-    axes.plot(*position[:, :2].T, color=FLOWN, linewidth=2.0, label="flown")
-    if len(reference):
-        axes.plot(*reference[:, :2].T, label="reference", **DASHED)
-    ends: dict[str, Any] = {"color": FLOWN, "markersize": 7, "linestyle": "none"}
-    axes.plot(*position[0, :2], marker="o", markerfacecolor="white", label="start", **ends)
-    axes.plot(*position[-1, :2], marker="s", label="end", **ends)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.12)
-    axes.set(xlabel="x east [m]", ylabel="y north [m]")
-    axes.legend(loc="best")
-
-
-def _paths(flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-    """Reference and flown positions [m], world frame, shapes (m, 3) and (n, 3), thinned for drawing."""
-    position = flight.truth.position
-    every = max(1, len(position) // POINTS)
-    return flight.reference[::every, :3], position[::every]
+def plan(flight: Flight) -> Panel:
+    """What is seen from above."""
+    x, y, _ = flight.truth.position.T
+    marks = [Line(x, y, "flown", width=2.0)]
+    if len(flight.reference):
+        marks.append(reference(*flight.reference.T[:2]))
+    marks.append(Line(x[:1], y[:1], "start", marker="open", size=8.0, joined=False))
+    marks.append(Line(x[-1:], y[-1:], "end", marker="square", size=7.0, joined=False))
+    return Panel(tuple(marks), "y north [m]", "x east [m]", column=1, timed=False, equal=True)

@@ -29,8 +29,6 @@ def clearances(feet, ground):
 @pytest.mark.parametrize("level", [None, ground(), ground(slope=[0.0, 0.0])])
 def test_on_level_ground_it_is_not_turned_by_a_bit(level):
     assert standing_pose(FEET, level) == ((0.0, 0.0, 0.35), NO_ROTATION)
-    uneven = [(0.2, 0.0, -0.3), (-0.2, 0.1, -0.35), (-0.2, -0.1, -0.35)]
-    assert standing_pose(uneven, level) == ((0.0, 0.0, 0.35), NO_ROTATION)
     assert standing_pose([], level) == ((0.0, 0.0, 0.0), NO_ROTATION)
 
 
@@ -44,12 +42,29 @@ def test_on_a_slope_every_foot_touches(slope):
     assert standing_pose(FEET, plane)[0][:2] == (0.0, 0.0)
 
 
-def test_of_uneven_feet_the_lowest_touches():
-    uneven = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.2, -0.2, -0.32)]
-    plane = ground(slope=[0.1, 0.0])
-    R, heights = clearances(uneven, plane)
-    assert R[:, 2] == pytest.approx(plane.normal, abs=1e-12)
-    assert heights.min() == pytest.approx(0.0, abs=1e-12)
+UNEVEN = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.25, -0.2, -0.32)]
+
+
+@pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.3)])
+def test_of_uneven_feet_three_around_the_centre_of_mass_touch(slope):
+    R, heights = clearances(UNEVEN, ground(slope=list(slope)))
+    assert heights.min() > -1e-12
+    assert np.sort(heights)[2] < 1e-12
+    touching = (np.array(UNEVEN) @ R.T)[np.argsort(heights)[:3], :2]
+    shares = np.linalg.solve(np.vstack([touching.T, np.ones(3)]), [0.0, 0.0, 1.0])
+    assert shares.min() >= -1e-9
+    assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_three_feet_of_unequal_height_give_the_tilt_in_closed_form():
+    R, heights = clearances([(0.2, 0.0, -0.30), (-0.2, 0.1, -0.35), (-0.2, -0.1, -0.35)], None or ground())
+    assert abs(heights).max() < 1e-12
+    assert math.atan2(-R[2, 0], R[2, 2]) == pytest.approx(math.atan2(0.05, 0.4), abs=1e-12)  # nose down
+
+
+def test_feet_that_do_not_stand_around_the_centre_of_mass_leave_it_level():
+    (x, y, z), attitude = standing_pose([(0.1, 0.1, -0.3), (0.2, 0.1, -0.35), (0.2, -0.1, -0.35)], ground())
+    assert (x, y, z, attitude) == (0.0, 0.0, 0.35, NO_ROTATION)
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, -0.05)])

@@ -56,7 +56,7 @@ def test_page_and_tables(found, tmp_path):
     path = tmp_path / "tune.html"
     report.write(path, found)
     page = path.read_text()
-    assert page.count("data:image/png") == 2
+    assert page.count('<figure class="plot">') == 2
     assert "Open loops" in page
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=120)

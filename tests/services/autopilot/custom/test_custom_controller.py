@@ -162,7 +162,7 @@ def test_a_command_that_is_not_finite_is_refused(scene):
         "        return T", "        if time > 1.0:\n            self.weight = float('nan')\n        return T"
     )
     assert (
-        "own_python:Altitude: a command that is not finite at t = 1.008 s"
+        "own_python:Altitude: ValueError: step returned thrust = (nan,), which is not finite at t = 1.008 s"
         in fly(scene("own_python", text, "Altitude")).failure
     )
 
@@ -191,7 +191,7 @@ def test_what_is_wrong_is_one_line_with_the_key(scene, module, text, name, overr
     with pytest.raises(KeyedError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
-    assert line.startswith("autopilot.controller")
+    assert line.startswith("--set autopilot.controller")
     assert said in line
     assert "\n" not in line
 

@@ -1,0 +1,94 @@
+"""How a flight ended, and what flew, for the head of the page."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from studies.flight import Flight
+
+LONG = 60  # letters of an effect's keys that are still listed
+MANY = 12  # keys in which two scenes differ that are listed
+
+
+class Verdict(NamedTuple):
+    """How a flight ended; `kind` is "good", "bad" or "" where there is nothing to judge."""
+
+    kind: str
+    text: str
+
+
+def verdict(flight: Flight) -> Verdict:
+    """Whether it landed, when, or why it ended before."""
+    lasted = f"{flight.truth.times[-1]:.2f} s"
+    if flight.failure:
+        return Verdict("bad", f"Ended before its time, at {lasted}: {flight.failure}")
+    if flight.origin.recorded and not flight.digest:
+        return Verdict("bad", f"The log has no end: it breaks off at {lasted}")
+    if not flight.has("status"):
+        return Verdict("", f"Flown to the end, {lasted}; nobody steers, so nothing has to land")
+    if flight.landed:
+        return Verdict("good", f"Landed: upright, at rest and on the ground at {lasted}")
+    if flight.finished:
+        return Verdict("bad", f"Not landed: the mission is over at {lasted}, the vehicle not upright or not at rest")
+    return Verdict("bad", f"Not landed: the mission was not over at {lasted}")
+
+
+def facts(flight: Flight) -> dict[str, str]:
+    """What flew, and how it was computed, by name; what the log does not say is left out."""
+    said, scene = flight.metadata, flight.origin.scene
+    t = flight.truth.times
+    vehicle, autopilot = scene.get("vehicle", {}), scene.get("autopilot", {})
+    kind = vehicle.get("airframe") or vehicle.get("model", "")
+    mass = scene.get("airframe", {}).get("mass", {}).get("total")
+    steered = "autopilot" in flight.origin.scene and flight.has("actuators")
+    found = {
+        "scene": said.get("scene", ""),
+        "log": flight.origin.source if flight.origin.recorded else "",
+        "vehicle": ", ".join(filter(None, (flight.vehicle, kind, f"{mass:g} kg" if mass else ""))),
+        "effects": "; ".join(_with_keys(name, keys) for name, keys in scene.get("effects", {}).items()),
+        "sensors": "; ".join(_with_keys(name, keys) for name, keys in scene.get("sensors", {}).items()),
+        "estimator": str(autopilot.get("estimator", "")) if steered else "",
+        "gains": _gains(scene) if steered else "",
+        "duration": f"{t[-1] - t[0]:.2f} s",
+        "landed": "yes" if flight.landed else "no" if flight.has("status") else "",
+        "seed": said.get("seed", ""),
+        "mode": said.get("mode", ""),
+        "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
+        "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
+        "version": said.get("version", ""),
+        "commit": said.get("commit", ""),
+        "digest": flight.digest or "none: the log has no end",
+    }
+    return {name: value for name, value in found.items() if value}
+
+
+def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """The keys of two scenes whose values differ, and both values; of many the first, and how many more."""
+    first, second = dict(_leaves(one)), dict(_leaves(other))
+    keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
+    found = {key: (_short(first.get(key, "")), _short(second.get(key, ""))) for key in keys[:MANY]}
+    if len(keys) > MANY:
+        found[f"{len(keys) - MANY} more"] = ("", "")
+    return found
+
+
+def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted key and value of all that is no table; an empty table, such as an effect without keys, is "yes"."""
+    for key, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", "yes" if isinstance(value, dict) else value
+
+
+def _gains(scene: dict[str, Any]) -> str:
+    name, told = str(scene["autopilot"].get("gains", "")), scene.get("gains", {}).get("description", "")
+    return f"{name}: {told}" if name and told else name
+
+
+def _with_keys(name: str, keys: dict[str, Any]) -> str:
+    told = ", ".join(f"{key} {_short(value)}" for key, value in keys.items())
+    return f"{name} ({told if len(told) <= LONG else f'{len(keys)} keys'})" if told else name
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,177 @@
+"""`import lapwing`: controllers and estimators handed over, loaded scenes, campaigns; and what is wrong in one line."""
+
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import lapwing
+from services.common.controllers import ThrustAndMoments
+from services.common.estimators import StateEstimate
+
+MODULE = """
+from services.common.controllers import ThrustAndMoments
+
+class Altitude:
+    rate = 125.0
+
+    def __init__(self, vehicle, extra=0.0):
+        self.weight = vehicle.mass * vehicle.gravity + extra
+
+    def step(self, time, estimate, setpoint):
+        p, v, r, s = estimate.position_world, estimate.velocity_world, setpoint.position_world, setpoint.velocity_world
+        w = estimate.omega_body
+        thrust = self.weight + 60.0 * (r[2] - p[2]) + 40.0 * (s[2] - v[2])
+        return ThrustAndMoments(thrust, (-3.0 * w[0], -3.0 * w[1], -3.0 * w[2]))
+"""
+SHORT = {"run.duration": 1.5}
+
+
+@pytest.fixture
+def altitude(tmp_path, monkeypatch):
+    """The class of a module on Python's path."""
+    (tmp_path / "given_altitude.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    import given_altitude
+
+    yield given_altitude.Altitude
+    del sys.modules["given_altitude"]
+
+
+def test_a_class_a_copy_and_a_name_fly_like_the_scene_that_names_it(altitude):
+    named = lapwing.fly("hover", {**SHORT, "autopilot.controller": "given_altitude:Altitude"})
+    vehicle = named.setup.services["autopilot"].parameters.vehicle
+    flights = [
+        lapwing.fly("hover", SHORT, controller="given_altitude:Altitude"),
+        lapwing.fly("hover", SHORT, controller=altitude),
+        lapwing.fly("hover", SHORT, controller=altitude(vehicle)),
+        lapwing.fly(lapwing.load("hover", SHORT), controller=type("Local", (altitude,), {})),
+    ]
+    assert {flight.digest for flight in flights} == {named.digest}
+    assert [len(flight.setup.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would carry
+    assert named.digest != lapwing.fly("hover", SHORT, controller=altitude, controller_options={"extra": 9.0}).digest
+
+
+def test_an_edited_class_is_flown_as_it_was_handed_over(altitude, tmp_path):
+    before = lapwing.fly("hover", SHORT, controller=altitude)
+    (tmp_path / "given_altitude.py").write_text(MODULE.replace("60.0", "30.0"))
+    assert lapwing.fly("hover", SHORT, controller=altitude).digest == before.digest
+
+
+def test_an_estimator_is_handed_over_in_the_same_way():
+    class Blind:
+        rate = 250
+
+        def __init__(self, vehicle, height=0.0):
+            self.height = height + vehicle.resting_height
+
+        def step(self, time, readings):
+            return StateEstimate(position_world=(0.0, 0.0, self.height))
+
+    flight = lapwing.fly("hover", {"run.duration": 0.5}, estimator=Blind, estimator_options={"height": 0.25})
+    assert flight.estimate.position[:, 2] == pytest.approx(0.6)
+
+
+class Faulty(NamedTuple):
+    """A controller that returns what it is told to, and its rate."""
+
+    output: object
+    rate: float = 250.0
+
+    def step(self, time, estimate, setpoint):
+        """What it is told to."""
+        if isinstance(self.output, BaseException):
+            raise self.output
+        return self.output
+
+
+@pytest.mark.parametrize(
+    ("controller", "said"),
+    [
+        (Faulty((1.0, 2.0)), "step returned tuple, expected MotorVoltages or ThrustAndMoments"),
+        (Faulty(ThrustAndMoments(1.0, (0.0, 0.0))), "step returned moments_body = (0.0, 0.0), expected 3 numbers"),
+        (Faulty(ThrustAndMoments(np.zeros(2), (0.0,) * 3)), "thrust = (array([0., 0.]),), expected 1 number"),
+        (Faulty(ThrustAndMoments(float("nan"), (0.0,) * 3)), "thrust = (nan,), which is not finite"),
+        (Faulty(RuntimeError("no\nway")), "memory:Faulty: RuntimeError: no (test_api.py, line "),
+        (Faulty(SystemExit(3)), "memory:Faulty: SystemExit: 3 (test_api.py, line "),
+        (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), 100.0), "expected a rate that divides exchange.rate = 250 Hz"),
+        (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), "fast"), "has rate = 'fast'; expected a number of steps a second"),
+        (7, "memory:int has no step; expected the method `step`"),
+        ("memory:Gone", "Gone was an object in the memory of the Python session that flew it"),
+        ("nowhere", "expected a text of the form \"module:Name\", got 'nowhere'"),
+    ],
+)
+def test_a_controller_that_cannot_be_flown_is_a_scene_error_of_one_line(controller, said):
+    with pytest.raises(lapwing.SceneError) as caught:
+        lapwing.fly("hover", controller=controller)
+    line = str(caught.value)
+    assert line.startswith("--set autopilot.controller: ")
+    assert said in line
+    assert "\n" not in line
+
+
+def test_options_belong_to_a_class_and_a_controller_to_a_scene_with_an_autopilot():
+    with pytest.raises(lapwing.SceneError, match="controller_options: a Faulty is there already; expected a class"):
+        lapwing.fly("hover", controller=Faulty(None), controller_options={"gain": 1.0})
+    with pytest.raises(lapwing.SceneError, match="the model gyrostat knows no such table"):
+        lapwing.fly("gyrostat_chaotic", controller=Faulty(None))
+
+
+def test_a_loaded_scene_takes_more_overrides_and_the_later_ones_hold():
+    scene = lapwing.load("hover", {"run.duration": 1.5, "run.seed": 3})
+    again = lapwing.load(scene, ["run.duration=0.5"])
+    assert (again.lookup("run.duration"), again.lookup("run.seed")) == (0.5, 3)
+    assert lapwing.load(again) is again
+    assert repr(again) == "<Scene hover, run.duration=1.5, run.seed=3, run.duration=0.5>"
+    flight = lapwing.fly(scene, {"run.duration": 0.5}, seed=4)
+    assert (flight.setup.seed, flight.setup.duration) == (4, 0.5)
+    assert repr(flight) == "<Flight of hover, 0.50 s: not landed>"
+
+
+def test_a_campaign_varies_a_loaded_scene_by_seed():
+    scene = lapwing.load("hover", {"run.duration": 0.5})
+    vary = {"vehicle.mass": lapwing.normal(10.4, 0.2)}
+    flights = lapwing.campaign(scene, seeds=range(3), vary=vary)
+    masses = [flight.setup.services["autopilot"].parameters.airframe.mass for flight in flights]
+    assert [flight.setup.seed for flight in flights] == [0, 1, 2]
+    assert masses == [float(np.random.default_rng(seed).normal(10.4, 0.2)) for seed in range(3)]
+    alone = lapwing.campaign(scene, seeds=[2], vary=vary)
+    assert alone[0].digest == flights[2].digest
+    assert [f.setup.seed for f in lapwing.campaign(scene, seeds=np.arange(2))] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: lapwing.campaign("hover", [1], {"vehicle.mass": 10.4}), "vehicle.mass: expected a distribution"),
+        (lambda: lapwing.campaign("hover", [1], {"vehicle.mas": lapwing.normal(1.0, 0.0)}), "did you mean mass?"),
+        (lambda: lapwing.campaign("hover", [-1]), "run.seed: expected a whole number from 0 to 2^63 - 1, got -1"),
+        (lambda: lapwing.campaign("hover", [1.5]), "run.seed: expected a whole number from 0 to 2^63 - 1, got 1.5"),
+        (lambda: lapwing.fly("hover", seed=-1), "run.seed: expected a whole number at least 0"),
+        (lambda: lapwing.fly("hoverr"), "unknown scene 'hoverr'; did you mean hover?"),
+        (lambda: lapwing.load("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),
+        (lambda: lapwing.load("hover", {3: 1}), "expected the keys of overrides as texts, got 3"),
+        (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: nobody steers there"),
+    ],
+)
+def test_mistakes_are_scene_errors_of_one_line(wrong, said):
+    with pytest.raises(lapwing.SceneError) as caught:
+        wrong()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("wrong", [lambda: lapwing.normal(1.0, -1.0), lapwing.choice, lambda: lapwing.uniform(2, 1)])
+def test_a_distribution_that_cannot_be_drawn_from_is_refused_where_it_is_made(wrong):
+    with pytest.raises(ValueError, match="expected"):
+        wrong()
+
+
+def test_a_plot_is_a_figure_and_a_file(tmp_path):
+    flight = lapwing.fly("hover", {"run.duration": 0.5})
+    figure = flight.plot(tmp_path / "flight.png")
+    assert len(figure.axes) == 4
+    assert (tmp_path / "flight.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: No such file"):
+        flight.plot(tmp_path / "none" / "flight.png")
