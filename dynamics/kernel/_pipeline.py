@@ -11,10 +11,11 @@ from typing import Any
 
 import numba
 from llvmlite import binding
-from numba.core import sigutils
+from numba.core import sigutils, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, DefaultPassBuilder, PassManager
 from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
@@ -82,8 +83,35 @@ def _refusal(target_context: Any) -> Any:
     return target_context.get_executable(result.library, result.fndesc, result.environment)
 
 
+class _Lower(Lower):
+    """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
+
+    def incref(self, typ: types.Type, val: Any) -> None:
+        if self._is_counted(typ):
+            super().incref(typ, val)
+
+    def decref(self, typ: types.Type, val: Any) -> None:
+        if self._is_counted(typ):
+            super().decref(typ, val)
+
+    def _is_counted(self, typ: types.Type) -> bool:
+        return self.context.data_model_manager[typ].contains_nrt_meminfo()
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class InnerLowering(NativeLowering):
+class KernelLowering(NativeLowering):
+    """To machine code with wrappers for Python and C."""
+
+    _name = "kernel_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """What writes the LLVM code."""
+        return _Lower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class InnerLowering(KernelLowering):
     """To an `InnerLibrary`, without wrappers."""
 
     _name = "inner_lowering"
@@ -102,16 +130,14 @@ class InnerLowering(NativeLowering):
 
 
 class Pipeline(Compiler):
-    """numba's pipeline, with `InnerLowering` for functions that are compiled for another one's sake."""
+    """numba's pipeline, with the lowering passes of this module."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one."""
+        lowering = InnerLowering if _depth.value > 1 else KernelLowering
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        if _depth.value > 1:
-            pipeline.passes = [
-                (InnerLowering, text) if p is NativeLowering else (p, text) for p, text in pipeline.passes
-            ]
-            pipeline.finalize()
+        pipeline.passes = [(lowering, text) if p is NativeLowering else (p, text) for p, text in pipeline.passes]
+        pipeline.finalize()
         return [pipeline]
 
     def _compile_core(self) -> CompileResult:
