@@ -1,5 +1,6 @@
 """A vehicle that you step yourself, with motor voltages or with setpoints."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -95,7 +96,7 @@ class Simulator:
             ticks: how many; one is `setup.interval` seconds.
 
         Raises:
-            ValueError: none or both are given, the other than before, or not a voltage for each motor.
+            ValueError: none or both are given, the other than before, or not a finite voltage for each motor.
             LockStepError: the state is no longer finite.
         """
         if (motor_voltages is None) == (setpoint is None):
@@ -144,6 +145,11 @@ class Simulator:
         like: MotorCommand = self._setup.port(ports.ACTUATORS).like
         if len(voltages) != len(like.motor_voltage):
             raise ValueError(f"motor_voltages: expected {len(like.motor_voltage)} of them, got {len(voltages)}")
+        for i, value in enumerate(voltages):
+            if not math.isfinite(value):
+                raise ValueError(
+                    f"motor_voltages[{i}] = {value} at t = {graph.tick * self._setup.interval:g} s: must be finite"
+                )
         command = like._replace(motor_voltage=voltages, armed=True)
         delay = next(i.delay for i in self._setup.services["plant"].inputs if i.port == ports.ACTUATORS)
         if graph.tick >= delay:

@@ -35,8 +35,8 @@ class Axis:
     def ticks(self) -> list[tuple[float, str]]:
         """(place, text) of about six marks."""
         if self.log:
-            step = max(1, round((self.high - self.low) / 6))
-            values = np.arange(self.low, self.high + 0.5, step)
+            decades = max(1, round((self.high - self.low) / 6))
+            values = np.arange(self.low, self.high + 0.5, decades)
             return [(float(self.place(np.array(10.0**v))), f"1e{int(v)}") for v in values]
         rough = (self.high - self.low) / 5
         step = 10.0 ** math.floor(math.log10(rough))

@@ -31,6 +31,8 @@ def test_what_cannot_be_is_refused():
     sim.step(motor_voltages=(0.0,) * 4)
     with pytest.raises(ValueError, match="as before"):
         sim.step(setpoint=Reference())
+    with pytest.raises(ValueError, match=r"motor_voltages\[1\] = nan at t = 0.004 s: must be finite"):
+        sim.step(motor_voltages=(0.0, float("nan"), 0.0, 0.0))
     with pytest.raises(ValueError, match="expected 4 of them, got 3"):
         sim.step(motor_voltages=(0.0,) * 3)
     with pytest.raises(ValueError, match="nobody steers"):
