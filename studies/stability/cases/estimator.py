@@ -119,7 +119,16 @@ def run() -> Found:
             naive, said = "the compass taken at its word", np.pi / o.angle_std[before]
         what = "largest error over the claimed deviation, while it says that it is well"
         rows.append(
-            Row(name, "error-state filter with gates and health", what, SIGMAS, WHY, float(o.ratio[o.well].max()), naive, said)
+            Row(
+                name,
+                "error-state filter with gates and health",
+                what,
+                SIGMAS,
+                WHY,
+                float(o.ratio[o.well].max()),
+                naive,
+                said,
+            )
         )
         curves.append(Curve(name, o.t, np.maximum(o.ratio, 1e-3)))
     least = min(o.least for o in outcomes.values())
