@@ -13,7 +13,7 @@ from studies.accuracy.coordinates import matrices
 from studies.flight import Flight
 from studies.stability.case import Curve, Found, Plot, Row
 
-HARD = "gyro bias jump of 1 deg/s, 60 s without GPS, a magnetometer upside down, all sensors frozen, in the delivery mission"
+HARD = "the mission with a gyro bias jump, 60 s without GPS, a magnetometer upside down, all sensors frozen"
 
 START, END = 20.0, 100.0  # [s]
 SENSORS = ("imu", "gps", "magnetometer", "barometer", "sonar")
@@ -23,7 +23,7 @@ FAULTS: dict[str, dict[str, str]] = {
     "gyro_bias": {"imu": f'{{kind = "bias", channel = "gyro", size = [0.0175, 0.0, 0.0], {TO_THE_END}'},
     "gps_outage": {"gps": f'{{kind = "dropout", start = {START}, stop = {START + 60.0}}}'},
     "magnetometer": {"magnetometer": f'{{kind = "scale", size = [-1.0, -1.0, -1.0], {TO_THE_END}'},
-    "frozen": {sensor: f'{{kind = "freeze", {TO_THE_END}' for sensor in SENSORS},
+    "frozen": dict.fromkeys(SENSORS, f'{{kind = "freeze", {TO_THE_END}'),
 }
 SIGMAS = 6.0
 WHY = "of 3000 estimates of nine numbers one beyond six standard deviations is expected in ten thousand flights"
