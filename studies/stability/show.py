@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from studies.stability.measure import Result
@@ -31,21 +32,29 @@ def distance(bound: float, measured: float) -> str:
     return f"{bound / measured:.3g} x" if measured > 0.1 * bound else f"{bound / measured:.1g} x"
 
 
+COLUMNS = {  # name: share of the width, None where it is as wide as its figures
+    "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
+    "naive method": 5, "its result": None,
+}  # fmt: skip
+FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}  # letters
+
+
 def table(console: Console, results: Sequence[Result]) -> None:
-    """A line for each row, under a line for what is hard about its case."""
-    shown = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
-    for name in ("case", "invariant", "method", "bound", "measured", "away", "verdict", "naive method", "its result"):
-        right = name in ("bound", "measured", "away", "its result")
-        shown.add_column(name, justify="right" if right else "left", no_wrap=right or name == "verdict")
-    for result in results:
-        shown.add_row(result.case, f"[dim]{result.hard}[/dim]", *[""] * 7, end_section=False)
+    """For each case a line that says what is hard about it, and its rows."""
+    for k, result in enumerate(results):
+        console.print(f"\n[bold]{result.case}[/bold]: {escape(result.hard)}", highlight=False)
+        shown = Table(box=None, pad_edge=False, header_style="dim", show_header=k == 0, expand=True)
+        for name, ratio in COLUMNS.items():
+            width = FIGURES.get(name)
+            right = name in FIGURES and name != "verdict"
+            shown.add_column(name, justify="right" if right else "left", ratio=ratio, width=width, no_wrap=bool(width))
         for row in result.found.rows:
             shown.add_row(
-                f"  {row.name}", row.invariant, row.method, figure(row.bound), figure(row.measured),
-                distance(row.bound, row.measured), _coloured(row.passes), row.naive,
+                row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
+                distance(row.bound, row.measured), _coloured(row.passes), escape(row.naive),
                 f"{figure(row.naive_measured)} {_coloured(row.naive_passes, not row.naive_passes)}",
             )  # fmt: skip
-    console.print(shown)
+        console.print(shown)
 
 
 def _coloured(passes: bool, wanted: bool | None = None) -> str:
@@ -59,11 +68,12 @@ def sweeps(console: Console, results: Sequence[Result]) -> None:
         if result.sweep is None:
             continue
         console.print(
-            f"\n[bold]{result.case}[/bold]: {result.sweep.error} beyond {figure(result.sweep.bound)}", highlight=False
+            f"\n[bold]{result.case}[/bold]: {escape(result.sweep.error)} beyond {figure(result.sweep.bound)}",
+            highlight=False,
         )
         for name, at in result.sweep.breaks().items():
-            where = "nowhere in the sweep" if at is None else f"at {result.sweep.difficulty} = {at:.3g}"
-            console.print(f"  {name}: {where}", highlight=False)
+            where = "nowhere in the sweep" if at is None else f"at {escape(result.sweep.difficulty)} = {at:.3g}"
+            console.print(f"  {escape(name)}: {where}", highlight=False)
 
 
 def as_json(results: Sequence[Result]) -> dict[str, Any]:

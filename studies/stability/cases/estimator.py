@@ -1,5 +1,6 @@
 """Case 16: the estimator under faults that it was not built for."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,9 +47,9 @@ class Outcome(NamedTuple):
         return np.maximum(self.position / self.position_std, self.angle / self.angle_std)
 
 
-def flown(faults: dict[str, str]) -> Outcome:
-    """The mission with these faults."""
-    overrides = [f"run.duration={END}", *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
+def flown(faults: dict[str, str], more: Sequence[str] = ()) -> Outcome:
+    """The mission with these faults, and more overrides."""
+    overrides = [f"run.duration={END}", *more, *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
     setup = resolve(load("delivery_mission", overrides))
     services = create_all(setup)
     topics = (TRUTH, ESTIMATE)
