@@ -15,7 +15,7 @@ HARD = "1000 s of tumbling about the intermediate axis (Dzhanibekov): every flip
 
 INERTIA = (1.0, 1.6, 2.1)  # [kg m^2]
 EPSILON = 1e-2  # [rad/s] beside the intermediate axis: the distance to the separatrix
-DURATION, STEPS, SAMPLES = 1000.0, 200_000, 4000
+DURATION, STEPS, SAMPLES = 1000.0, 200_000, 500
 SMALL = 1e-11
 
 
@@ -94,7 +94,7 @@ def run() -> Found:
 
 def sweep() -> Sweep:
     """Longer and longer steps."""
-    counts = [200_000, 100_000, 40_000, 20_000, 8000, 4000]
+    counts = [200_000, 100_000, 40_000, 20_000, 8000, 4000, 2000, 1000, 500]
     steps = DURATION / np.array(counts)
     curves = [
         Curve(name, steps, np.array([figures(name, EPSILON, n)[0].max() for n in counts]))

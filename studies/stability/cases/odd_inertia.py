@@ -87,7 +87,7 @@ def run() -> Found:
 
 def sweep() -> Sweep:
     """The needle with longer and longer steps."""
-    counts = [100_000, 50_000, 20_000, 10_000, 4000, 2000, 1000]
+    counts = [1_000_000, 400_000, 200_000, 100_000, 50_000, 20_000, 10_000, 4000]
     curves = [
         Curve(name, DURATION / np.array(counts), np.array([drifts(name, "needle", n).max() for n in counts]))
         for name in (METHOD, "rkmk4", "implicit_lie_midpoint", "rk4_renormalised", "rk4", "lie_euler")
