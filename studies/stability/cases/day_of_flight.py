@@ -10,9 +10,7 @@ from services.processes import create_all
 from services.table import load, resolve
 from studies.stability.case import Curve, Found, Plot, Row
 
-HARD = (
-    "24 h of hover in one go: memory that grows, a flight that slows down, a clock that drifts, an attitude that decays"
-)
+HARD = "24 h of hover in one go: memory that grows, a flight that slows down"
 LONG = True
 
 HOURS = 24
