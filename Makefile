@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: mission test check bench docker-build docker-test clean
+.PHONY: mission test check stability bench docker-build docker-test clean
 
 # The lock file pins what was tested; without it the lower bounds of pyproject.toml hold.
 $(VENV)/.installed: pyproject.toml deploy/requirements.lock
@@ -28,6 +28,9 @@ check: $(VENV)/.installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest tests/contracts/test_imports.py
+
+stability: $(VENV)/.installed
+	$(BIN)/lapwing stability
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint deploy/requirements.lock --editable ".[bench]"

@@ -161,12 +161,17 @@ class Simulator:
             found = tuple(map(float, given))
         except (TypeError, ValueError):
             found = ()
-        if len(found) != n or not all(map(math.isfinite, found)):
-            raise ValueError(f"motor_voltages: expected {n} finite numbers [V], got {given!r}")
+        if len(found) != n:
+            raise ValueError(f"motor_voltages: expected {n} numbers [V], got {given!r}")
         return found
 
     def _command(self, graph: Graph, voltages: tuple[float, ...]) -> None:
         like: MotorCommand = self._setup.port(ports.ACTUATORS).like
+        for i, value in enumerate(voltages):
+            if not math.isfinite(value):
+                raise ValueError(
+                    f"motor_voltages[{i}] = {value} at t = {graph.tick * self._setup.interval:g} s: must be finite"
+                )
         command = like._replace(motor_voltage=voltages, armed=True)
         delay = next(i.delay for i in self._setup.services["plant"].inputs if i.port == ports.ACTUATORS)
         if graph.tick >= delay:

@@ -79,9 +79,11 @@ class GroundContact(NamedTuple):
             given.friction_static, given.friction_dynamic,
         )  # fmt: skip
         if given.friction == "smooth":
-            rate = _rate_bound(airframe, points.feet, given.stiffness, 0.0)
+            rate = _rate_bound(airframe, points.feet, (given.stiffness, 0.0), (given.damping, 0.0))
             return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
-        rate = _rate_bound(airframe, points.feet, given.stiffness, given.tangential_stiffness)
+        rate = _rate_bound(
+            airframe, points.feet, (given.stiffness, given.tangential_stiffness), (given.damping, given.damping)
+        )
         return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
 
     def initial_memory(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -119,6 +121,7 @@ FREE, STICKING, SLIDING = 0.0, 1.0, 2.0
 STABLE = 1.25  # [rad] of the fastest oscillation in one step
 SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
 STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
+STABLE_DAMPER = 2.75  # the same of the damper, whose rate is known to the digit
 
 
 def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
@@ -127,11 +130,18 @@ def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
     return 1.0 / airframe.mass.total + arm / min(inertia)
 
 
-def _rate_bound(airframe: "Airframe", feet: tuple[Vec3, ...], normal: float, tangential: float) -> float:
-    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it."""
+def _rate_bound(
+    airframe: "Airframe", feet: tuple[Vec3, ...], stiffness: tuple[float, float], damping: tuple[float, float]
+) -> float:
+    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it; of a stronger
+    damper the frequency that asks for steps as short. Stiffness and damping: normal, tangential."""
     mass = airframe.mass
     xx, yy, zz = (sum(foot[i] ** 2 for foot in feet) for i in range(3))
-    heave = len(feet) * normal / mass.total
-    roll = (normal * yy + tangential * zz) / mass.inertia[0]
-    pitch = (normal * xx + tangential * zz) / mass.inertia[1]
-    return math.sqrt(max(heave, roll, pitch))
+
+    def highest(normal: float, tangential: float) -> float:
+        heave = len(feet) * normal / mass.total
+        roll = (normal * yy + tangential * zz) / mass.inertia[0]
+        pitch = (normal * xx + tangential * zz) / mass.inertia[1]
+        return max(heave, roll, pitch)
+
+    return max(math.sqrt(highest(*stiffness)), highest(*damping) * STABLE / STABLE_DAMPER)

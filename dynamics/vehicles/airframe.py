@@ -67,17 +67,17 @@ class RotorPlacement(Section):
 class Propeller(Section):
     """Geometry and blade-element constants of theory.md, eq. (1.9) to (1.11)."""
 
-    diameter: Positive  # [m] D
-    pitch: Positive  # [m] way of a turn without slip
+    diameter: Annotated[float, Ge(1e-3), Le(100)]  # [m] D
+    pitch: Annotated[float, Ge(1e-6), Le(100)]  # [m] way of a turn without slip
     blades: Annotated[int, Gt(0)]  # how many
-    aspect_ratio: Positive  # A, of the blades
+    aspect_ratio: Annotated[float, Ge(1e-3), Le(1e3)]  # A, of the blades
     downwash_factor: Annotated[float, Gt(0), Le(1)]  # epsilon
     lift_correction: Annotated[float, Gt(0), Le(1)]  # lambda
     radius_weight: Annotated[float, Gt(0), Le(1)]  # zeta, of the section taken for the blade, over the radius
     oswald_factor: Annotated[float, Gt(0), Le(1)]  # e
     zero_lift_drag: NotNegative  # C_fD
     zero_lift_angle: float  # [rad] alpha_0
-    lift_curve_slope: Positive  # [1/rad] K_0
+    lift_curve_slope: Annotated[float, Ge(1e-3), Le(1e3)]  # [1/rad] K_0
 
 
 class Motor(Section):
@@ -87,7 +87,7 @@ class Motor(Section):
     gear_ratio: Positive  # propeller speed over motor speed
     no_load_current: NotNegative  # [A] I_0, without load
     resistance: Positive  # [ohm] of the winding
-    time_constant: Positive  # [s] of rotor speed after a step of voltage
+    time_constant: Annotated[float, Ge(1e-6)]  # [s] of rotor speed after a step of voltage
     max_voltage: Positive  # [V] that the controller can ask for
     esc_current: Positive  # [A] limit of the speed controller
 

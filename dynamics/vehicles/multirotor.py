@@ -21,6 +21,7 @@ from dynamics.vector import ZERO, Vec3, scale
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
 
+FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
 
@@ -244,6 +245,8 @@ def _awake_step(method, drive, t, x, h):
 def advance(method, p, key, tick, state, command, h, n):
     """The state one exchange interval later: n steps of length h [s] under constant voltages.
 
+    Steps are split where the motors' lag is too fast for them.
+
     Args:
         method: `Method()` of an integrator's module.
         p: MultirotorParameters.
@@ -264,6 +267,8 @@ def advance(method, p, key, tick, state, command, h, n):
     memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
     body = hooks.all_body(p.effects, memory, p.body)
     airborne = _airborne(p, body, memory, voltage)
+    split = max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
+    h, n = h / split, n * split
     for i in range(n):
         if hooks.all_asleep(p.effects, memory, seen(layout, x), h):
             x = _step(method, airborne, start + i * h, x, h)

@@ -1,4 +1,4 @@
-"""The studies: performance, effects, accuracy, campaign, tune."""
+"""The studies: performance, effects, accuracy, stability, campaign, tune."""
 
 from collections.abc import Callable
 from functools import partial
@@ -106,6 +106,30 @@ def accuracy(
         console = command.console()
         find = partial(command.study, console, target, set_ or [], goal)
         _study("TARGET", Path(target), json, plot, console, find, command)
+
+
+@app.command()
+def stability(
+    case: Annotated[str | None, typer.Argument(metavar="CASE", help="one case; all without")] = None,
+    long: Annotated[bool, typer.Option("--long", help="with the cases that take minutes")] = False,
+    sweep: Annotated[
+        bool, typer.Option("--sweep", help="walk each case's difficulty until every method breaks")
+    ] = False,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all figures as JSON")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="write figures and plots (HTML)")] = None,
+) -> None:
+    """Hard cases beside a naive method that fails each: bounds, figures, verdicts. Exit code 1 if one falls short."""
+    with user_errors():
+        from studies.stability import command
+
+        check_distinct({"--json": json, "--report": report})
+        if report and report.suffix != ".html":
+            raise ValueError(f"--report {report}: expected a name that ends in .html")
+        check_writable(json)
+        check_writable(report)
+        stands = command.run(case, long, sweep, json, report)
+    if not stands:
+        raise SystemExit(1)
 
 
 @app.command()

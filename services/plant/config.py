@@ -15,7 +15,7 @@ class Solver(Section):
 
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"  # a module of dynamics/integrators
-    step: float = Field(default=0.001, gt=0.0)  # [s], divides the exchange interval
+    step: float = Field(default=0.001, ge=1e-9)  # [s], divides the exchange interval
     accuracy: float | None = Field(default=None, gt=0.0)  # error that step, and integrator unless given, are chosen for
 
     @field_validator("integrator")

@@ -36,6 +36,8 @@ def test_what_cannot_be_is_refused():
     sim.step(motor_voltages=(0.0,) * 4)
     with pytest.raises(ValueError, match="as before"):
         sim.step(setpoint=Reference())
+    with pytest.raises(ValueError, match=r"motor_voltages\[1\] = nan at t = 0.004 s: must be finite"):
+        sim.step(motor_voltages=(0.0, float("nan"), 0.0, 0.0))
     with pytest.raises(ValueError, match="nobody steers"):
         Simulator("gyrostat_blocked")
 
@@ -43,9 +45,9 @@ def test_what_cannot_be_is_refused():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"motor_voltages": (1.0, 2.0)}, "motor_voltages: expected 4 finite numbers [V], got (1.0, 2.0)"),
-        ({"motor_voltages": (1.0, 2.0, 3.0, math.nan)}, "motor_voltages: expected 4 finite numbers [V]"),
-        ({"motor_voltages": 5.0}, "motor_voltages: expected 4 finite numbers [V], got 5.0"),
+        ({"motor_voltages": (1.0, 2.0)}, "motor_voltages: expected 4 numbers [V], got (1.0, 2.0)"),
+        ({"motor_voltages": (1.0, 2.0, 3.0, math.nan)}, "motor_voltages[3] = nan at t = 0 s: must be finite"),
+        ({"motor_voltages": 5.0}, "motor_voltages: expected 4 numbers [V], got 5.0"),
         ({"setpoint": (0.0, 0.0, 1.0)}, "setpoint: expected a Reference of finite numbers"),
         ({"setpoint": lapwing.Reference((0.0, 0.0))}, "setpoint: expected a Reference of finite numbers"),
         ({"setpoint": lapwing.Reference((0.0, 0.0, math.inf))}, "setpoint: expected a Reference of finite numbers"),

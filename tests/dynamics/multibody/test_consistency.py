@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from multibody_consistency import check, consistent
 from test_augmented import state
 
+from dynamics.multibody.consistency import check, consistent
 from dynamics.multibody.mechanisms import bricard, drone_system, four_bars
 from dynamics.multibody.placement import displaced, euler_from_quaternion
 

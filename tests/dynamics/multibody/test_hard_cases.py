@@ -3,7 +3,6 @@ propellers, locked, free and torn-off propellers, a redundant loop."""
 
 import numpy as np
 import pytest
-from multibody_simulation import energy, simulate
 from test_augmented import PAPER
 from test_delivery_drone import momentum
 
@@ -15,6 +14,7 @@ from dynamics.multibody.five_bodies import BodyState, arrays, machine
 from dynamics.multibody.hold import NONE, PARTITION, PROJECTION, advance, together, violation
 from dynamics.multibody.mechanisms import bricard, drone_system
 from dynamics.multibody.placement import displaced, euler_from_quaternion
+from dynamics.multibody.simulation import energy, simulate
 
 GRAVITY, NOWHERE = (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)
 ZERO4 = (0.0,) * 4

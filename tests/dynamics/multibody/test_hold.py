@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from multibody_simulation import energy
 from test_five_bodies import scene
 
 from dynamics.integrators import get
@@ -11,6 +10,7 @@ from dynamics.multibody.five_bodies import BodyState, FiveBodies, arrays
 from dynamics.multibody.hold import NONE, PARTITION, PROJECTION, advance, partition, project, violation
 from dynamics.multibody.mechanisms import drone_system
 from dynamics.multibody.placement import displaced
+from dynamics.multibody.simulation import energy
 from dynamics.multibody.stabilisation import project as general_project
 
 METHOD = get("rk4_renormalised").Method()

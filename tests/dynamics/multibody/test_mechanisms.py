@@ -9,13 +9,13 @@ import math
 
 import numpy as np
 import pytest
-from multibody_simulation import energy, simulate
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 from dynamics.multibody.mechanisms import bricard, four_bars, pendulum
+from dynamics.multibody.simulation import energy, simulate
 
 G = 9.81
 

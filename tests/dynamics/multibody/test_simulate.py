@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from multibody_simulation import energy, simulate
 from test_augmented import PAPER
 
 from dynamics.lie.quaternion import Quaternion
@@ -11,6 +10,7 @@ from dynamics.multibody.five_bodies import BodyState, arrays, machine
 from dynamics.multibody.hold import together
 from dynamics.multibody.mechanisms import drone_system, four_bars
 from dynamics.multibody.placement import euler_from_quaternion, quaternion_from_euler
+from dynamics.multibody.simulation import energy, simulate
 
 SPEEDS = (40.0, -30.0, 35.0, -45.0)
 

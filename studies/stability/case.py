@@ -1,0 +1,84 @@
+"""What a case gives: rows of figures beside their bounds, a plot, and where each method breaks as it gets harder."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Curve(NamedTuple):
+    """A line of a plot."""
+
+    name: str
+    x: np.ndarray  # (n,)
+    y: np.ndarray  # (n,) NaN where there is nothing finite
+
+
+class Plot(NamedTuple):
+    """Lines over one axis."""
+
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve]
+    bound: float | None = None  # a horizontal line
+    log_x: bool = False
+    log_y: bool = True
+
+
+class Row(NamedTuple):
+    """One figure of a case: what must stay below a bound, by our method and by a naive one on the same case."""
+
+    name: str
+    method: str
+    invariant: str  # what is measured, with its unit
+    bound: float
+    why: str  # it is this bound
+    measured: float
+    naive: str  # the naive method
+    naive_measured: float
+
+    @property
+    def passes(self) -> bool:
+        """Whether our method keeps the bound; NaN does not."""
+        return bool(self.measured <= self.bound)
+
+    @property
+    def naive_passes(self) -> bool:
+        """Whether the naive method keeps it: then the row shows nothing."""
+        return bool(self.naive_measured <= self.bound)
+
+    @property
+    def stands(self) -> bool:
+        """Ours keeps the bound, and the naive method does not."""
+        return self.passes and not self.naive_passes
+
+
+class Found(NamedTuple):
+    """What a case came to."""
+
+    rows: Sequence[Row]
+    plot: Plot
+
+
+class Sweep(NamedTuple):
+    """How far each method goes: an error over the difficulty, which grows from left to right."""
+
+    difficulty: str  # with its unit
+    error: str
+    bound: float
+    curves: Sequence[Curve]  # a method each
+    log_x: bool = True
+    falling: bool = False  # the case gets harder towards small values
+
+    def breaks(self) -> dict[str, float | None]:
+        """The first difficulty at which each method is beyond the bound; None: nowhere in the sweep."""
+        found: dict[str, float | None] = {}
+        for name, x, y in self.curves:
+            order = np.argsort(x)[:: -1 if self.falling else 1]
+            broken = order[~(np.asarray(y)[order] <= self.bound)]
+            found[name] = float(x[broken[0]]) if len(broken) else None
+        return found
+
+    def plot(self) -> Plot:
+        """The sweep as a plot."""
+        return Plot(self.difficulty, self.error, self.curves, self.bound, self.log_x)

@@ -1,0 +1,122 @@
+"""The study of hard cases: cheap ones whole, and what is printed, written and returned."""
+
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lapwing.cli.studies import stability
+from studies.stability import cases, show
+from studies.stability.case import Curve, Found, Plot, Row, Sweep
+from studies.stability.chart import chart
+from studies.stability.measure import chosen, one
+
+CHEAP = ("lie_limits", "odd_inertia", "looping", "intermediate_axis", "large_steps", "exact_time")
+
+
+@pytest.mark.parametrize("name", CHEAP)
+def test_a_case_stands_and_its_naive_method_does_not(name):
+    result = one(name, False)
+    assert result.found.rows
+    for row in result.found.rows:
+        assert row.passes, (row.name, row.measured, row.bound)
+        assert not row.naive_passes, (row.name, row.naive_measured)
+    assert "<polyline" in chart(result.found.plot)
+
+
+def test_every_case_says_what_is_hard():
+    for name in cases.names():
+        assert cases.get(name).HARD
+        assert cases.get(name).__doc__.startswith("Case ")
+
+
+def row(measured, naive, bound=1.0):
+    return Row("row", "ours", "x", bound, "why", measured, "naive", naive)
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    """A case that gives what it is told to."""
+
+    def make(*rows):
+        plot = Plot("x", "y", [Curve("a", np.arange(3.0), np.array([1.0, np.nan, 2.0]))], 1.5)
+        module = SimpleNamespace(HARD="hard", run=lambda: Found(rows, plot), __name__="made_up")
+        monkeypatch.setattr(cases, "get", lambda name: module)
+        monkeypatch.setattr(cases, "names", lambda: ["made_up"])
+
+    return make
+
+
+def test_json_and_page(made_up, tmp_path, capsys):
+    made_up(row(0.5, 2.0), row(0.0, math.nan, 0.0))
+    stability("made_up", json=tmp_path / "s.json", report=tmp_path / "s.html")
+    given = {"name": "made_up.row", "bound": 1.0, "measured": 0.5, "verdict": "pass"}
+    assert json.loads((tmp_path / "s.json").read_text()) == {
+        "cases": [
+            {**given, "naive_measured": 2.0, "naive_verdict": "fail"},
+            {**given, "bound": 0.0, "measured": 0.0, "naive_measured": None, "naive_verdict": "fail"},
+        ]
+    }
+    page = (tmp_path / "s.html").read_text()
+    assert "<svg" in page
+    assert "http" not in page.replace('xmlns="http://www.w3.org/2000/svg"', "")
+    assert "made_up" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "rows", [[row(2.0, 3.0)], [row(math.nan, 3.0)], [row(0.1, 0.2)]], ids=["over", "nan", "no teeth"]
+)
+def test_exit_code_1_where_a_case_falls_short(made_up, rows):
+    made_up(*rows)
+    with pytest.raises(SystemExit) as ended:
+        stability("made_up")
+    assert ended.value.code == 1
+
+
+def test_a_case_that_ends_in_an_error_falls_short(monkeypatch):
+    def broken():
+        raise ValueError("out of reach")
+
+    monkeypatch.setattr(cases, "get", lambda name: SimpleNamespace(HARD="hard", run=broken))
+    result = one("broken", False)
+    assert not result.stands
+    assert "out of reach" in result.found.rows[0].invariant
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"case": "loping"}, "unknown case 'loping'; did you mean looping?"),
+        ({"case": "exact_time", "sweep": True}, "the difficulty of exact_time is not walked"),
+        ({"report": "page.txt"}, "expected a name that ends in .html"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_one_line_and_exit_code_2(arguments, message, capsys, tmp_path):
+    if "report" in arguments:
+        arguments = {"report": tmp_path / arguments["report"]}
+    with pytest.raises(SystemExit) as ended:
+        stability(**arguments)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_long_cases_are_left_out_unless_they_are_asked_for():
+    assert "day_of_flight" not in chosen(None, False, False)
+    assert "day_of_flight" in chosen(None, True, False)
+    assert "lie_limits" not in chosen(None, False, True)
+
+
+def test_where_a_method_breaks():
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    curves = [Curve("soon", x, np.array([0.1, 5.0, 0.1, 9.0])), Curve("never", x, x * 0.0)]
+    assert Sweep("d", "e", 1.0, curves).breaks() == {"soon": 2.0, "never": None}
+    assert Sweep("d", "e", 1.0, curves, falling=True).breaks() == {"soon": 4.0, "never": None}
+    assert Sweep("d", "e", 1.0, [Curve("nan", x, x * np.nan)]).breaks() == {"nan": 1.0}
+
+
+def test_how_far_from_the_bound():
+    assert show.distance(1.0, 0.5) == "2 x"
+    assert show.distance(1.0, 0.0) == "exact"
+    assert show.distance(0.0, 0.0) == ""
