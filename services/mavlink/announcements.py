@@ -33,13 +33,20 @@ class Announcements:
         if (home := self._vehicle.home_world) != self._home:
             self._home = home
             self._send("HOME_POSITION")
+        if s.mission_reached != self._reached:
+            self._announce_reached(s.mission_reached, s.mission_count)
+
         if (item := (s.mission_current, s.mission_state)) != self._item:
             self._item = item
             self._send("MISSION_CURRENT")
-        if s.mission_reached != self._reached:
-            self._reached = s.mission_reached
-            if s.mission_count and s.mission_reached != NO_ITEM:
-                self._broadcast(mavlink.MAVLink_mission_item_reached_message(s.mission_reached))
+
+    def _announce_reached(self, reached: int, count: int) -> None:
+        """Each item by itself, also where several were reached since the last status."""
+        first = self._item[0] if self._reached == NO_ITEM else self._reached + 1
+        self._reached = reached
+        if count and reached != NO_ITEM:
+            for number in range(min(first, reached), reached + 1):
+                self._broadcast(mavlink.MAVLink_mission_item_reached_message(number))
 
     def say(self, text: str) -> None:
         """A text for the operators, in pieces where it is long."""

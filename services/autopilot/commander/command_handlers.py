@@ -97,6 +97,19 @@ def change_mode(context: Context, command: Any) -> None:
     state.failsafe = ""
 
 
+@handles("mission_start")
+def mission_start(context: Context, command: Any) -> None:
+    """Arm and fly the mission from an item, as PX4 does at MAV_CMD_MISSION_START."""
+    before = context.state.mode, context.state.mode_name
+    transitions.enter(context.constants, context.state, "mission", *command.values[:1])
+    if not context.state.guidance.armed and (reasons := checks.reasons(context.view, context.state)):
+        context.state.mode, context.state.mode_name = before
+        raise ValueError(f"arming refused: {'; '.join(reasons)}")
+    if not context.state.guidance.armed:
+        transitions.arm(context)
+    context.state.failsafe = ""
+
+
 @handles("manual")
 def manual(context: Context, command: Any) -> None:
     """Sticks, which the modes position_control and altitude_control listen to."""

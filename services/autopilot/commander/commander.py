@@ -117,7 +117,9 @@ def _detect_landing(context: Context) -> None:
 def _disarm_when_idle(context: Context) -> None:
     """Disarm what has been armed on the ground for long."""
     view, state, guidance = context.view, context.state, context.state.guidance
-    state.on_ground_time = state.on_ground_time + view.dt if guidance.armed and not guidance.flying else 0.0
+    amid_mission = guidance.has_flown and state.mode_name == "mission" and guidance.route.item is not None
+    waits = guidance.armed and not guidance.flying and not amid_mission  # PX4's too: the next item may take off
+    state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
         disarm(context, "landed" if guidance.has_flown else "nobody took off")

@@ -1,7 +1,7 @@
 """The mission's list of items, and which of them is flown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 NONE_REACHED = 65535
@@ -44,6 +44,11 @@ class Route:
         """The item that is flown, None after the last."""
         return self.items[self.current] if self.current < len(self.items) else None
 
+    @property
+    def on_last(self) -> bool:
+        """Whether the last item is flown."""
+        return self.current == len(self.items) - 1
+
     def select(self, number: int) -> None:
         """Go on with another item; ValueError if there is none of this number."""
         if not 0 <= number < len(self.items):
@@ -65,6 +70,21 @@ class Route:
                 self.current = int(item.values[0])
             else:
                 self.current += 1
+
+    def following(self) -> Iterator[Any]:
+        """The items after the current one in the order in which they will be flown, without the jumps."""
+        number, jumped = self.current + 1, dict(self._jumped)
+        while number < len(self.items):
+            item = self.items[number]
+            taken = jumped.get(number, 0)
+            if item.action != "jump":
+                yield item
+                number += 1
+            elif taken < item.values[1]:
+                jumped[number] = taken + 1
+                number = int(item.values[0])
+            else:
+                number += 1
 
     def restart(self) -> None:
         """From the first item again."""

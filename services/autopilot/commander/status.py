@@ -19,7 +19,7 @@ def status(constants: Constants, view: View, state: State) -> Status:
         armed=armed,
         finished=not state.on_trajectory and guidance.has_flown and not armed and last_flight,
         failsafe=state.failsafe,
-        mission_current=route.current,
+        mission_current=min(route.current, max(0, len(route.items) - 1)),
         mission_count=len(route.items),
         mission_reached=route.reached,
         mission_state=mission_state(state),

@@ -99,8 +99,8 @@ def reposition(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_MISSION_START)
 def mission_start(session: Session, c: Command) -> Outcome:
-    """Fly the mission from an item."""
-    return Request("mission", (c.params[0],))
+    """Arm and fly the mission from an item."""
+    return Request("mission_start", (c.params[0],))
 
 
 @rule(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)

@@ -136,6 +136,10 @@ class StandIn:
             return 1
         self.mode, self.state, self.landed = "mission", 3, False
 
+    def do_mission_start(self, c):
+        self.armed = True
+        return self.do_mission(c)
+
     def do_mission_current(self, c):
         if not 0 <= c.values[0] < len(self.items):
             return 2

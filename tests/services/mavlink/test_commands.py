@@ -69,7 +69,7 @@ def test_progress_is_passed_on_before_the_end():
     bench.step(2)
     ack = station.last("COMMAND_ACK")
     assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
-    number = bench.vehicle.kinds["mission"].id
+    number = bench.vehicle.kinds["mission_start"].id
     bench.vehicle.answers = [Answer(id=number, result=Answer.ACCEPTED)]
     bench.step()
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED

@@ -7,7 +7,6 @@ from services.autopilot.commander.view import Constants, View
 from services.autopilot.interface import Setpoint
 
 NAME = "altitude_control"
-TILT_FRACTION = 0.6  # of the maximum tilt at full stick: the rest is left to the wind
 
 
 class Mode(FlightMode):
@@ -25,7 +24,7 @@ class Mode(FlightMode):
         if not guidance.inputs.sticks_fresh:
             self.next_mode = "descend" if view.position_lost else "hold"
         forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
-        limits, tilt = guidance.limits, TILT_FRACTION * guidance.parameters["MPC_TILT_MAX"]
+        limits, tilt = guidance.manual_limits, guidance.manual_tilt
         climb_rate = up * (limits.up if up > 0.0 else limits.down)
         tilts = (tilt * forward, tilt * left)
         return self._flight.step(constants, view, guidance, climb_rate, yaw * limits.yaw_rate, tilts)

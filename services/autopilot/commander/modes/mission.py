@@ -1,19 +1,24 @@
 """The uploaded mission, item by item."""
 
 import math
+from itertools import islice
 from typing import Any
 
 from dynamics.vector import ZERO, Vec3, norm, subtract
 from services.autopilot.commander.flight_mode import FlightMode, fill_in, value
 from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.leg import Leg, Place, passing_speed
 from services.autopilot.commander.modes import land, return_, takeoff
 from services.autopilot.commander.smoothing import wrap_angle
 from services.autopilot.commander.view import Constants, View
 
 NAME = "mission"
-YAW_TOLERANCE = 0.05  # [rad]
 ARRIVED = 0.05  # [m]
 EXACT_RADIUS = 0.2  # [m] to wait or land somewhere the vehicle must be there
+LANDED_TIME = 1.0  # [s] on the ground before the next item is begun
+FORESIGHT = 32  # items that are looked through for the places to come
+_TO_PLACES = ("waypoint", "loiter_time")
+_INSTANT = ("speed",)  # items that take no time
 _NOT_GIVEN = (math.nan, math.nan, math.nan)
 
 
@@ -25,14 +30,14 @@ class Mode(FlightMode):
         if not route.items:
             raise ValueError("mission: there is none; upload one first")
         first = value(values, 0)
-        if math.isfinite(first):
+        if math.isfinite(first) and first >= 0.0:
             route.select(int(first))
-        elif route.item is None:
+        elif route.item is None or (route.on_last and not guidance.flying):
             route.restart()
         self._number: int | None = None
         self._time_there = 0.0  # [s] since the item's place was reached
         self._item_mode: FlightMode | None = None  # another mode that flies the item
-        self._start = ZERO  # where the item was begun [m]
+        self._leg = Leg(ZERO, ZERO)  # to the item's place
         self._last_waypoint: Vec3 | None = None  # [m]
         self._count = len(route.items)
 
@@ -51,12 +56,11 @@ class Mode(FlightMode):
             self._number = None
             self._stay(view, guidance)
             return
-        if not guidance.flying and item.action in ("waypoint", "loiter_time"):
+        if not guidance.flying and item.action in _TO_PLACES:
             guidance.lift_off(constants, view)  # a mission without a take-off starts from the ground all the same
         if route.current != self._number:
             self._begin(constants, guidance, item)
         if self._fly(constants, view, guidance, item):
-            self._number = None if route.current == len(route.items) - 1 else self._number
             route.advance()
 
     def _stay(self, view: View, guidance: Guidance) -> None:
@@ -70,20 +74,50 @@ class Mode(FlightMode):
 
     def _begin(self, constants: Constants, guidance: Guidance, item: Any) -> None:
         self._number, self._time_there, self._item_mode = guidance.route.current, 0.0, None
-        self._start = guidance.smoothing.position
         if item.action == "takeoff":
-            asked = item.position.z if math.isfinite(item.position.z) else guidance.parameters["MIS_TAKEOFF_ALT"]
+            given = math.isfinite(item.position.z)
+            asked = item.position.z if given else guidance.above_home(constants, "MIS_TAKEOFF_ALT")
             height = max(constants.resting_height + 0.1, asked)
             if not (guidance.flying and guidance.smoothing.position[2] >= height):
                 self._item_mode = takeoff.Mode(constants, guidance, height, item.yaw)
-        elif item.action == "return":
+        elif item.action == "return" and guidance.flying:
             self._item_mode = return_.Mode(constants, guidance)
+        else:
+            self._leg = self._leg_to(guidance, item)
+            if item.action in _TO_PLACES:
+                self._last_waypoint = self._leg.target
+
+    def _leg_to(self, guidance: Guidance, item: Any) -> Leg:
+        """The way to the item's place: along the line from the waypoint before, on through it where nothing stops."""
+        here = guidance.smoothing.position
+        target = _place(item, here)
+        start = here
+        if (
+            self._last_waypoint is not None
+            and norm(subtract(self._last_waypoint, here)) < 2.0 * guidance.parameters["NAV_ACC_RAD"]
+        ):
+            start = self._last_waypoint
+        places: list[Place] = [(target, _radius(guidance, item))]
+        before = item
+        for after in islice(guidance.route.following(), FORESIGHT):
+            if not _flown_through(before) or after.action not in (*_TO_PLACES, *_INSTANT, "land"):
+                break
+            if after.action in _INSTANT:
+                continue
+            place = _place(after, places[-1][0])
+            if place != places[-1][0]:
+                places.append((place, _radius(guidance, after)))
+            before = after
+        return Leg(start, target, passing_speed(start, places, guidance.limits))
 
     def _fly(self, constants: Constants, view: View, guidance: Guidance, item: Any) -> bool:
         """Move the setpoint for one tick; whether the item is done."""
         if item.action == "speed":
             guidance.speed = item.values[0]
             return True
+        if item.action in ("land", "return") and not guidance.flying:
+            self._time_there += view.dt
+            return self._time_there > LANDED_TIME
         if self._item_mode is not None:
             self._item_mode.step(constants, view, guidance)
             if self._item_mode.next_mode == "land":
@@ -91,30 +125,35 @@ class Mode(FlightMode):
             return self._item_mode.next_mode == "hold"
         if item.action == "takeoff":
             return True
-        reached = self._approach(view, guidance, item)
-        if self._time_there == 0.0 and not reached:
+        self._leg.step(guidance, item.yaw, view.dt)
+        if self._time_there == 0.0 and not self._reached(guidance, item):
             return False
-        self._time_there += view.dt
         if item.action == "land":
             self._item_mode = land.Mode(constants, guidance)
             return False
+        self._time_there += view.dt
         return self._time_there >= item.hold
 
-    def _approach(self, view: View, guidance: Guidance, item: Any) -> bool:
-        """Move towards the item's place and yaw; whether they are reached."""
-        smoothing, limits = guidance.smoothing, guidance.limits
-        target = self._target(item)
-        if item.action in ("waypoint", "loiter_time"):
-            self._last_waypoint = target
-        smoothing.move_to(target, limits, view.dt)
-        smoothing.turn_to(item.yaw, limits, view.dt)
-        radius = item.radius if item.radius > 0.0 else guidance.parameters["NAV_ACC_RAD"]
-        if item.action == "land" or item.hold > 0.0:
-            radius = min(radius, EXACT_RADIUS)
-        aligned = math.isnan(item.yaw) or abs(wrap_angle(item.yaw - smoothing.yaw)) < YAW_TOLERANCE
-        return norm(subtract(target, smoothing.position)) < radius and aligned
+    def _reached(self, guidance: Guidance, item: Any) -> bool:
+        """Whether the item's place and yaw are reached."""
+        smoothing = guidance.smoothing
+        aligned = math.isnan(item.yaw) or abs(wrap_angle(item.yaw - smoothing.yaw)) < guidance.yaw_tolerance
+        return norm(subtract(self._leg.target, smoothing.position)) < _radius(guidance, item) and aligned
 
-    def _target(self, item: Any) -> Vec3:
-        asked = tuple(item.position) if item.action in ("waypoint", "loiter_time", "land") else _NOT_GIVEN
-        x, y, z = fill_in(self._start, asked)
-        return x, y, self._start[2] if item.action == "land" else z  # to land: horizontally first, then down
+
+def _radius(guidance: Guidance, item: Any) -> float:
+    """Distance [m] within which an item's place is reached."""
+    radius = item.radius if item.radius > 0.0 else guidance.parameters["NAV_ACC_RAD"]
+    return radius if _flown_through(item) else min(radius, EXACT_RADIUS)
+
+
+def _flown_through(item: Any) -> bool:
+    """Whether nothing of the item itself asks for a stop at its place."""
+    return item.action in _TO_PLACES and item.hold == 0.0
+
+
+def _place(item: Any, here: Vec3) -> Vec3:
+    """Where an item leads [m]; a coordinate that it does not give is that of `here`."""
+    asked = tuple(item.position) if item.action in (*_TO_PLACES, "land") else _NOT_GIVEN
+    x, y, z = fill_in(here, asked)
+    return x, y, here[2] if item.action == "land" else z  # to land: horizontally first, then down
