@@ -5,9 +5,9 @@ from typing import Any
 
 from services.mavlink.dialect import id_of, mavlink
 from services.mavlink.telemetry import streams
+from services.mavlink.text import statustext
 from services.mavlink.view import VehicleView
 
-TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
 NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 
 
@@ -52,13 +52,9 @@ class Announcements:
         """A text for the operators, in pieces where it is long."""
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
-        data = text.encode()
-        number = 0
-        if len(data) > TEXT_LENGTH:
-            self._texts = number = self._texts % 0xFFFF + 1
-        for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):
-            chunk = data[start : start + TEXT_LENGTH]
-            self._broadcast(mavlink.MAVLink_statustext_message(severity, chunk, number, piece))
+        self._texts = self._texts % 0xFFFF + 1
+        for message in statustext(severity, text, self._texts):
+            self._broadcast(message)
 
     def _send(self, name: str) -> None:
         number = id_of(name)

@@ -174,9 +174,9 @@ def rally_upload(context: Context, command: Any) -> None:
 
 @handles("speed")
 def speed(context: Context, command: Any) -> None:
-    """Fly at another speed [m/s] until disarmed."""
+    """Fly at another speed [m/s] until disarmed; NaN: at the parameter's."""
     asked = value(command.values, 0)
-    if not 0.0 < asked < math.inf:
+    if not (0.0 < asked < math.inf or math.isnan(asked)):
         raise Denied(f"speed: expected one above 0 m/s, got {asked:g}")
     context.state.guidance.speed = asked
 

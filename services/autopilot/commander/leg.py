@@ -65,7 +65,7 @@ def heading(guidance: Guidance, target_world: Vec3) -> float:
     smoothing = guidance.smoothing
     mode = guidance.parameters["MPC_YAW_MODE"]
     if guidance.roi is not None:
-        return _direction(smoothing.position, guidance.roi)
+        return towards_roi(guidance)
     if mode in (TOWARDS_HOME, AWAY_FROM_HOME):
         outwards = _direction(guidance.home, smoothing.position)
         return (
@@ -75,6 +75,11 @@ def heading(guidance: Guidance, target_world: Vec3) -> float:
         vx, vy, _ = smoothing.velocity
         return math.atan2(vy, vx) if math.hypot(vx, vy) > _SLOW else math.nan
     return math.nan if mode == STAY else _direction(smoothing.position, target_world)
+
+
+def towards_roi(guidance: Guidance) -> float:
+    """Yaw [rad] towards the region of interest, NaN where there is none."""
+    return math.nan if guidance.roi is None else _direction(guidance.smoothing.position, guidance.roi)
 
 
 def _direction(start: Vec3, end: Vec3) -> float:

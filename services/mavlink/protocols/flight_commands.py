@@ -15,7 +15,9 @@ from services.mavlink.session import Session
 def set_mode(session: Session, m: Any) -> None:
     """The old way to change the mode, which is not acknowledged."""
     kind = session.vehicle.flavour.mode_kind(m.custom_mode)
-    if kind and session.trusted:
+    if kind is None:
+        session.say(f"no flight mode {m.custom_mode}")
+    elif session.trusted:
         session.command(kind)
 
 
@@ -24,9 +26,13 @@ def do_set_mode(session: Session, c: Command) -> Outcome:
     """A flight mode by its numbers."""
     flavour = session.vehicle.flavour
     if not int(c.params[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        session.say("flight modes only by their custom numbers")
         return UNSUPPORTED
     kind = flavour.mode_kind(flavour.custom_mode(c.params[1], c.params[2]))
-    return Request(kind) if kind else UNSUPPORTED
+    if kind is None:
+        session.say(f"no flight mode {c.params[1]:.0f}, {c.params[2]:.0f}")
+        return UNSUPPORTED
+    return Request(kind)
 
 
 @rule(mavlink.MAV_CMD_DO_SET_STANDARD_MODE)
@@ -38,6 +44,7 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
     return Request(kind) if kind else UNSUPPORTED
 
 
+SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; nothing measures the air's
 FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the checks say
 
 
@@ -90,11 +97,29 @@ def reposition(session: Session, c: Command) -> Outcome:
     """Go there; what of the place is not given stays as it is. Yaw is a heading [rad]."""
     estimate = session.vehicle.estimate
     there = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    yaw = swap_yaw(c.params[3])
     if estimate is None or all(map(math.isnan, there)):
-        return Request("hold")
+        return Request("hold", (yaw,))  # a heading alone turns it on the spot
     place = [here if math.isnan(asked) else asked for here, asked in zip(estimate.position_world, there, strict=True)]
     speed = c.params[0] if c.params[0] > 0.0 else math.nan
-    return Request("goto", (*place, swap_yaw(c.params[3]), speed))
+    return Request("goto", (*place, yaw, speed))
+
+
+@rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)
+def change_altitude(session: Session, c: Command) -> Outcome:
+    """To another altitude, here; its frame is the second parameter."""
+    _, _, height = to_world(session.vehicle.datum, int(c.params[1]), math.nan, math.nan, c.params[0])
+    return Request("goto", (math.nan, math.nan, height))
+
+
+@rule(mavlink.MAV_CMD_CONDITION_YAW)
+def turn(session: Session, c: Command) -> Outcome:
+    """Turn on the spot to a heading [deg], or by an angle in a direction."""
+    heading, relative = math.radians(c.params[0]), c.params[3] == 1.0
+    if relative:
+        estimate = session.vehicle.estimate
+        heading = math.copysign(heading, c.params[2]) + (estimate.angles[2] if estimate else math.nan)
+    return Request("hold", (swap_yaw(heading),)) if math.isfinite(heading) else DENIED
 
 
 @rule(mavlink.MAV_CMD_MISSION_START)
@@ -111,5 +136,10 @@ def set_mission_current(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_SPEED)
 def change_speed(session: Session, c: Command) -> Outcome:
-    """Fly at another speed; one below 0 is none."""
+    """Fly at another speed over the ground; -1 changes nothing, -2 is the parameter's again."""
+    if int(c.params[0]) not in (SPEED_AIR, SPEED_GROUND):
+        session.say("DO_CHANGE_SPEED: only the speed over the ground")
+        return UNSUPPORTED
+    if c.params[1] == DEFAULT_SPEED:
+        return Request("speed", (math.nan,))
     return Request("speed", (c.params[1],)) if c.params[1] >= 0.0 else ACCEPTED

@@ -20,8 +20,23 @@ from flights import (
     said,
 )
 
+from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
 from services.common.parameters import table
 from services.table import load
+
+
+def angles(flown, t):
+    """True roll, pitch and yaw [rad] at t [s]."""
+    q = at(flown, "truth", t, lambda m: tuple(m.pose.orientation))
+    return to_roll_pitch_yaw(Quaternion(q[3], *q[:3]))
+
+
+def roll(flown, t):
+    return angles(flown, t)[0]
+
+
+def pitch(flown, t):
+    return angles(flown, t)[1]
 
 
 def test_takeoff_goto_land_and_disarm_by_itself():
@@ -167,7 +182,45 @@ def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
     east, north, up = (at(flown, "truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
     assert math.atan2(north, east) == pytest.approx(yaw, abs=0.1)
     assert math.hypot(east, north) == pytest.approx(9.80665 * math.tan(angle) * 2.3, rel=0.1)
-    assert up == pytest.approx(-9.80665 * (1.0 - math.cos(angle)) * 2.4, abs=0.1)  # the thrust of hovering, tilted
+    assert up == pytest.approx(0.0, abs=0.05)  # no thrust is given: the altitude is held
+
+
+def test_by_hand_from_the_ground_in_stabilized_and_acro():
+    sticks = {
+        (0.5, 3.0): [command("manual", 0.0, 0.0, 0.15, 0.0)],
+        (3.1, 4.0): [command("manual", 0.25, 0.0, 0.0, 0.0)],
+        (4.1, 5.0): [command("manual", 0.0, 0.0, 0.0, 0.5)],
+        (5.1, 5.6): [command("manual", 0.0, 0.15, 0.0, 0.0)],
+        (5.7, 8.0): [command("manual", 0.0, 0.0, 0.0, 0.0)],
+    }
+    flown = fly(9.5, {0.04: [command("stabilized", id=1), command("arm")], 5.04: [command("acro", id=2)]} | sticks)
+    assert results(flown)[1] == results(flown)[2] == ACCEPTED
+    assert height(flown, 3.0) > 1.0
+    assert math.degrees(pitch(flown, 3.9)) == pytest.approx(0.25 * 20.0, abs=1.0)  # nose down
+    assert math.degrees(pitch(flown, 4.9)) == pytest.approx(0.0, abs=1.0)
+    assert at(flown, "estimate", 5.0, lambda m: m.pose.orientation.z) == pytest.approx(math.sin(0.18), abs=0.03)
+    assert math.degrees(roll(flown, 7.0)) == pytest.approx(-0.15 * 100.0 * 0.55, abs=3.0)  # to the left, and kept
+    assert mode(flown, 9.4) == "hold"  # nobody holds the sticks
+
+
+def test_body_rates_tilt_it_on_and_a_yaw_rate_turns_it():
+    nan = float("nan")
+    rates = command("offboard_attitude", *[nan] * 4, 0.0, 0.2, 0.3, nan)
+    level = command("offboard_attitude", 1.0, 0.0, 0.0, 0.0, nan, nan, 0.3, nan)
+    flown = fly(8.6, UP | {(6, 6.9): [rates], (7.0, 8.6): [level], 6.1: [command("offboard", id=1)]})
+    assert results(flown)[1] == ACCEPTED
+    assert pitch(flown, 6.9) == pytest.approx(0.2 * 0.8, abs=0.05)
+    assert pitch(flown, 8.5) == pytest.approx(0.0, abs=0.03)
+    turned = 2.0 * math.asin(at(flown, "estimate", 8.5, lambda m: m.pose.orientation.z))
+    assert turned == pytest.approx(0.3 * 2.4, abs=0.06)
+    assert height(flown, 8.5) == pytest.approx(3.0, abs=0.3)  # no thrust is given: the altitude is held
+
+
+def test_altitude_control_takes_off_from_the_ground():
+    script = {0.04: [command("altitude_control", id=1), command("arm")], (0.5, 3.0): [command("manual", 0, 0, 0.5, 0)]}
+    flown = fly(3.0, script)
+    assert results(flown)[1] == ACCEPTED
+    assert height(flown, 3.0) > 1.5
 
 
 def test_gains_change_in_flight_and_act():
