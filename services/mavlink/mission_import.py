@@ -1,7 +1,7 @@
 """Items of missions, fences and rally points from MAVLink messages to the autopilot's.
 
 An item that this vehicle has nothing to do for (cameras, gimbals, servos) becomes a delay of no length, so that the
-numbers of the items stay.
+numbers of the items stay; `skipped` names them.
 """
 
 import math
@@ -17,9 +17,17 @@ MAX_ITEMS = 1000
 
 _ON_GLOBE = ABOVE_SEA | ABOVE_HOME
 _IDLE = {  # commands of a mission for parts that this vehicle does not have
-    mavlink.MAV_CMD_DO_SET_ROI,
-    mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
-    mavlink.MAV_CMD_DO_SET_ROI_NONE,
+    mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
+    mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+    mavlink.MAV_CMD_DO_GRIPPER,
+    mavlink.MAV_CMD_DO_WINCH,
+    mavlink.MAV_CMD_DO_PARACHUTE,
+    mavlink.MAV_CMD_DO_SET_ACTUATOR,
+    mavlink.MAV_CMD_DO_FENCE_ENABLE,
+    mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
+    mavlink.MAV_CMD_DO_CONTROL_VIDEO,
+    mavlink.MAV_CMD_CONDITION_GATE,
+    mavlink.MAV_CMD_OBLIQUE_SURVEY,
     mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
     mavlink.MAV_CMD_DO_MOUNT_CONTROL,
     mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
@@ -48,6 +56,14 @@ class RefusedItemError(ValueError):
         self.result = result
 
 
+def skipped(items: Sequence[Any]) -> list[str]:
+    """What is kept and does nothing, in words."""
+    names = mavlink.enums["MAV_CMD"]
+    return [
+        f"item {m.seq}: {names[m.command].name.removeprefix('MAV_CMD_')} skipped" for m in items if m.command in _IDLE
+    ]
+
+
 Maker = Callable[[Any, Datum], Any]
 
 _ACTIONS: dict[int, Maker] = {}
@@ -72,12 +88,18 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
     Raises:
         RefusedItemError: one cannot be flown.
     """
-    return [
+    found = [
         _idle()
         if home_first and number == 0 and m.mission_type == mavlink.MAV_MISSION_TYPE_MISSION
         else _item(m, datum)
         for number, m in enumerate(items)
     ]
+    # ArduPilot's ground stations write 0 where they mean no heading: its copter turns by CONDITION_YAW alone.
+    return [_without_heading(i) if home_first and i.action != "yaw" else i for i in found]
+
+
+def _without_heading(i: Any) -> Any:
+    return MissionItem(i.action, i.position, math.nan, i.radius, i.hold, i.values)
 
 
 def _item(m: Any, datum: Datum) -> Any:
@@ -135,12 +157,12 @@ def _waypoint(m: Any, datum: Datum) -> Any:
     return MissionItem("waypoint", _place(m, datum), _yaw(m.param4), _radius(m.param2), hold, ())
 
 
-@_makes(mavlink.MAV_CMD_NAV_TAKEOFF)
+@_makes(mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
 def _takeoff(m: Any, datum: Datum) -> Any:
     return MissionItem("takeoff", _place(m, datum, needed=False), _yaw(m.param4), math.nan, 0.0, ())
 
 
-@_makes(mavlink.MAV_CMD_NAV_LAND)
+@_makes(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 def _land(m: Any, datum: Datum) -> Any:
     return MissionItem("land", _place(m, datum, needed=False), _yaw(m.param4), math.nan, 0.0, ())
 
@@ -156,7 +178,53 @@ def _loiter_time(m: Any, datum: Datum) -> Any:
     return MissionItem("loiter_time", _place(m, datum, needed=False), _yaw(m.param4), math.nan, hold, ())
 
 
-@_makes(mavlink.MAV_CMD_NAV_DELAY, mavlink.MAV_CMD_CONDITION_DELAY)
+@_makes(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
+def _loiter(m: Any, datum: Datum) -> Any:
+    return MissionItem("loiter", _place(m, datum, needed=False), _yaw(m.param4), math.nan, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_NAV_LOITER_TO_ALT)
+def _loiter_to_alt(m: Any, datum: Datum) -> Any:
+    return MissionItem("loiter_to_alt", _place(m, datum, needed=False), math.nan, math.nan, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_DO_SET_ROI_LOCATION)
+def _roi(m: Any, datum: Datum) -> Any:
+    return MissionItem("roi", _place(m, datum), math.nan, math.nan, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_DO_SET_ROI)
+def _old_roi(m: Any, datum: Datum) -> Any:
+    location = int(m.param1) == mavlink.MAV_ROI_LOCATION
+    return _roi(m, datum) if location else _no_roi(m, datum)
+
+
+@_makes(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+def _no_roi(m: Any, datum: Datum) -> Any:
+    return MissionItem("roi", Vector3(*(math.nan,) * 3), math.nan, math.nan, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_DO_SET_HOME)
+def _set_home(m: Any, datum: Datum) -> Any:
+    if m.param1 == 1.0:  # where it is then
+        return MissionItem("set_home", Vector3(*(math.nan,) * 3), math.nan, math.nan, 0.0, ())
+    x, y, z = _place(m, datum)
+    return MissionItem("set_home", Vector3(x, y, z - datum.standing_height), math.nan, math.nan, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_CONDITION_DELAY)
+def _condition_delay(m: Any, datum: Datum) -> Any:
+    hold = _length(m.param1, mavlink.MAV_MISSION_INVALID_PARAM1, m)
+    return MissionItem("condition", Vector3(), math.nan, math.nan, hold, ())
+
+
+@_makes(mavlink.MAV_CMD_CONDITION_DISTANCE)
+def _condition_distance(m: Any, datum: Datum) -> Any:
+    distance = _length(m.param1, mavlink.MAV_MISSION_INVALID_PARAM1, m)
+    return MissionItem("condition", Vector3(), math.nan, distance, 0.0, ())
+
+
+@_makes(mavlink.MAV_CMD_NAV_DELAY)
 def _delay(m: Any, datum: Datum) -> Any:
     hold = _length(m.param1, mavlink.MAV_MISSION_INVALID_PARAM1, m)
     return MissionItem("delay", Vector3(), math.nan, math.nan, hold, ())
@@ -164,13 +232,20 @@ def _delay(m: Any, datum: Datum) -> Any:
 
 @_makes(mavlink.MAV_CMD_CONDITION_YAW)
 def _turn(m: Any, datum: Datum) -> Any:
-    if m.param4 == 1.0 or math.isnan(m.param1):  # relative angles have no meaning before the item is reached
-        raise RefusedItemError(mavlink.MAV_MISSION_UNSUPPORTED, m.seq)
+    if math.isnan(m.param1):
+        raise RefusedItemError(mavlink.MAV_MISSION_INVALID_PARAM1, m.seq)
+    if m.param4 == 1.0:  # an angle from the heading that it then has, clockwise unless its direction is -1
+        angle = math.copysign(math.radians(m.param1), 1.0 if m.param3 == -1.0 else -1.0)
+        return MissionItem("yaw", Vector3(), angle, math.nan, 0.0, (1.0,))
     return MissionItem("yaw", Vector3(), _yaw(m.param1), math.nan, 0.0, ())
 
 
 @_makes(mavlink.MAV_CMD_DO_CHANGE_SPEED)
 def _speed(m: Any, datum: Datum) -> Any:
+    if int(m.param1) not in (0, 1):  # of the air, over the ground; not of climbing
+        return _idle()
+    if m.param2 == -2.0:  # the usual one
+        return MissionItem("speed", Vector3(), math.nan, math.nan, 0.0, (math.nan,))
     if not m.param2 > 0.0:
         return _idle()
     return MissionItem("speed", Vector3(), math.nan, math.nan, 0.0, (m.param2,))

@@ -10,8 +10,10 @@ from services.mavlink.coordinates import Datum
 from services.mavlink.dialect import mavlink
 from services.mavlink.endpoint import Endpoint
 from services.mavlink.mission_export import to_mavlink
-from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink
+from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
+from services.mavlink.text import statustext
 
+MAX_WARNINGS = 10  # texts about items that are skipped
 RETRY, RETRIES = 0.25, 8  # [s] before an item is asked for again, and how often that is done
 KINDS = {  # what the autopilot is asked to take
     mavlink.MAV_MISSION_TYPE_MISSION: "mission_upload",
@@ -168,6 +170,9 @@ class MissionStore:
                 return
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self.held[upload.kind] = upload.items
+                for text in skipped(upload.items)[:MAX_WARNINGS]:
+                    for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
+                        upload.endpoint.send(message)
             self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), told)
 
         self._commands.put(KINDS[upload.kind], upload.endpoint.name, acknowledged, items=items)

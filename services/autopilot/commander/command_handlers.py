@@ -6,10 +6,8 @@ from typing import Any
 
 from messages import Answer
 from services.autopilot.commander import checks, transitions
-from services.autopilot.commander.fence import Fence, rally_points
 from services.autopilot.commander.flight_mode import value
 from services.autopilot.commander.mode_table import MODES
-from services.autopilot.commander.route import Route
 from services.autopilot.commander.state import PendingArm
 from services.autopilot.commander.transitions import Context
 
@@ -134,44 +132,6 @@ def link(context: Context, command: Any) -> None:
     inputs.linked, inputs.link_age = True, 0.0
 
 
-@handles("mission_upload")
-def mission_upload(context: Context, command: Any) -> None:
-    """A new mission, in place of the one there is."""
-    state = context.state
-    state.guidance.route = _denied_if_wrong(Route, command.items)
-    if state.mode_name == "mission" and not state.on_trajectory:
-        flies_on = state.guidance.route.items and state.guidance.flying
-        transitions.enter(context.constants, state, "mission" if flies_on else "hold")
-
-
-@handles("mission_clear")
-def mission_clear(context: Context, command: Any) -> None:
-    """No mission any more."""
-    state = context.state
-    state.guidance.route = Route()
-    if state.mode_name == "mission" and not state.on_trajectory:
-        transitions.enter(context.constants, state, "hold")
-
-
-@handles("mission_current")
-def mission_current(context: Context, command: Any) -> None:
-    """Go on with another item."""
-    number = value(command.values, 0)
-    _denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
-
-
-@handles("fence_upload")
-def fence_upload(context: Context, command: Any) -> None:
-    """A new fence; without items, none."""
-    context.state.guidance.fence = _denied_if_wrong(Fence, command.items)
-
-
-@handles("rally_upload")
-def rally_upload(context: Context, command: Any) -> None:
-    """New places to return to; without items, home."""
-    context.state.guidance.rally_points = _denied_if_wrong(rally_points, command.items)
-
-
 @handles("speed")
 def speed(context: Context, command: Any) -> None:
     """Fly at another speed [m/s] until disarmed; NaN: at the parameter's."""
@@ -188,7 +148,7 @@ def parameter(context: Context, command: Any) -> None:
     if known is None:
         raise Denied(f"unknown parameter {command.text}")
     asked = value(command.values, 0)
-    _denied_if_wrong(known.check, asked)
+    denied_if_wrong(known.check, asked)
     parameters = context.state.guidance.parameters
     parameters[known.name] = asked
     context.outbox.parameters = dict(parameters)
@@ -200,7 +160,7 @@ def finish(context: Context, command: Any) -> None:
     context.state.finish_requested = True
 
 
-def _denied_if_wrong(function: Callable, argument: Any) -> Any:
+def denied_if_wrong(function: Callable, argument: Any) -> Any:
     """The function's value; what it refuses is refused for good."""
     try:
         return function(argument)

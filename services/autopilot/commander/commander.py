@@ -7,7 +7,7 @@ import math
 
 from dynamics.vector import ZERO
 from messages import Answer
-from services.autopilot.commander import checks, failsafes
+from services.autopilot.commander import checks, failsafes, plan_handlers  # noqa: F401 (the last declares its handlers)
 from services.autopilot.commander.attention import battery_thresholds, needs_attention
 from services.autopilot.commander.command_handlers import handle
 from services.autopilot.commander.request import Outbox, Request, Status

@@ -7,7 +7,9 @@ from typing import Any
 NONE_REACHED = 65535
 NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
 
-ACTIONS = ("waypoint", "takeoff", "land", "return", "loiter_time", "delay", "jump", "speed", "yaw")
+TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions that lead somewhere
+INSTANT = ("speed", "roi", "set_home")  # those that take no time
+ACTIONS = (*TO_PLACES, *INSTANT, "takeoff", "land", "return", "delay", "condition", "jump", "yaw")
 _PLACED = ("waypoint",)
 MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]
 
@@ -25,8 +27,8 @@ def check_items(items: Sequence[Any]) -> None:
             raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
         if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
             raise ValueError(f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and how often")
-        if item.action == "speed" and not (item.values and item.values[0] > 0.0):
-            raise ValueError(f"item {number}: expected a speed above 0 m/s")
+        if item.action == "speed" and not (item.values and (item.values[0] > 0.0 or math.isnan(item.values[0]))):
+            raise ValueError(f"item {number}: expected a speed above 0 m/s, or none for the usual one")
 
 
 class Route:

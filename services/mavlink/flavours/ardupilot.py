@@ -13,7 +13,7 @@ TAKEOFF_ABOVE_SEA = False
 PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
 RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 
-_STABILIZE, _ACRO = 0, 1
+_STABILIZE, _ACRO, _CIRCLE = 0, 1, 7
 _ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
 _SHOWN = {  # what a mode looks like
     "takeoff": _GUIDED,
@@ -28,6 +28,7 @@ _SHOWN = {  # what a mode looks like
     "altitude_control": _ALT_HOLD,
     "stabilized": _STABILIZE,
     "acro": _ACRO,
+    "orbit": _CIRCLE,
 }
 MODES = (
     FlightMode("stabilized", "STABILIZE", _STABILIZE),

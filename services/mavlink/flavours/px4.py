@@ -31,7 +31,8 @@ MODES = (  # standard and advanced as PX4's lib/modes has them
     FlightMode("takeoff", "Takeoff", custom_mode(4, 2), mavlink.MAV_STANDARD_MODE_TAKEOFF),
     FlightMode("land", "Land", custom_mode(4, 6), mavlink.MAV_STANDARD_MODE_LAND),
 )
-_NUMBERS = {mode.kind: mode.number for mode in MODES}
+ORBIT = custom_mode(3, 1)  # that is entered by DO_ORBIT alone
+_NUMBERS = {mode.kind: mode.number for mode in MODES} | {"orbit": ORBIT}
 _KINDS = {mode.number: mode.kind for mode in MODES} | {custom_mode(1, 0): "stabilized"}  # PX4's Manual of a multirotor
 _SHOWN_AS = {"goto": "hold", "descend": "land"}  # modes that PX4 has no number for
 

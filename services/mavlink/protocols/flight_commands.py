@@ -45,6 +45,7 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
 
 
 SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; nothing measures the air's
+DEFAULT_ORBIT_SPEED = 1.0  # [m/s]
 FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the checks say
 
 
@@ -68,7 +69,7 @@ def takeoff(session: Session, c: Command) -> Outcome:
     return Request("takeoff", (height, math.nan))
 
 
-@rule(mavlink.MAV_CMD_NAV_LAND)
+@rule(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 def land(session: Session, c: Command) -> Outcome:
     """Down, where it is."""
     return Request("land")
@@ -103,6 +104,42 @@ def reposition(session: Session, c: Command) -> Outcome:
     place = [here if math.isnan(asked) else asked for here, asked in zip(estimate.position_world, there, strict=True)]
     speed = c.params[0] if c.params[0] > 0.0 else math.nan
     return Request("goto", (*place, yaw, speed))
+
+
+@rule(mavlink.MAV_CMD_DO_ORBIT)
+def orbit(session: Session, c: Command) -> Outcome:
+    """Round a place, clockwise where the radius is above 0, as PX4 takes it."""
+    radius, speed, behaviour, turns = c.params
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    clockwise = math.copysign(1.0, radius) * math.copysign(1.0, speed) > 0.0
+    pace = DEFAULT_ORBIT_SPEED if math.isnan(speed) else abs(speed)
+    return Request("orbit", (x, y, z, abs(radius), -pace if clockwise else pace, behaviour, turns))
+
+
+@rule(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI)
+def set_roi(session: Session, c: Command) -> Outcome:
+    """Point the nose at a place."""
+    if c.number == mavlink.MAV_CMD_DO_SET_ROI and int(c.params[0]) != mavlink.MAV_ROI_LOCATION:
+        return Request("roi") if int(c.params[0]) == mavlink.MAV_ROI_NONE else UNSUPPORTED
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    return Request("roi", (x, y, z)) if math.isfinite(x) else DENIED
+
+
+@rule(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+def no_roi(session: Session, c: Command) -> Outcome:
+    """Point it nowhere any more."""
+    return Request("roi")
+
+
+@rule(mavlink.MAV_CMD_DO_SET_HOME)
+def set_home(session: Session, c: Command) -> Outcome:
+    """Return to where it is, or to a place."""
+    if c.params[0] == 1.0:
+        return Request("set_home")
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    if not math.isfinite(x):
+        return DENIED
+    return Request("set_home", (x, y, z - session.vehicle.description.standing_height))
 
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)

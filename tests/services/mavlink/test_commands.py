@@ -129,6 +129,40 @@ def test_a_heading_alone_is_turned_to_on_the_spot():
     assert asked(bench, "goto")[2] == pytest.approx(12.0 + 0.35)
 
 
+def test_home_region_of_interest_and_orbit():
+    bench = Bench()
+    bench.vehicle.do_set_home = bench.vehicle.do_roi = lambda c: 0
+    bench.vehicle.armed = True
+    bench.step()
+    station = bench.station()
+    there = 40.7686 + 10.0 / 111_049, 14.7907
+    station.command(179, 0.0, 0.0, 0.0, 0.0, *there, 290.0)
+    assert asked(bench, "set_home") == pytest.approx((0.0, 10.0, 9.65), abs=0.3)
+    station.command(179, 1.0)
+    assert asked(bench, "set_home") == ()
+    station.command(195, 0.0, 0.0, 0.0, 0.0, *there, 280.0)
+    assert asked(bench, "roi") == pytest.approx((0.0, 10.0, 0.0), abs=0.3)
+    station.command(197)
+    assert asked(bench, "roi") == ()
+    station.command(34, 12.0, 3.0, 0.0, NAN, *there, 290.0)
+    values = asked(bench, "orbit")
+    assert values[:6] == pytest.approx((0.0, 10.0, 10.0, 12.0, -3.0, 0.0), abs=0.3)  # clockwise
+    station.command(34, -12.0, NAN, NAN, NAN, NAN, NAN, NAN)
+    assert asked(bench, "orbit")[3:5] == pytest.approx((12.0, 1.0))
+
+
+def test_a_place_as_ardupilots_stations_write_it():
+    bench = Bench("mavlink.flavour=ardupilot")
+    bench.vehicle.armed = True
+    bench.step()
+    station = bench.station()
+    place = round((40.7686 + 10.0 / 111_049) * 1e7), 147907000, 20.0
+    station.send("mission_item_int", 1, 1, 0, 6, 16, 2, 0, 0.0, 0.0, 0.0, 0.0, *place, 0)
+    assert asked(bench, "goto") == pytest.approx((0.0, 10.0, 20.35), abs=0.05)
+    bench.step()
+    assert station.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+
+
 LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
 
 

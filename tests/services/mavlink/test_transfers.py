@@ -182,6 +182,7 @@ def test_cameras_keep_their_number_in_the_mission_but_do_nothing():
         client.send("mission_item_int", *item(seq, command))
     bench.step(3)
     assert [(i.action, i.hold) for i in bench.vehicle.items] == [("waypoint", 0.0), ("delay", 0.0), ("waypoint", 0.0)]
+    assert [m.text for m in client.all("STATUSTEXT")] == ["item 1: IMAGE_START_CAPTURE skipped"]
 
 
 def test_everything_is_cleared_with_one_acknowledgement():

@@ -113,3 +113,71 @@ def test_heights_count_from_where_it_stands():
     assert flight.on(2.0).setpoint.position_world[2] == pytest.approx(2.85, abs=0.05)
     flight.told(command("goto", 30.0, 0.0, 3.0)).on(12.0).told(command("return")).on(10.0)
     assert flight.setpoint.position_world[2] == pytest.approx(15.35, abs=0.05)
+
+
+def test_what_has_nothing_to_do_does_not_stop_it():
+    far = [i for k in range(1, 4) for i in (item("waypoint", 15.0 * k, 0.0, 3.0), item("delay"), item("delay"))]
+    flight = mission(item("takeoff", z=3.0), *far)
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert min(flight.speeds((15.0, 0.0), 1.0)) > 4.9
+    assert reached(flight)[-1] == 9
+
+
+def test_loiter_to_an_altitude_and_for_ever():
+    flight = mission(item("takeoff", z=3.0), item("loiter_to_alt", 9.0, 0.0, 8.0), item("loiter", 9.0, 9.0, 8.0))
+    assert flight.until(lambda s: s.mission_current == 2)
+    over = [s.position_world for s, _ in flight.track if s.position_world[2] > 3.2]
+    assert all(math.dist(p[:2], (9.0, 0.0)) < 0.5 for p in over)  # first there, then up
+    flight.on(30.0)
+    assert (flight.status.mission_current, flight.status.mission_state) == (2, 3)
+    assert flight.setpoint.position_world == pytest.approx((9.0, 9.0, 8.0), abs=0.05)
+
+
+def test_the_nose_points_at_the_region_of_interest_until_it_is_none():
+    flight = mission(
+        item("takeoff", z=3.0), item("roi", 20.0, 20.0, 0.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0),
+        item("roi"), item("waypoint", 40.0, 0.0, 3.0, hold=2.0),
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_current == 4)
+    assert flight.setpoint.yaw == pytest.approx(0.5 * math.pi, abs=0.05)
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert flight.setpoint.yaw == pytest.approx(0.0, abs=0.05)
+    flight.told(command("roi", 40.0, -30.0, 0.0)).on(6.0)
+    assert flight.setpoint.yaw == pytest.approx(-0.5 * math.pi, abs=0.05)
+
+
+def test_conditions_are_waited_for_on_the_way():
+    for condition in (item("condition", radius=10.0), item("condition", hold=4.0)):
+        flight = mission(
+            item("takeoff", z=3.0), condition, item("speed", values=(2.0,)), item("waypoint", 40.0, 0.0, 3.0)
+        )
+        assert flight.until(lambda s: s.mission_state == 5)
+        assert max(flight.speeds((10.0, 0.0), 2.0)) > 3.5
+        assert max(flight.speeds((36.0, 0.0), 1.0)) == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_relative_turn_and_another_home():
+    flight = mission(
+        item("takeoff", z=3.0), item("waypoint", 0.0, 9.0, 3.0, hold=3.0), item("yaw", yaw=-1.0, values=(1.0,)),
+        item("set_home"), item("waypoint", 9.0, 9.0, 3.0), item("return"), parameters={"MPC_YAW_MODE": 5},
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_current == 4)
+    assert flight.setpoint.yaw == pytest.approx(-1.0, abs=math.radians(12.0))
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert flight.setpoint.position_world[:2] == pytest.approx((0.0, 9.0), abs=0.3)
+
+
+def test_it_circles_a_place_facing_it():
+    flight = Flight(command("takeoff", 5.0), command("arm"))
+    assert flight.until(lambda s: s.mode == "hold")
+    flight.told(command("orbit", 20.0, 0.0, 8.0, 8.0, 2.0)).on(25.0)
+    flight.track.clear()
+    flight.on(25.0)
+    places = [s.position_world for s, _ in flight.track]
+    assert all(math.dist(p[:2], (20.0, 0.0)) == pytest.approx(8.0, abs=0.2) for p in places)
+    assert all(p[2] == pytest.approx(8.0, abs=0.1) for p in places)
+    turned = [math.atan2(p[1], p[0] - 20.0) for p in places]
+    assert math.remainder(turned[250] - turned[0], 2.0 * math.pi) == pytest.approx(0.25, abs=0.03)  # to the left
+    facing = flight.setpoint.yaw - turned[-1] - math.pi
+    assert math.cos(facing) > 0.9
+    assert flight.status.mode == "orbit"
