@@ -76,7 +76,7 @@ _FAILSAFES = (
     Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "offboard setpoints older than this are lost"),
     Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"when they are: {_ACTION}", True),
     Parameter("COM_DL_LOSS_T", "s", 10.0, 1.0, 300.0, "a ground station that is silent for so long is lost"),
-    Parameter("NAV_DLL_ACT", "", RETURN, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("NAV_DLL_ACT", "", RETURN, 0, 3, "when it is: 0 a warning, 1 hold, 2 return, 3 land", True),
     Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
     Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"when it is: {_ACTION}", True),
     Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which it is critical, and the motors are not armed"),

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from services.mavlink.clock import Clock, Instant
@@ -10,6 +11,7 @@ from services.mavlink.component_metadata import files
 from services.mavlink.dialect import mavlink
 from services.mavlink.endpoint import Endpoint
 from services.mavlink.file_server import FileServer
+from services.mavlink.log_server import LogServer
 from services.mavlink.mission_store import MissionStore
 from services.mavlink.parameter_store import ParameterStore
 from services.mavlink.schedule import Schedule
@@ -31,6 +33,7 @@ class Session:
         parameters: ParameterStore,
         missions: MissionStore,
         counts: Counter[str],
+        log: Path | None,
         trusts: Callable[[Endpoint], bool],
     ):
         """A conversation that begins.
@@ -43,11 +46,13 @@ class Session:
             parameters: of the autopilot.
             missions: that the vehicle holds.
             counts: what was refused, by reason.
+            log: of the run, None where there is none.
             trusts: whether commands of an endpoint are taken.
         """
         self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
         self.parameters, self.missions = parameters, missions
         self.schedule = Schedule(vehicle)
+        self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
         self._commands, self._counts, self._trusts = commands, counts, trusts
         self._said: dict[str, Instant] = {}
