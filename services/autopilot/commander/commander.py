@@ -7,7 +7,12 @@ import math
 
 from dynamics.vector import ZERO
 from messages import Answer
-from services.autopilot.commander import checks, failsafes, plan_handlers  # noqa: F401 (the last declares its handlers)
+from services.autopilot.commander import (  # noqa: F401 (two declare their handlers)
+    checks,
+    failsafes,
+    failure_handlers,
+    plan_handlers,
+)
 from services.autopilot.commander.attention import battery_thresholds, needs_attention
 from services.autopilot.commander.command_handlers import handle
 from services.autopilot.commander.request import Outbox, Request, Status
@@ -54,6 +59,7 @@ class Commander:
         return Request(
             setpoint=setpoint,
             parameters=context.outbox.parameters,
+            faults=context.outbox.faults,
             acknowledgements=tuple(context.outbox.acknowledgements),
             texts=tuple(context.outbox.texts),
             reset_controller=not state.on_trajectory and not state.guidance.flying,

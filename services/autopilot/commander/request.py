@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from messages import Answer
 from services.autopilot.interface import Setpoint
+from services.common.failures import Faults
 
 
 class Status(NamedTuple):
@@ -31,6 +32,7 @@ class Request(NamedTuple):
 
     setpoint: Setpoint | None  # to be followed; None: the scene's trajectory
     parameters: Mapping[str, float] | None  # values of all, where one has changed
+    faults: Faults | None  # that are injected, where one has changed
     acknowledgements: tuple[Any, ...]  # of commands, as `Answer` messages
     texts: tuple[str, ...]  # for the operator
     reset_controller: bool  # the vehicle is on the ground: the controller must be as before a flight
@@ -46,6 +48,7 @@ class Outbox:
     acknowledgements: list[Any] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     parameters: dict[str, float] | None = None
+    faults: Faults | None = None
 
     def say(self, text: str) -> None:
         """Tell the operator."""
