@@ -83,6 +83,7 @@ class Adapter:
         """An endpoint is gone."""
         del self.sessions[endpoint]
         self.parameters.forget(endpoint)
+        self.missions.forget(endpoint)
 
     def trusts(self, endpoint: Endpoint) -> bool:
         """Whether its commands are taken: signed ones always, unsigned ones from this machine."""

@@ -62,6 +62,7 @@ def item(session: Session, m: Any) -> None:
 @handles("MISSION_REQUEST_LIST")
 def request_list(session: Session, m: Any) -> None:
     """A download begins."""
+    session.missions.forget(session.endpoint, m.mission_type)
     held = session.missions.held.get(m.mission_type)
     if held is None:
         _reply(session, m.mission_type, mavlink.MAV_MISSION_UNSUPPORTED)
