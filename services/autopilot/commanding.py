@@ -159,9 +159,9 @@ class Commanding:
         restart = tick if request.reset_controller and flight.stage != STANDING else -1
         words = self.words.number(_words(status))
         if wanted is None:
-            return Order(True, Reference(), words, False, False, restart)
+            return Order(True, Reference(), words, False, False, status.released, restart)
         reference = Reference(*wanted, self.phases.number(status.phase), False)
-        return Order(False, reference, words, status.armed, status.finished, restart)
+        return Order(False, reference, words, status.armed, status.finished, status.released, restart)
 
     def _answer(self, tick: int, request: Request) -> None:
         self._acknowledgements += request.acknowledgements
@@ -182,7 +182,7 @@ def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
 
 def _words(status: Status) -> Status:
     """What is left of a status without all that is numbers in the port."""
-    return status._replace(phase="", armed=False, finished=False, battery_warning=0)
+    return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)
 
 
 def _setpoint(r: Reference) -> Setpoint:

@@ -9,7 +9,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.frames import saturated, swap_yaw
 
 GROUND_SPEED, NO_THROTTLE, DEFAULT_SPEED = 1.0, -1.0, -2.0  # parameters of DO_CHANGE_SPEED
-_PLACELESS = ("return", "delay", "condition", "jump", "speed", "yaw")
+_PLACELESS = ("gripper", "return", "delay", "condition", "jump", "speed", "yaw")
 _NOWHERE = {"roi": mavlink.MAV_CMD_DO_SET_ROI_NONE}  # what an action without a place is
 _Params = tuple[float, ...]
 
@@ -43,6 +43,7 @@ _COMMANDS: dict[str, tuple[int, Callable[[Any], _Params]]] = {  # by action: MAV
     ),
     "yaw": (mavlink.MAV_CMD_CONDITION_YAW, lambda i: _turn(i)),
     "loiter": (mavlink.MAV_CMD_NAV_LOITER_UNLIM, lambda i: (0.0, 0.0, 0.0, _heading(i.yaw))),
+    "gripper": (mavlink.MAV_CMD_DO_GRIPPER, lambda i: (1.0, i.values[0])),
     "loiter_to_alt": (mavlink.MAV_CMD_NAV_LOITER_TO_ALT, lambda i: ()),
     "roi": (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, lambda i: ()),
     "set_home": (mavlink.MAV_CMD_DO_SET_HOME, lambda i: (float(math.isnan(i.position.x)),)),

@@ -2,6 +2,7 @@
 
 from cosim.scene import Scene
 from dynamics.effects import battery
+from dynamics.effects.payload import Payload
 from services.common.parameters import table
 from services.common.sections import Exchange, Vehicle, active, airframe, start_height
 from services.mavlink.config import Mavlink
@@ -26,6 +27,7 @@ def describe(scene: Scene) -> VehicleDescription:
         battery=_battery(scene),
         sensors=sensors,
         parameters=tuple(table(scene).values()),
+        gripper=any(isinstance(effect, Payload) for effect in active(scene)),
         accepts_commands=scene.lookup("autopilot.operator"),
         tick_ns=scene[Exchange].interval_ns,
     )

@@ -56,6 +56,7 @@ class Guidance:
     speed: float = math.nan  # asked for in this flight; NaN: the parameter's [m/s]
     home: Vec3 = (0.0, 0.0, 0.0)  # world x, y and the height of the ground where it was armed, or was told to be [m]
     roi: Vec3 | None = None  # region of interest: where the nose points on its way [m]
+    released: bool = False  # the gripper is to be open
     route: Route = field(default_factory=Route)
     fence: Fence = field(default_factory=Fence)
     rally_points: tuple[Vec3, ...] = ()

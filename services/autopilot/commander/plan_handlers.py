@@ -7,7 +7,7 @@ from services.autopilot.commander import transitions
 from services.autopilot.commander.command_handlers import Denied, denied_if_wrong, handles
 from services.autopilot.commander.fence import Fence, rally_points
 from services.autopilot.commander.flight_mode import fill_in, value, vector
-from services.autopilot.commander.route import Route
+from services.autopilot.commander.route import GRAB, Route
 from services.autopilot.commander.transitions import Context
 
 
@@ -64,3 +64,9 @@ def region_of_interest(context: Context, command: Any) -> None:
     """Point the nose there on the way. Values: x, y, z [m]; without a place, nowhere any more."""
     place = vector(command.values, 0)
     context.state.guidance.roi = place if all(map(math.isfinite, place[:2])) else None
+
+
+@handles("gripper")
+def gripper(context: Context, command: Any) -> None:
+    """Open it (0) or close it (1); what it has let go of does not come back."""
+    context.state.guidance.released = value(command.values, 0) != GRAB

@@ -24,6 +24,7 @@ class Status(NamedTuple):
     offboard_fresh: bool  # setpoints from outside are coming
     prearm: tuple[str, ...]  # why it cannot be armed; to be left out while the motors run on the trajectory
     home: tuple[float, float, float]  # world x, y, and height of the ground [m]
+    released: bool  # the gripper is to be open
     battery_warning: int  # 0 none, 1 low, 2 critical, 3 nearly empty
 
 

@@ -8,7 +8,8 @@ NONE_REACHED = 65535
 NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
 
 TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions that lead somewhere
-INSTANT = ("speed", "roi", "set_home")  # those that take no time
+INSTANT = ("speed", "roi", "set_home", "gripper")  # those that take no time
+GRAB = 1.0  # value of the action gripper; 0: release
 ACTIONS = (*TO_PLACES, *INSTANT, "takeoff", "land", "return", "delay", "condition", "jump", "yaw")
 _PLACED = ("waypoint",)
 MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]

@@ -26,6 +26,7 @@ def status(constants: Constants, view: View, state: State) -> Status:
         offboard_fresh=guidance.offboard_fresh,
         prearm=tuple(checks.reasons(view, state)) if constants.has_operator and not armed else (),
         home=guidance.home,
+        released=guidance.released,
         battery_warning=sum(view.battery_charge < limit for limit in battery_thresholds(guidance.parameters)),
     )
 

@@ -142,6 +142,15 @@ def set_home(session: Session, c: Command) -> Outcome:
     return Request("set_home", (x, y, z - session.vehicle.description.standing_height))
 
 
+@rule(mavlink.MAV_CMD_DO_GRIPPER)
+def gripper(session: Session, c: Command) -> Outcome:
+    """Let the payload go; what is gone cannot be grabbed again."""
+    if not session.vehicle.description.gripper:
+        session.say("DO_GRIPPER: there is no payload to let go")
+        return UNSUPPORTED
+    return Request("gripper", (0.0,)) if c.params[1] == mavlink.GRIPPER_ACTION_RELEASE else UNSUPPORTED
+
+
 @rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)
 def change_altitude(session: Session, c: Command) -> Outcome:
     """To another altitude, here; its frame is the second parameter."""

@@ -254,3 +254,17 @@ def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
             assert 2.0 * abs(z[0] - z[1]) < 0.01  # yaw [rad]
             assert at(flown, "estimate", t, lambda m: m.health) == 0
         assert height(flown, 20.0) > 1.5
+
+
+def test_a_gripper_lets_the_payload_go():
+    items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
+             item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
+    script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
+    flown = fly(14, script, "effects.payload={}")
+    thrust = flown.column("actuators", lambda m: sum(m.thrust))
+    times, reached = flown.times("actuators"), flown.column("status", lambda m: m.mission_reached)
+    released = flown.times("status")[reached == 2][0]
+    before = thrust[(times > released - 0.5) & (times < released)].mean()
+    after = thrust[times > 13.0].mean()
+    assert (before - after) / 9.80665 == pytest.approx(2.0, abs=0.1)  # kg
+    assert height(flown, 14.0) == pytest.approx(3.0, abs=0.1)

@@ -34,6 +34,7 @@ ITEMS = [
     item("roi"),
     item("set_home", 1.0, 2.0, 0.5),
     item("set_home"),
+    item("gripper", values=(0.0,)),
     item("condition", hold=3.0),
     item("condition", radius=8.0),
     item("yaw", yaw=-0.5, values=(1.0,)),

@@ -9,7 +9,7 @@ from services.autopilot.commander.flight_mode import FlightMode, fill_in, value
 from services.autopilot.commander.guidance import Guidance
 from services.autopilot.commander.leg import Leg, Place, passing_speed
 from services.autopilot.commander.modes import land, return_, takeoff
-from services.autopilot.commander.route import INSTANT, TO_PLACES
+from services.autopilot.commander.route import GRAB, INSTANT, TO_PLACES
 from services.autopilot.commander.smoothing import wrap_angle
 from services.autopilot.commander.view import Constants, View
 
@@ -191,6 +191,8 @@ def _act(constants: Constants, view: View, guidance: Guidance, item: Any) -> Non
         guidance.speed = item.values[0]
     elif item.action == "roi":
         guidance.roi = (place[0], place[1], place[2]) if all(map(math.isfinite, place[:2])) else None
+    elif item.action == "gripper":
+        guidance.released = item.values[:1] != (GRAB,)
     elif item.action == "set_home":
         x, y, z = view.estimate.position_world
         guidance.home = fill_in((x, y, z - constants.resting_height), (place[0], place[1], place[2]))
