@@ -30,6 +30,7 @@ from services.common import ports
 from services.common.failures import Faults
 
 NAME = "autopilot"
+GPS_HEIGHT, NO_HEIGHT = 1, 1e8  # of EKF2_HGT_REF; variance [m^2] of a height that tells nothing
 BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
 
 
@@ -83,6 +84,7 @@ def _navigation(
         inputs = (Input(ports.TRUTH), battery, flight)
         return [Part(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
+    height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
     known = setup.ports
     begin = InertialNavigation(p, given.start_world, STANDSTILL_EVERY * given.imu_every)
     inputs = (Input(injection.received(ports.IMU)), Input(injection.received(ports.MAGNETOMETER)), flight)
@@ -90,7 +92,7 @@ def _navigation(
     for port, fusion in (
         (ports.MAGNETOMETER, MagnetometerFusion(p)),
         (ports.BAROMETER, BarometerFusion(p)),
-        (ports.GPS, GpsFusion(p, given.gps_age)),
+        (ports.GPS, GpsFusion(p, given.gps_age, 0.0 if height_reference == GPS_HEIGHT else NO_HEIGHT)),
         (ports.SONAR, SonarFusion(p)),
     ):
         if port in known:

@@ -86,6 +86,7 @@ _FAILSAFES = (
     Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"when a motor gives less than it is asked for: {_ACTION}", True),
     Parameter("COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position for so long it is lost"),
     Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("EKF2_HGT_REF", "", 1, 0, 1, "where the height comes from, from the start on: 0 barometer, 1 GPS", True),
     Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "whether failures may be injected; 1 from the start of the run on", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"outside of the fence: {_ACTION}", True),
 )

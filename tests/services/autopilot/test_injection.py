@@ -100,6 +100,16 @@ def test_a_sensor_that_fails_is_refused_and_the_others_carry_on(unit, kind, sour
     assert math.dist(place(flown, 19.0)[:2], place(flown, 14.0)[:2]) < 1.5
 
 
+@pytest.mark.parametrize(("reference", "least", "most"), [(0, 0.03, 0.1), (1, 0.005, 0.02)])
+def test_the_height_comes_from_where_the_parameter_says(reference, least, most):
+    up = {0.04: [command("takeoff", 15.0), command("arm", float("nan"), 10.0)]}  # beyond the sonar's reach
+    sets = [f"EKF2_HGT_REF={reference}", "MPC_TKO_SPEED=3"]
+    flown = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
+    spread = flown.column("estimate", lambda m: m.position_std.z)[flown.times("estimate") > 17.0].mean()
+    assert least < spread < most  # the barometer knows less
+    assert error(flown, 15.0) < 0.3
+
+
 def test_a_slow_sensor_is_taken_in_where_it_speaks():
     flown = fly_by_sensors(19, {14: [inject("gps", SLOW), inject("magnetometer", SLOW, id=8)]})
     assert 0.1 < rejected(flown, 16.0, "magnetometer") < 1.0
