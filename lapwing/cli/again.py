@@ -70,7 +70,7 @@ def replay(
         with ExitStack() as stack:
             hub = None
             if mavlink:
-                options = mavlink_options(mavlink, mavlink_key, insecure, pace)
+                options = mavlink_options(mavlink, mavlink_key, insecure, log, pace)
                 hub = stack.enter_context(_recorded_hub(log, options))
             stack.enter_context(key_space(space))
             stop = stack.enter_context(Stop())

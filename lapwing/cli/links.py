@@ -22,11 +22,13 @@ def check_links(urls: list[str] | None, key: Path | None, insecure: bool) -> Non
         read_key(key)
 
 
-def mavlink_options(urls: list[str] | None, key: Path | None, insecure: bool, speed: float | None) -> "Options":
-    """The link that a service or a replay opens."""
+def mavlink_options(
+    urls: list[str] | None, key: Path | None, insecure: bool, log: Path, speed: float | None
+) -> "Options":
+    """The link that a replay of a log opens."""
     from services.mavlink.channel import read_key
     from services.mavlink.options import Options
 
     if not urls:
         raise ValueError("--mavlink: expected at least one URL")
-    return Options(tuple(urls), read_key(key) if key else None, insecure, speed)
+    return Options(tuple(urls), read_key(key) if key else None, insecure, log, speed)

@@ -62,6 +62,7 @@ def run(
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan
     from services.common.sections import Run
+    from services.common.vehicle import start_height
     from services.participant import Participation
     from services.processes import needed
     from services.table import resolve
@@ -79,8 +80,8 @@ def run(
             check_endpoint("--open", open_)
         check_links(mavlink, mavlink_key, insecure)
         set_ = [*(set_ or []), *(OPERATED if plan else ["autopilot.operator=true"] if mavlink else [])]
-        commands = tuple(read_plan(plan)) if plan else ()
         loaded = decided(scene, set_)
+        commands = tuple(read_plan(plan, start_height(loaded))) if plan else ()
         warn_of_gains(loaded)
         setup = resolve(loaded, commands)
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if mavlink else None)

@@ -45,7 +45,8 @@ def service(
     from services import processes
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan
-    from services.participant import Participation, take_part
+        from services.participant import Participation, take_part
+    from services.common.vehicle import start_height
     from services.table import resolve
 
     with user_errors():
@@ -58,8 +59,8 @@ def service(
             raise ValueError("--log: the recorder needs the name of its log")
         if name == processes.MAVLINK:
             check_links(mavlink, mavlink_key, insecure)
-        commands = tuple(read_plan(plan)) if plan else ()
         loaded = decided(scene, [*(set_ or []), *(OPERATED if plan else [])])
+        commands = tuple(read_plan(plan, start_height(loaded))) if plan else ()
         setup = resolve(loaded, commands)
         if entry.lock_step and name not in setup.services:
             typer.echo(f"{name}: {scene} does not call for it")  # compose starts every service there is

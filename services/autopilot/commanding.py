@@ -15,6 +15,7 @@ from services.autopilot.commander.commander import Commander
 from services.autopilot.commander.request import Request, Status
 from services.autopilot.commander.view import Constants, View
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
+from services.autopilot.injection.parts import Injection
 from services.autopilot.interface import Setpoint
 from services.autopilot.law import build
 from services.autopilot.setup import AutopilotSetup
@@ -48,8 +49,25 @@ class Commanding:
 
     name = "autopilot.commander"
 
-    def __init__(self, given: AutopilotSetup, law: Cell, thresholds: Cell, service: Service, operator: Operator):
-        """Parameters that change go into the cells; `operator` gives the commands that have come until a tick."""
+    def __init__(
+        self,
+        given: AutopilotSetup,
+        law: Cell,
+        thresholds: Cell,
+        service: Service,
+        operator: Operator,
+        injection: Injection,
+    ):
+        """Parameters and failures that change go into their cells.
+
+        Args:
+            given: the autopilot.
+            law: cell of the controller's parameters.
+            thresholds: cell of the battery's.
+            service: gets the messages.
+            operator: gives the commands that have come until a tick.
+            injection: where failures are injected.
+        """
         unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), KEPT),)
         self.outputs = (Port(ORDER, Order(), KEPT), *unwritten)
         a = given.airframe
@@ -71,8 +89,11 @@ class Commanding:
                 self._weight / (4.0 * thrust_max),
                 bool(given.phases),
                 given.operator,
+                injection.units,
             )
         )
+        self._injection = injection
+        self._battery = injection.received(ports.BATTERY)
         self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
         self._estimate: Any = None
         self._estimate_every_tick = False
@@ -101,7 +122,7 @@ class Commanding:
                 self._interval,
                 self._estimate,
                 elapsed,
-                graph.latest(ports.BATTERY, tick).charge if graph.has(ports.BATTERY) else math.nan,
+                graph.latest(self._battery, tick).charge if graph.has(self._battery) else math.nan,
                 flight.failed_motor,
                 followed,
                 self._thrust(tick),
@@ -113,6 +134,8 @@ class Commanding:
         if request.parameters is not None:
             write(self._law, controller(self._given, dict(request.parameters)))
             write(self._thresholds, battery_thresholds(request.parameters))
+        if request.faults is not None and self._injection.faults is not None:
+            write(self._injection.faults, request.faults)
         graph.put(ORDER, tick, self._order(tick, request, flight))
         self._answer(tick, request)
         return NEVER if request.quiet else tick + 1
@@ -136,9 +159,9 @@ class Commanding:
         restart = tick if request.reset_controller and flight.stage != ON_GROUND else -1
         words = self.words.number(_words(status))
         if wanted is None:
-            return Order(True, Reference(), words, False, False, restart)
+            return Order(True, Reference(), words, False, False, status.released, restart)
         reference = Reference(*wanted, self.phases.number(status.phase), False)
-        return Order(False, reference, words, status.armed, status.finished, restart)
+        return Order(False, reference, words, status.armed, status.finished, status.released, restart)
 
     def _answer(self, tick: int, request: Request) -> None:
         self._acknowledgements += request.acknowledgements
@@ -159,7 +182,7 @@ def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
 
 def _words(status: Status) -> Status:
     """What is left of a status without all that is numbers in the port."""
-    return status._replace(phase="", armed=False, finished=False, battery_warning=0)
+    return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)
 
 
 def _setpoint(r: Reference) -> Setpoint:

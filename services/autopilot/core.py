@@ -21,6 +21,7 @@ class Order(NamedTuple):
     words: int = 0  # number of the commander's words
     armed: bool = False
     finished: bool = False  # the run may end
+    released: bool = False  # the gripper is to be open
     restart_at: int = -1  # [tick] at which the controller begins afresh, on the ground
 
 
@@ -103,7 +104,9 @@ def outcome(
     return watched, (
         MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
         wanted,
-        AutopilotStatus(wanted.phase, order.words, armed, not flying, finished, warning, watched.failed),
+        AutopilotStatus(
+            wanted.phase, order.words, armed, not flying, finished, warning, watched.failed, order.released
+        ),
         Flight(stage, still_from, watched.failed),
     )
 

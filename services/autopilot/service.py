@@ -15,6 +15,7 @@ from services.autopilot.commanding import Commanding, Operator, controller
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
 from services.autopilot.custom.parts import controller_parts, estimator_parts
 from services.autopilot.estimate import before
+from services.autopilot.injection.parts import Injection
 from services.autopilot.navigation.correction import Correction
 from services.autopilot.navigation.estimate import FilterEstimate
 from services.autopilot.navigation.gps import GpsFusion
@@ -24,8 +25,10 @@ from services.autopilot.navigation.truth import TrueEstimate
 from services.autopilot.setup import AutopilotSetup
 from services.autopilot.wire import wires
 from services.common import ports
+from services.common.failures import Faults
 
 NAME = "autopilot"
+GPS_HEIGHT, NO_HEIGHT = 1, 1e8  # of EKF2_HGT_REF; variance [m^2] of a height that tells nothing
 BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
 
 
@@ -41,27 +44,33 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     def speak(tick: int) -> list[Any]:
         return [*(given.plan if tick == 0 else ()), *operator(tick)]
 
-    commanding = Commanding(given, law, thresholds, service, speak)
+    faults = Cell(Faults()) if given.operator and values["SYS_FAILURE_EN"] else None
+    injection = Injection(faults, setup.ports, given.estimator is not None)
+    commanding = Commanding(given, law, thresholds, service, speak, injection)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
         law, motor_failure.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
     )
-    inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(ports.BATTERY), Input(reference))
-    gives = (outputs[ports.ACTUATORS], outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
+    battery, actuators = injection.received(ports.BATTERY), outputs[ports.ACTUATORS]
+    inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(battery), Input(reference))
+    gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
     if given.controller is None:
         control = [Part(f"{NAME}.control", common, Cell(core.START), inputs, gives)]
     else:
         control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
-    service.parts = [*_navigation(setup, given, attention, outputs[ports.ESTIMATE]), commanding, *control]
+    navigation = _navigation(setup, given, attention, outputs[ports.ESTIMATE], injection)
+    service.parts = [*injection.before(NAME), *navigation, commanding, *control, *injection.after(NAME, actuators)]
     texts, words = commanding.phases.table, commanding.words.table
     service.wires = wires(setup, given.estimate_every, given.status_every, texts, words)
     service.spoken = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
     return service
 
 
-def _navigation(setup: Setup, given: AutopilotSetup, attention: Attention, estimate: Port) -> list[Part]:
+def _navigation(
+    setup: Setup, given: AutopilotSetup, attention: Attention, estimate: Port, injection: Injection
+) -> list[Part]:
     """The parts that make the estimate, in their order."""
-    battery, flight = Input(ports.BATTERY), Input(FLIGHT, 1)
+    battery, flight = Input(injection.received(ports.BATTERY)), Input(FLIGHT, 1)
     p = given.estimator
     if given.own_estimator is not None:
         names = [port.name for port in setup.services["sensors"].ports] if "sensors" in setup.services else []
@@ -73,17 +82,20 @@ def _navigation(setup: Setup, given: AutopilotSetup, attention: Attention, estim
         inputs = (Input(ports.TRUTH), battery, flight)
         return [Part(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
+    height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
     known = setup.ports
     begin = InertialNavigation(p, given.start_world, STANDSTILL_EVERY * given.imu_every)
-    inputs = (Input(ports.IMU), Input(ports.MAGNETOMETER), flight)
+    inputs = (Input(injection.received(ports.IMU)), Input(injection.received(ports.MAGNETOMETER)), flight)
     parts = [Part(f"{NAME}.inertial", begin, state, inputs, (), given.imu_every)]
     for port, fusion in (
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),
-        (ports.GPS, GpsFusion(p, given.gps_age)),
+        (ports.GPS, GpsFusion(p, given.gps_age, 0.0 if height_reference == GPS_HEIGHT else NO_HEIGHT)),
         (ports.SONAR, Correction(p)),
     ):
         if port in known:
-            parts.append(Part(f"{NAME}.{port}", fusion, state, (Input(port),), (), known[port].period))
+            parts.append(
+                Part(f"{NAME}.{port}", fusion, state, (Input(injection.received(port)),), (), known[port].period)
+            )
     told = FilterEstimate(p, attention, before(given.start_world))
     return [*parts, Part(f"{NAME}.estimate", told, state, (battery, flight), (estimate,))]

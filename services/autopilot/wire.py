@@ -85,7 +85,7 @@ def _status_sample(texts: Sequence[str], words: Sequence[Any]) -> Callable[[int,
             header(0, "body"), w.mode, texts[phase], text=w.failsafe,
             mission_current=w.mission_current, mission_count=w.mission_count, mission_reached=w.mission_reached,
             mission_state=w.mission_state, offboard_fresh=w.offboard_fresh, prearm=() if armed else tuple(w.prearm),
-            failsafe=bool(w.failsafe), home=Vector3(*w.home, 0.0),
+            failsafe=bool(w.failsafe), home=Vector3(*w.home),
         )  # fmt: skip
 
     return sample

@@ -1,7 +1,7 @@
 """Missions from files: QGroundControl's .plan (JSON) and .waypoints (QGC WPL 110), in the autopilot's terms.
 
 Sources: MAVLink guide, "File formats"; QGroundControl developer guide, "Plan file format". Places are relative to the
-home of the simulated world; altitudes of frame 3 are above home, those of frame 0 above the sea.
+home of the simulated world; altitudes of frame 3 count from where the vehicle stands, those of frame 0 from the sea.
 """
 
 import json
@@ -12,7 +12,6 @@ from typing import Any
 
 from dynamics.geodesy import Home, geodetic_to_enu
 from messages import MissionItem, OperatorCommand, Vector3
-from services.common.operator import Operator, nobody
 
 OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # overrides of a scene that flies a plan
 PATIENCE = 60.0  # [s] the vehicle gets to become ready for take-off
@@ -36,8 +35,12 @@ _ACTIONS: dict[int, tuple[str, Callable[[_Params], dict[str, Any]]]] = {  # by M
 }
 
 
-def read(path: Path) -> list[OperatorCommand]:
+def read(path: Path, standing_height: float = 0.0) -> list[OperatorCommand]:
     """The commands that upload a plan, fly it, and end the run with the landing.
+
+    Args:
+        path: of the file.
+        standing_height: world z [m] of the vehicle where it stands, from which altitudes above home count.
 
     Raises:
         ValueError: (one line) no such file, not of these formats, or an item that cannot be flown.
@@ -50,9 +53,9 @@ def read(path: Path) -> list[OperatorCommand]:
         raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
     try:
         if text.startswith(HEADER):
-            items, fence, rally = _waypoints(text)
+            items, fence, rally = _waypoints(text, standing_height)
         else:
-            items, fence, rally = _plan(json.loads(text))
+            items, fence, rally = _plan(json.loads(text), standing_height)
     except (KeyError, TypeError, IndexError) as error:
         raise ValueError(f"{path}: not a plan: {type(error).__name__} at {error}") from None
     except json.JSONDecodeError as error:
@@ -76,15 +79,7 @@ def read(path: Path) -> list[OperatorCommand]:
     ]
 
 
-def operator(path: Path | None) -> Operator:
-    """Gives a plan's commands at the first tick; without a plan, nobody."""
-    if path is None:
-        return nobody
-    commands = read(path)
-    return lambda tick: commands if tick == 0 else ()
-
-
-def _waypoints(text: str) -> tuple[list[Any], list[Any], list[Any]]:
+def _waypoints(text: str, ground: float) -> tuple[list[Any], list[Any], list[Any]]:
     rows = [line.split() for line in text.splitlines()[1:] if line.strip()]
     items = []
     for number, row in enumerate(rows):
@@ -93,7 +88,7 @@ def _waypoints(text: str) -> tuple[list[Any], list[Any], list[Any]]:
         place = [float(v) for v in row[8:11]]
         if number == 0 and row[3] == "16" and row[2] == "0":
             continue  # by custom the first row is home
-        items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place))
+        items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place, ground))
     return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
 
 
@@ -102,7 +97,7 @@ def _jump_back(item: Any, left_out: int) -> Any:
     return item._replace(values=(item.values[0] - left_out, item.values[1])) if item.action == "jump" else item
 
 
-def _plan(data: dict) -> tuple[list[Any], list[Any], list[Any]]:
+def _plan(data: dict, ground: float) -> tuple[list[Any], list[Any], list[Any]]:
     if data.get("fileType") != "Plan":
         raise ValueError('expected "fileType": "Plan"')
     items, numbers = [], {}
@@ -111,7 +106,7 @@ def _plan(data: dict) -> tuple[list[Any], list[Any], list[Any]]:
             raise ValueError(f"item {number}: expected a SimpleItem, got {raw.get('type')}")
         params = [math.nan if v is None else float(v) for v in raw["params"]]
         numbers[raw.get("doJumpId", number + 1)] = number
-        items.append(_item(number, raw["command"], raw["frame"], params[:4], params[4:7]))
+        items.append(_item(number, raw["command"], raw["frame"], params[:4], params[4:7], ground))
     items = [
         i._replace(values=(float(numbers[int(i.values[0])]), i.values[1])) if i.action == "jump" else i for i in items
     ]
@@ -122,11 +117,11 @@ def _plan(data: dict) -> tuple[list[Any], list[Any], list[Any]]:
         action = "fence_inclusion" if polygon["inclusion"] else "fence_exclusion"
         count = (float(len(polygon["polygon"])),)
         shapes += [_item_of(action, *corner, values=count) for corner in polygon["polygon"]]
-    rally = [_item_of("rally", *point) for point in data.get("rallyPoints", {}).get("points", ())]
+    rally = [_item_of("rally", x, y, ground + z) for x, y, z in data.get("rallyPoints", {}).get("points", ())]
     return items, shapes, rally
 
 
-def _item(number: int, command: int, frame: int, params: list[float], place: list[float]) -> Any:
+def _item(number: int, command: int, frame: int, params: list[float], place: list[float], ground: float) -> Any:
     if command not in _ACTIONS:
         raise ValueError(f"item {number}: unknown command {command}; known: {', '.join(map(str, _ACTIONS))}")
     if frame not in (*_ABOVE_SEA, *_ABOVE_HOME, _NO_PLACE):
@@ -137,13 +132,15 @@ def _item(number: int, command: int, frame: int, params: list[float], place: lis
         raise ValueError(f"item {number}: expected a latitude and a longitude, got {latitude:g}, {longitude:g}")
     if frame in _ABOVE_SEA:
         height -= _HOME.height
+    else:
+        height += ground
     if action in ("waypoint", "land", "takeoff", "loiter_time"):
         return _item_of(action, latitude, longitude, height, **told(params))
     return _made(action, (math.nan,) * 3, **told(params))
 
 
 def _item_of(action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:
-    """An item at a place on the Earth, `height` above home [m]; without a place, NaN."""
+    """An item at a place on the Earth, at a world z of `height` [m]; without a place, NaN."""
     if math.isnan(latitude) or (latitude, longitude) == (0.0, 0.0):
         return _made(action, (math.nan, math.nan, height), **more)
     x, y, _ = geodetic_to_enu(_HOME, float(latitude), float(longitude), _HOME.height + height)

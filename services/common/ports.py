@@ -133,6 +133,7 @@ class AutopilotStatus(NamedTuple):
     finished: bool = False
     battery_warning: int = 0  # 0 none or not known, 1 low, 2 critical, 3 nearly empty
     failed_motor: int = 0  # from 1; 0: none
+    released: bool = False  # the gripper is open
 
 
 class StateEstimate(NamedTuple):

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from messages import OperatorInput, header
@@ -35,6 +36,7 @@ class Adapter:
         operate: Callable[[Any], None] | None,
         key: bytes | None = None,
         insecure: bool = False,
+        log: Path | None = None,
     ):
         """An adapter that nobody has connected to.
 
@@ -43,6 +45,7 @@ class Adapter:
             operate: hands an OperatorCommand to the autopilot; None for a recorded flight.
             key: signs what is sent, and refuses what is not signed with it.
             insecure: commands are taken from other machines without a key.
+            log: of the run, which endpoints may download.
         """
         self.vehicle = VehicleView(description)
         self.clock = Clock()
@@ -55,7 +58,7 @@ class Adapter:
         self.parameters = ParameterStore(description, flavour, self.commands, self.broadcast, self.counts)
         self.sessions: dict[Endpoint, Session] = {}
         self.signature = Signature(key) if key else None
-        self._insecure = insecure
+        self._insecure, self._log = insecure, log
         self._announcements = Announcements(self.vehicle, self.broadcast)
         self._next_link = 0
 
@@ -71,6 +74,7 @@ class Adapter:
             self.parameters,
             self.missions,
             self.counts,
+            self._log,
             self.trusts,
         )
         return endpoint
@@ -79,6 +83,7 @@ class Adapter:
         """An endpoint is gone."""
         del self.sessions[endpoint]
         self.parameters.forget(endpoint)
+        self.missions.forget(endpoint)
 
     def trusts(self, endpoint: Endpoint) -> bool:
         """Whether its commands are taken: signed ones always, unsigned ones from this machine."""
@@ -153,6 +158,8 @@ class Adapter:
         built: dict[int, Any] = {}
         for endpoint, session in self.sessions.items():
             session.schedule.send_due(endpoint.send, built)
+            for message in session.log.step():
+                endpoint.send(message)
         self.commands.step()
         self.missions.step()
         self.parameters.step()

@@ -5,9 +5,9 @@ from typing import Any
 
 from services.mavlink.dialect import id_of, mavlink
 from services.mavlink.telemetry import streams
+from services.mavlink.text import statustext
 from services.mavlink.view import VehicleView
 
-TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
 NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 
 
@@ -33,25 +33,28 @@ class Announcements:
         if (home := self._vehicle.home_world) != self._home:
             self._home = home
             self._send("HOME_POSITION")
+        if s.mission_reached != self._reached:
+            self._announce_reached(s.mission_reached, s.mission_count)
+
         if (item := (s.mission_current, s.mission_state)) != self._item:
             self._item = item
             self._send("MISSION_CURRENT")
-        if s.mission_reached != self._reached:
-            self._reached = s.mission_reached
-            if s.mission_count and s.mission_reached != NO_ITEM:
-                self._broadcast(mavlink.MAVLink_mission_item_reached_message(s.mission_reached))
+
+    def _announce_reached(self, reached: int, count: int) -> None:
+        """Each item by itself, also where several were reached since the last status."""
+        first = self._item[0] if self._reached == NO_ITEM else self._reached + 1
+        self._reached = reached
+        if count and reached != NO_ITEM:
+            for number in range(min(first, reached), reached + 1):
+                self._broadcast(mavlink.MAVLink_mission_item_reached_message(number))
 
     def say(self, text: str) -> None:
         """A text for the operators, in pieces where it is long."""
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
-        data = text.encode()
-        number = 0
-        if len(data) > TEXT_LENGTH:
-            self._texts = number = self._texts % 0xFFFF + 1
-        for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):
-            chunk = data[start : start + TEXT_LENGTH]
-            self._broadcast(mavlink.MAVLink_statustext_message(severity, chunk, number, piece))
+        self._texts = self._texts % 0xFFFF + 1
+        for message in statustext(severity, text, self._texts):
+            self._broadcast(message)
 
     def _send(self, name: str) -> None:
         number = id_of(name)

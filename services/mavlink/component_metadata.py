@@ -12,7 +12,12 @@ from services.mavlink.px4_facts import Fact
 from services.mavlink.vehicle import VehicleDescription
 
 GENERAL, PARAMETERS = "etc/extras/component_general.json", "etc/extras/parameters.json"
-PARAMETER_TYPE = 1  # COMP_METADATA_TYPE_PARAMETER
+EVENTS = "etc/extras/all_events.json"
+PARAMETER_TYPE, EVENTS_TYPE = 1, 4  # COMP_METADATA_TYPE
+_NO_EVENTS = {
+    "version": 2,
+    "components": {"1": {"namespace": "lapwing", "event_groups": {}}},
+}  # texts tell what happens
 
 
 def uri(path: str) -> str:
@@ -28,9 +33,13 @@ def files(description: VehicleDescription) -> Mapping[str, bytes]:
     for fact in flavours.get(description.flavour).facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})
-    types = [{"type": PARAMETER_TYPE, "uri": uri(PARAMETERS), "fileCrc": crc32(parameters)}]
+    events = _json(_NO_EVENTS)
+    types = [
+        {"type": PARAMETER_TYPE, "uri": uri(PARAMETERS), "fileCrc": crc32(parameters)},
+        {"type": EVENTS_TYPE, "uri": uri(EVENTS), "fileCrc": crc32(events)},
+    ]
     general = {"version": 1, "vendorName": "Lapwing", "modelName": description.name, "metadataTypes": types}
-    return {GENERAL: _json(general), PARAMETERS: parameters}
+    return {GENERAL: _json(general), PARAMETERS: parameters, EVENTS: events}
 
 
 def _json(value: Any) -> bytes:

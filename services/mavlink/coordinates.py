@@ -18,6 +18,7 @@ class Datum(NamedTuple):
 
     home: Home = Home()  # origin of the world frame
     home_z: float = 0.0  # [m] world z from which relative altitudes count
+    standing_height: float = 0.0  # [m] of the body frame's origin above the ground
 
 
 def degrees(coordinate: int) -> float:

@@ -43,7 +43,7 @@ class Hub:
             operate(OperatorInput(commands=(command,)).encode())
 
         operator = put if operate else None
-        self.adapter = Adapter(description, operator, options.key, options.insecure)
+        self.adapter = Adapter(description, operator, options.key, options.insecure, options.log)
         self._pacing = Pacing(options.speed)
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
         self._selector = selectors.DefaultSelector()

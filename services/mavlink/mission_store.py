@@ -10,9 +10,11 @@ from services.mavlink.coordinates import Datum
 from services.mavlink.dialect import mavlink
 from services.mavlink.endpoint import Endpoint
 from services.mavlink.mission_export import to_mavlink
-from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink
+from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
+from services.mavlink.mission_upload import Repeat, Upload
+from services.mavlink.text import statustext
 
-RETRY, RETRIES = 0.25, 8  # [s] before an item is asked for again, and how often that is done
+MAX_WARNINGS = 10  # texts about items that are skipped
 KINDS = {  # what the autopilot is asked to take
     mavlink.MAV_MISSION_TYPE_MISSION: "mission_upload",
     mavlink.MAV_MISSION_TYPE_FENCE: "fence_upload",
@@ -26,16 +28,6 @@ _RESULTS = {
     mavlink.MAV_RESULT_DENIED: mavlink.MAV_MISSION_DENIED,
     mavlink.MAV_RESULT_UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
 }
-
-
-class _Upload:
-    """Items that an endpoint is about to hand over, one after the other."""
-
-    def __init__(self, endpoint: Endpoint, kind: int, count: int, clock: Clock):
-        self.endpoint, self.kind, self.count = endpoint, kind, count
-        self.items: list[Any] = []
-        self.asked, self.tries = clock.now, 0
-        self.complete = False
 
 
 class MissionStore:
@@ -61,13 +53,15 @@ class MissionStore:
         self._clock, self._commands, self._datum = clock, commands, datum
         self._home_first, self._counts = home_first, counts
         self.held: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as they came
-        self._uploads: dict[int, _Upload] = {}
+        self._uploads: dict[int, Upload] = {}
         self._finished: dict[int, tuple[Endpoint, int]] = {}  # whose the last upload was, and how it ended
+        self._repeats: dict[int, Repeat] = {}  # of last acknowledgements, which may get lost
         self._observed: deque[Any] = deque(maxlen=_RECENT)  # uploads that did not come through us
         self._accepted: deque[tuple[str, int]] = deque(maxlen=_RECENT)  # source and number of commands
 
     def begin(self, endpoint: Endpoint, kind: int, count: int) -> None:
         """An endpoint has that many items to hand over."""
+        self._repeats.pop(kind, None)
         upload = self._uploads.get(kind)
         if upload and upload.endpoint is not endpoint:
             self._counts["upload while another endpoint uploads"] += 1
@@ -80,7 +74,7 @@ class MissionStore:
             self._counts["too many items"] += 1
             self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_NO_SPACE)
         else:
-            upload = self._uploads[kind] = _Upload(endpoint, kind, count, self._clock)
+            upload = self._uploads[kind] = Upload(endpoint, kind, count, self._clock)
             self._go_on(upload)
 
     def take(self, endpoint: Endpoint, m: Any) -> None:
@@ -97,9 +91,14 @@ class MissionStore:
             self._counts["item out of order"] += 1
             self._ask(upload)
         else:
-            upload.items.append(m)
-            upload.tries = 0
+            upload.take(m)
             self._go_on(upload)
+
+    def forget(self, endpoint: Endpoint, kind: int | None = None) -> None:
+        """An endpoint goes on with something else, or is gone: it needs no last acknowledgement any more."""
+        for other, repeat in list(self._repeats.items()):
+            if repeat.endpoint is endpoint and kind in (None, other):
+                del self._repeats[other]
 
     def cancel(self, endpoint: Endpoint, kind: int) -> None:
         """An endpoint gives up its upload."""
@@ -112,7 +111,7 @@ class MissionStore:
         if kind == mavlink.MAV_MISSION_TYPE_ALL:
             for other in KINDS:
                 if other not in self._uploads:
-                    self._hand_over(_Upload(endpoint, other, 0, self._clock), told=kind)
+                    self._hand_over(Upload(endpoint, other, 0, self._clock), told=kind)
         else:
             self.begin(endpoint, kind, 0)
 
@@ -131,29 +130,31 @@ class MissionStore:
             self.held[kind] = to_mavlink(command.items, kind, self._datum())
 
     def step(self) -> None:
-        """Ask again for what does not come; give up at last."""
-        for upload in list(self._uploads.values()):
-            if upload.complete or self._clock.since(upload.asked) < RETRY:
-                continue
-            upload.tries += 1
-            if upload.tries > RETRIES:
+        """Ask again for what does not come, and give up at last; repeat last acknowledgements."""
+        for kind, repeat in list(self._repeats.items()):
+            if repeat.due():
+                self._acknowledge(repeat.endpoint, kind, repeat.result)
+            if repeat.over:
+                del self._repeats[kind]
+        for upload in [u for u in self._uploads.values() if u.overdue]:
+            if upload.given_up:
                 self._counts["upload that stopped"] += 1
                 self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
             else:
+                upload.ask_again()
                 self._ask(upload)
 
-    def _go_on(self, upload: _Upload) -> None:
+    def _go_on(self, upload: Upload) -> None:
         if len(upload.items) < upload.count:
             self._ask(upload)
             return
         self._hand_over(upload)
 
-    def _ask(self, upload: _Upload) -> None:
-        upload.asked = self._clock.now
+    def _ask(self, upload: Upload) -> None:
         to = upload.endpoint.system, upload.endpoint.component
-        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, len(upload.items), upload.kind))
+        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, upload.ask(), upload.kind))
 
-    def _hand_over(self, upload: _Upload, told: int | None = None) -> None:
+    def _hand_over(self, upload: Upload, told: int | None = None) -> None:
         """All items are there: the autopilot takes them, or they are refused."""
         try:
             items = from_mavlink(upload.items, self._home_first, self._datum())
@@ -168,13 +169,18 @@ class MissionStore:
                 return
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self.held[upload.kind] = upload.items
+                for text in skipped(upload.items)[:MAX_WARNINGS]:
+                    for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
+                        upload.endpoint.send(message)
             self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), told)
 
         self._commands.put(KINDS[upload.kind], upload.endpoint.name, acknowledged, items=items)
 
-    def _end(self, upload: _Upload, result: int, told: int | None = None) -> None:
+    def _end(self, upload: Upload, result: int, told: int | None = None) -> None:
         self._uploads.pop(upload.kind, None)
         self._finished[upload.kind] = upload.endpoint, result
+        if upload.count:
+            self._repeats[upload.kind] = Repeat(upload, result, self._clock)
         if told is None or upload.kind == max(KINDS):  # of a clearing of everything once, at its end
             self._acknowledge(upload.endpoint, upload.kind if told is None else told, result)
 

@@ -1,5 +1,6 @@
 """How a run is linked to the outside."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 
@@ -9,4 +10,5 @@ class Options(NamedTuple):
     urls: tuple[str, ...]
     key: bytes | None = None  # signs what is sent, and refuses what is not signed with it
     insecure: bool = False  # commands are taken from other machines without a key
+    log: Path | None = None  # that endpoints may download
     speed: float | None = 1.0  # simulated seconds per second; None: as fast as it goes

@@ -69,8 +69,6 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
-        Fact("RTL_LAND_DELAY", lambda _: 0.0, False, "s"),  # it lands at once
-        Fact("RTL_DESCEND_ALT", lambda v: v.get("RTL_RETURN_ALT", 0.0), False, "m"),  # without a stop on the way down
         Fact("COM_LOW_BAT_ACT", _low_battery),
         Fact("GF_ACTION", lambda v: _GEOFENCE[int(v.get("FS_FENCE_ACT", NOTHING))]),
         Fact("NAV_RCL_ACT", lambda v: _LINK_LOSS[int(v.get("NAV_DLL_ACT", NOTHING))]),  # sticks come over the data link

@@ -2,6 +2,7 @@
 
 from cosim.scene import Scene
 from dynamics.effects import battery
+from dynamics.effects.payload import Payload
 from services.common.exchange import Exchange
 from services.common.parameters import table
 from services.common.vehicle import Vehicle, active, airframe, start_height
@@ -27,6 +28,7 @@ def describe(scene: Scene) -> VehicleDescription:
         battery=_battery(scene),
         sensors=sensors,
         parameters=tuple(table(scene).values()),
+        gripper=any(isinstance(effect, Payload) for effect in active(scene)),
         accepts_commands=scene.lookup("autopilot.operator"),
         tick_ns=scene[Exchange].interval_ns,
     )

@@ -4,6 +4,7 @@ It takes no part in the lock step: nobody waits for it, and when it dies the fli
 to what it shows at once; all else it reads from the services' batches, which wakes nobody up for a message.
 """
 
+from pathlib import Path
 from typing import Any
 
 from cosim.bundle import unpack_batch
@@ -29,7 +30,7 @@ def run(process: Process, given: Any) -> None:
     if description is None:
         raise ValueError("--mavlink: nobody steers in this scene; expected one with [autopilot]")
     key = read_key(given.mavlink_key) if given.mavlink_key else None
-    options = Options(given.mavlink, key, given.insecure, process.speed)
+    options = Options(given.mavlink, key, given.insecure, Path(given.log) if given.log else None, process.speed)
     # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
     at_once = AT_ONCE if process.speed else ()
     topics = {process.key(topic): topic for topic in at_once}

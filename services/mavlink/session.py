@@ -2,17 +2,23 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-from services.mavlink.clock import Clock
+from services.mavlink.clock import Clock, Instant
 from services.mavlink.command_queue import CommandQueue, OnAcknowledgement
 from services.mavlink.component_metadata import files
+from services.mavlink.dialect import mavlink
 from services.mavlink.endpoint import Endpoint
 from services.mavlink.file_server import FileServer
+from services.mavlink.log_server import LogServer
 from services.mavlink.mission_store import MissionStore
 from services.mavlink.parameter_store import ParameterStore
 from services.mavlink.schedule import Schedule
+from services.mavlink.text import statustext
 from services.mavlink.view import VehicleView
+
+SAY_EVERY, MAX_SAID = 5.0, 64  # [s] between two times of the same text; texts that are remembered
 
 
 class Session:
@@ -27,6 +33,7 @@ class Session:
         parameters: ParameterStore,
         missions: MissionStore,
         counts: Counter[str],
+        log: Path | None,
         trusts: Callable[[Endpoint], bool],
     ):
         """A conversation that begins.
@@ -39,13 +46,16 @@ class Session:
             parameters: of the autopilot.
             missions: that the vehicle holds.
             counts: what was refused, by reason.
+            log: of the run, None where there is none.
             trusts: whether commands of an endpoint are taken.
         """
         self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
         self.parameters, self.missions = parameters, missions
         self.schedule = Schedule(vehicle)
+        self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
         self._commands, self._counts, self._trusts = commands, counts, trusts
+        self._said: dict[str, Instant] = {}
 
     @property
     def address(self) -> tuple[int, int]:
@@ -66,6 +76,16 @@ class Session:
     ) -> None:
         """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` gets every acknowledgement."""
         self._commands.put(kind, self.endpoint.name, on_acknowledgement, values)
+
+    def say(self, text: str) -> None:
+        """Tell the endpoint alone why something is refused; the same text at most every few seconds."""
+        before = self._said.get(text)
+        if before is None or self.clock.since(before) > SAY_EVERY:
+            if len(self._said) >= MAX_SAID:
+                self._said.clear()
+            self._said[text] = self.clock.now
+            for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
+                self.endpoint.send(message)
 
     def count(self, reason: str) -> None:
         """Count a message that was refused."""

@@ -29,5 +29,6 @@ class VehicleDescription(NamedTuple):
     battery: Battery | None = None  # None where none is modelled: the motors get what they ask for
     sensors: tuple[str, ...] = ()  # fitted; none: the vehicle flies on its true state
     parameters: tuple[Parameter, ...] = ()  # the autopilot's, with the values that it starts with
+    gripper: bool = False  # a payload that can be let go
     accepts_commands: bool = False  # an operator is listened to
     tick_ns: int = 4_000_000  # length of a tick of the lock step [ns]

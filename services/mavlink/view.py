@@ -117,7 +117,7 @@ class VehicleView:
     @property
     def datum(self) -> Datum:
         """What latitudes, longitudes and altitudes of messages count from."""
-        return Datum(self.description.home, self.home_world[2])
+        return Datum(self.description.home, self.home_world[2], self.description.standing_height)
 
     @property
     def boot_ms(self) -> int:

@@ -23,7 +23,7 @@ FAULTS = [
 ]
 BATTERY = ["effects.battery.charge=0.16", "effects.motor_electrics={}"]
 EVENT = 'multibody.event=[{time=0.3, propeller=2, becomes="locked"}, {time=0.31, propeller=4, becomes="torn_off"}]'
-SCRIPT = {0.04: [command("takeoff", 3.0), command("arm")], 0.6: [command("parameter", 5.0, text="MPC_Z_P")]}
+SCRIPT = {0.04: [command("takeoff", 3.0), command("arm")], 0.6: [command("parameter", 5.0, text="PID_Z_P")]}
 
 CASES = {
     "sensors": ("hover", SENSORS, 1.2, None),

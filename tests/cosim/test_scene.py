@@ -1,5 +1,6 @@
 """Scenes: what they hold, what `--set` changes, and that a fault is named with file, line, key and choices."""
 
+import math
 import pickle
 import shutil
 from pathlib import Path
@@ -169,7 +170,7 @@ def test_nothing_is_read_after_loading(write, tmp_path, monkeypatch):
     for one in (scene, again):
         assert airframe(one).mass.total == 9.5
         assert (gravity(one), start_height(one)) == (9.80665, 0.35)
-        assert table(one)["MPC_TILT_MAX"].default == one[GainSet].tilt_limit
+        assert table(one)["MPC_TILTMAX_AIR"].default == math.degrees(one[GainSet].tilt_limit)
 
 
 def test_a_scene_that_leaves_its_step_open_is_still_open_when_it_is_resolved():

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from cosim.setup import Setup
 from services.common import plan
+from services.common.sections import start_height
 from services.table import load, resolve
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -19,8 +20,9 @@ class Case(NamedTuple):
 
     def resolve(self) -> Setup:
         """The set-up of the flight."""
-        commands = tuple(plan.read(self.plan)) if self.plan else ()
-        return resolve(load(self.scene, list(self.overrides)), commands)
+        scene = load(self.scene, list(self.overrides))
+        commands = tuple(plan.read(self.plan, start_height(scene))) if self.plan else ()
+        return resolve(scene, commands)
 
 
 OVERRIDES = {"groundstation": ("run.duration=5.0",)}  # of scenes that fly until they are stopped

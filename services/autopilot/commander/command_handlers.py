@@ -6,10 +6,8 @@ from typing import Any
 
 from messages import CommandAck
 from services.autopilot.commander import checks, transitions
-from services.autopilot.commander.fence import Fence, rally_points
 from services.autopilot.commander.flight_mode import value
 from services.autopilot.commander.mode_table import MODES
-from services.autopilot.commander.route import Route
 from services.autopilot.commander.state import PendingArm
 from services.autopilot.commander.transitions import Context
 
@@ -97,6 +95,19 @@ def change_mode(context: Context, command: Any) -> None:
     state.failsafe = ""
 
 
+@handles("mission_start")
+def mission_start(context: Context, command: Any) -> None:
+    """Arm and fly the mission from an item, as PX4 does at MAV_CMD_MISSION_START."""
+    before = context.state.mode, context.state.mode_name
+    transitions.enter(context.constants, context.state, "mission", *command.values[:1])
+    if not context.state.guidance.armed and (reasons := checks.reasons(context.view, context.state)):
+        context.state.mode, context.state.mode_name = before
+        raise ValueError(f"arming refused: {'; '.join(reasons)}")
+    if not context.state.guidance.armed:
+        transitions.arm(context)
+    context.state.failsafe = ""
+
+
 @handles("manual")
 def manual(context: Context, command: Any) -> None:
     """Sticks, which the modes position_control and altitude_control listen to."""
@@ -121,49 +132,11 @@ def link(context: Context, command: Any) -> None:
     inputs.linked, inputs.link_age = True, 0.0
 
 
-@handles("mission_upload")
-def mission_upload(context: Context, command: Any) -> None:
-    """A new mission, in place of the one there is."""
-    state = context.state
-    state.guidance.route = _denied_if_wrong(Route, command.items)
-    if state.mode_name == "mission" and not state.on_trajectory:
-        flies_on = state.guidance.route.items and state.guidance.flying
-        transitions.enter(context.constants, state, "mission" if flies_on else "hold")
-
-
-@handles("mission_clear")
-def mission_clear(context: Context, command: Any) -> None:
-    """No mission any more."""
-    state = context.state
-    state.guidance.route = Route()
-    if state.mode_name == "mission" and not state.on_trajectory:
-        transitions.enter(context.constants, state, "hold")
-
-
-@handles("mission_current")
-def mission_current(context: Context, command: Any) -> None:
-    """Go on with another item."""
-    number = value(command.values, 0)
-    _denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
-
-
-@handles("fence_upload")
-def fence_upload(context: Context, command: Any) -> None:
-    """A new fence; without items, none."""
-    context.state.guidance.fence = _denied_if_wrong(Fence, command.items)
-
-
-@handles("rally_upload")
-def rally_upload(context: Context, command: Any) -> None:
-    """New places to return to; without items, home."""
-    context.state.guidance.rally_points = _denied_if_wrong(rally_points, command.items)
-
-
 @handles("speed")
 def speed(context: Context, command: Any) -> None:
-    """Fly at another speed [m/s] until disarmed."""
+    """Fly at another speed [m/s] until disarmed; NaN: at the parameter's."""
     asked = value(command.values, 0)
-    if not 0.0 < asked < math.inf:
+    if not (0.0 < asked < math.inf or math.isnan(asked)):
         raise Denied(f"speed: expected one above 0 m/s, got {asked:g}")
     context.state.guidance.speed = asked
 
@@ -175,7 +148,7 @@ def parameter(context: Context, command: Any) -> None:
     if known is None:
         raise Denied(f"unknown parameter {command.text}")
     asked = value(command.values, 0)
-    _denied_if_wrong(known.check, asked)
+    denied_if_wrong(known.check, asked)
     parameters = context.state.guidance.parameters
     parameters[known.name] = asked
     context.outbox.parameters = dict(parameters)
@@ -187,7 +160,7 @@ def finish(context: Context, command: Any) -> None:
     context.state.finish_requested = True
 
 
-def _denied_if_wrong(function: Callable, argument: Any) -> Any:
+def denied_if_wrong(function: Callable, argument: Any) -> Any:
     """The function's value; what it refuses is refused for good."""
     try:
         return function(argument)

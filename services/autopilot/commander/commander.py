@@ -7,7 +7,12 @@ import math
 
 from dynamics.vector import ZERO
 from messages import CommandAck
-from services.autopilot.commander import checks, failsafes
+from services.autopilot.commander import (  # noqa: F401 (two declare their handlers)
+    checks,
+    failsafes,
+    failure_handlers,
+    plan_handlers,
+)
 from services.autopilot.commander.attention import battery_thresholds, needs_attention
 from services.autopilot.commander.command_handlers import handle
 from services.autopilot.commander.request import Outbox, Request, Status
@@ -54,6 +59,7 @@ class Commander:
         return Request(
             setpoint=setpoint,
             parameters=context.outbox.parameters,
+            faults=context.outbox.faults,
             acknowledgements=tuple(context.outbox.acknowledgements),
             texts=tuple(context.outbox.texts),
             reset_controller=not state.on_trajectory and not state.guidance.flying,
@@ -117,7 +123,9 @@ def _detect_landing(context: Context) -> None:
 def _disarm_when_idle(context: Context) -> None:
     """Disarm what has been armed on the ground for long."""
     view, state, guidance = context.view, context.state, context.state.guidance
-    state.on_ground_time = state.on_ground_time + view.dt if guidance.armed and not guidance.flying else 0.0
+    amid_mission = guidance.has_flown and state.mode_name == "mission" and guidance.route.item is not None
+    waits = guidance.armed and not guidance.flying and not amid_mission  # PX4's too: the next item may take off
+    state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
         disarm(context, "landed" if guidance.has_flown else "nobody took off")

@@ -22,7 +22,7 @@ class Fence:
     def __init__(self, items: Sequence[Any] = ()):
         """From items: a circle each, a polygon as many vertices as its first says; ValueError if they make no fence."""
         self.count = len(items)
-        self._shapes: list[tuple[bool, Any]] = []  # whether to stay in, (x, y, radius) or corners
+        self.shapes: list[tuple[bool, Any]] = []  # whether to stay in, (x, y, radius) or corners
         left = list(items)
         while left:
             first = left[0]
@@ -42,12 +42,12 @@ class Fence:
                 )
             if not all(map(math.isfinite, [p for i in left[:count] for p in (i.position.x, i.position.y)])):
                 raise ValueError("fence: a place is not finite")
-            self._shapes.append((first.action in ("fence_inclusion", "fence_circle_in"), shape))
+            self.shapes.append((first.action in ("fence_inclusion", "fence_circle_in"), shape))
             del left[:count]
 
     def allows(self, x: float, y: float) -> bool:
         """Whether the vehicle may be at (x, y) [m] of the world."""
-        for stay_in, shape in self._shapes:
+        for stay_in, shape in self.shapes:
             if isinstance(shape, tuple):
                 within = math.hypot(x - shape[0], y - shape[1]) <= shape[2]
             else:

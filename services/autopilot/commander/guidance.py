@@ -54,7 +54,9 @@ class Guidance:
     flying: bool = False
     has_flown: bool = False  # since it was armed
     speed: float = math.nan  # asked for in this flight; NaN: the parameter's [m/s]
-    home: tuple[float, float] = (0.0, 0.0)  # world x, y where it was armed [m]
+    home: Vec3 = (0.0, 0.0, 0.0)  # world x, y and the height of the ground where it was armed, or was told to be [m]
+    roi: Vec3 | None = None  # region of interest: where the nose points on its way [m]
+    released: bool = False  # the gripper is to be open
     route: Route = field(default_factory=Route)
     fence: Fence = field(default_factory=Fence)
     rally_points: tuple[Vec3, ...] = ()
@@ -71,8 +73,27 @@ class Guidance:
             p["MPC_Z_VEL_MAX_DN"],
             p["MPC_ACC_HOR"],
             p["MPC_JERK_AUTO"],
-            p["MPC_YAW_RATE"],
+            math.radians(p["MPC_YAWRAUTO_MAX"]),
         )
+
+    @property
+    def yaw_tolerance(self) -> float:
+        """Error [rad] within which a heading that was asked for is reached."""
+        return math.radians(self.parameters["MIS_YAW_ERR"])
+
+    @property
+    def manual_limits(self) -> Limits:
+        """As `limits`, under the sticks."""
+        return self.limits._replace(yaw_rate=math.radians(self.parameters["MPC_MAN_Y_MAX"]))
+
+    @property
+    def manual_tilt(self) -> float:
+        """Tilt [rad] that a full stick asks for."""
+        return math.radians(min(self.parameters["MPC_MAN_TILT_MAX"], self.parameters["MPC_TILTMAX_AIR"]))
+
+    def above_home(self, constants: Constants, parameter: str) -> float:
+        """World z [m] of an altitude above home, which is where the vehicle stands."""
+        return self.home[2] + constants.resting_height + self.parameters[parameter]
 
     @property
     def offboard_fresh(self) -> bool:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from messages import CommandAck
 from services.autopilot.interface import Setpoint
+from services.common.failures import Faults
 
 
 class Status(NamedTuple):
@@ -22,7 +23,8 @@ class Status(NamedTuple):
     mission_state: int  # as MAVLink's MISSION_STATE numbers it
     offboard_fresh: bool  # setpoints from outside are coming
     prearm: tuple[str, ...]  # why it cannot be armed; to be left out while the motors run on the trajectory
-    home: tuple[float, float]  # world x, y [m]
+    home: tuple[float, float, float]  # world x, y, and height of the ground [m]
+    released: bool  # the gripper is to be open
     battery_warning: int  # 0 none, 1 low, 2 critical, 3 nearly empty
 
 
@@ -31,6 +33,7 @@ class Request(NamedTuple):
 
     setpoint: Setpoint | None  # to be followed; None: the scene's trajectory
     parameters: Mapping[str, float] | None  # values of all, where one has changed
+    faults: Faults | None  # that are injected, where one has changed
     acknowledgements: tuple[Any, ...]  # of commands, as `CommandAck` messages
     texts: tuple[str, ...]  # for the operator
     reset_controller: bool  # the vehicle is on the ground: the controller must be as before a flight
@@ -46,6 +49,7 @@ class Outbox:
     acknowledgements: list[Any] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     parameters: dict[str, float] | None = None
+    faults: Faults | None = None
 
     def say(self, text: str) -> None:
         """Tell the operator."""

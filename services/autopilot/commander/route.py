@@ -1,13 +1,16 @@
 """The mission's list of items, and which of them is flown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 NONE_REACHED = 65535
 NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
 
-ACTIONS = ("waypoint", "takeoff", "land", "return", "loiter_time", "delay", "jump", "speed", "yaw")
+TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions that lead somewhere
+INSTANT = ("speed", "roi", "set_home", "gripper")  # those that take no time
+GRAB = 1.0  # value of the action gripper; 0: release
+ACTIONS = (*TO_PLACES, *INSTANT, "takeoff", "land", "return", "delay", "condition", "jump", "yaw")
 _PLACED = ("waypoint",)
 MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]
 
@@ -25,8 +28,8 @@ def check_items(items: Sequence[Any]) -> None:
             raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
         if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
             raise ValueError(f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and how often")
-        if item.action == "speed" and not (item.values and item.values[0] > 0.0):
-            raise ValueError(f"item {number}: expected a speed above 0 m/s")
+        if item.action == "speed" and not (item.values and (item.values[0] > 0.0 or math.isnan(item.values[0]))):
+            raise ValueError(f"item {number}: expected a speed above 0 m/s, or none for the usual one")
 
 
 class Route:
@@ -43,6 +46,11 @@ class Route:
     def item(self) -> Any:
         """The item that is flown, None after the last."""
         return self.items[self.current] if self.current < len(self.items) else None
+
+    @property
+    def on_last(self) -> bool:
+        """Whether the last item is flown."""
+        return self.current == len(self.items) - 1
 
     def select(self, number: int) -> None:
         """Go on with another item; ValueError if there is none of this number."""
@@ -65,6 +73,21 @@ class Route:
                 self.current = int(item.values[0])
             else:
                 self.current += 1
+
+    def following(self) -> Iterator[Any]:
+        """The items after the current one in the order in which they will be flown, without the jumps."""
+        number, jumped = self.current + 1, dict(self._jumped)
+        while number < len(self.items):
+            item = self.items[number]
+            taken = jumped.get(number, 0)
+            if item.action != "jump":
+                yield item
+                number += 1
+            elif taken < item.values[1]:
+                jumped[number] = taken + 1
+                number = int(item.values[0])
+            else:
+                number += 1
 
     def restart(self) -> None:
         """From the first item again."""

@@ -6,11 +6,12 @@ It knows nothing of the real vehicle, so the setpoint is as smooth as its limits
 import math
 from typing import NamedTuple
 
-from dynamics.vector import ZERO, Vec3, add, norm, scale, subtract
+from dynamics.vector import ZERO, Vec3, add, dot, norm, scale, subtract
 from services.autopilot.interface import Setpoint
 
 _POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre
 _VELOCITY_GAIN = 3.0  # [1/s] acceleration over error of the velocity
+_LOOK_AHEAD, _LOOK_AHEAD_TIME = 1.0, 1.0  # [m], [s] by which the point of a line that is aimed at lies ahead
 
 
 class Limits(NamedTuple):
@@ -45,6 +46,14 @@ def braking_speed(distance: float, acceleration: float) -> float:
     return _POSITION_GAIN * distance if distance < bend else math.sqrt(2.0 * brake * (distance - 0.5 * bend))
 
 
+def stopping_distance(speed: float, acceleration: float) -> float:
+    """Distance [m] from which `braking_speed` is this speed [m/s]."""
+    brake = 0.5 * acceleration
+    bend = brake / (_POSITION_GAIN * _POSITION_GAIN)
+    within = speed < _POSITION_GAIN * bend
+    return speed / _POSITION_GAIN if within else speed * speed / (2.0 * brake) + 0.5 * bend
+
+
 def wrap_angle(angle: float) -> float:
     """The same angle in [-pi, pi] [rad]."""
     return math.remainder(angle, 2.0 * math.pi)
@@ -74,6 +83,19 @@ class PositionSmoothing:
         if distance == 0.0:
             return ZERO
         return limit_velocity(scale(braking_speed(distance, limits.acceleration) / distance, way), limits)
+
+    def velocity_along(self, start_world: Vec3, target_world: Vec3, passing_speed: float, limits: Limits) -> Vec3:
+        """The velocity [m/s] of the way along a line to a position [m], which is passed at a speed [m/s]."""
+        way = subtract(target_world, self.position)
+        distance, track = norm(way), subtract(target_world, start_world)
+        if distance == 0.0:
+            return ZERO
+        aim, length = way, norm(track)
+        if length > 0.0 and (along := dot(way, track) / length) > 0.0:
+            ahead = min(along, max(_LOOK_AHEAD, norm(self.velocity) * _LOOK_AHEAD_TIME))
+            aim = subtract(way, scale((along - ahead) / length, track))
+        speed = braking_speed(distance + stopping_distance(passing_speed, limits.acceleration), limits.acceleration)
+        return limit_velocity(scale(speed / norm(aim), aim), limits)
 
     def move_at(self, velocity_world: Vec3, limits: Limits, dt: float) -> None:
         """Move it at a velocity [m/s] for a tick of dt [s]."""

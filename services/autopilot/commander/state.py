@@ -9,6 +9,7 @@ from services.autopilot.commander.modes import hold
 from services.autopilot.commander.smoothing import PositionSmoothing
 from services.autopilot.commander.view import Constants
 from services.autopilot.estimator import SOURCES
+from services.common.failures import Faults
 
 TRAJECTORY_MODE = "mission"  # how the flight along the scene's own trajectory is called
 
@@ -37,6 +38,7 @@ class State:
     failsafe: str = ""  # reason of the failsafe in force
     failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # by reason, of the conditions that hold
     source_outage: list[float] = field(default_factory=lambda: [0.0] * len(SOURCES))  # lost or refused for so long [s]
+    faults: Faults = field(default_factory=Faults)  # that are injected
     pending_arm: PendingArm | None = None
     on_ground_time: float = 0.0  # armed, but not flying [s]
     blocked_time: float = 0.0  # asked to sink without sinking [s]

@@ -19,13 +19,14 @@ def status(constants: Constants, view: View, state: State) -> Status:
         armed=armed,
         finished=not state.on_trajectory and guidance.has_flown and not armed and last_flight,
         failsafe=state.failsafe,
-        mission_current=route.current,
+        mission_current=min(route.current, max(0, len(route.items) - 1)),
         mission_count=len(route.items),
         mission_reached=route.reached,
         mission_state=mission_state(state),
         offboard_fresh=guidance.offboard_fresh,
         prearm=tuple(checks.reasons(view, state)) if constants.has_operator and not armed else (),
         home=guidance.home,
+        released=guidance.released,
         battery_warning=sum(view.battery_charge < limit for limit in battery_thresholds(guidance.parameters)),
     )
 

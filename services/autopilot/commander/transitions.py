@@ -27,15 +27,18 @@ def enter(constants: Constants, state: State, name: str, *values: float) -> None
     kind = MODES[name]
     if kind.needs_flight and not state.guidance.flying:
         raise ValueError(f"{name}: the vehicle does not fly")
-    state.mode, state.mode_name = kind(constants, state.guidance, *values), name
+    mode = kind(constants, state.guidance, *values)
+    if state.mode_name == "mission" != name:
+        state.guidance.speed = math.nan  # what a mission has asked for ends with it
+    state.mode, state.mode_name = mode, name
 
 
 def arm(context: Context) -> None:
     """Motors ready; home is here."""
     guidance = context.state.guidance
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
-    x, y, _ = context.view.estimate.position_world
-    guidance.home = (x, y)
+    x, y, z = context.view.estimate.position_world
+    guidance.home = (x, y, z - context.constants.resting_height)
     context.outbox.say("armed")
 
 
@@ -43,7 +46,7 @@ def disarm(context: Context, reason: str) -> None:
     """Motors off, wherever it is."""
     state = context.state
     state.guidance.armed = state.guidance.flying = False
-    state.failsafe, state.guidance.speed = "", math.nan
+    state.failsafe, state.guidance.speed, state.guidance.roi = "", math.nan, None
     state.failsafe_timers.clear()
     if state.mode_name != "hold":
         enter(context.constants, state, "hold")

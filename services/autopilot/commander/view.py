@@ -20,6 +20,7 @@ class Constants(NamedTuple):
     hover_thrust: float  # thrust of hovering over the maximum thrust
     has_trajectory: bool  # the run begins along the scene's own trajectory
     has_operator: bool  # somebody may give commands
+    failing: tuple[str, ...] = ()  # units whose failures may be injected
 
     @property
     def autonomous(self) -> bool:

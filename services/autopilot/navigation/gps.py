@@ -14,6 +14,7 @@ class GpsFusion(NamedTuple):
 
     filter: Estimator
     age: int  # of a reading when it arrives, in IMU readings
+    height_variance: float  # [m^2] by which its height is doubted: 0 where it is the reference
 
 
 @leaf
@@ -23,9 +24,9 @@ def step(
     """Correct by the reading of the tick."""
     r, x = inputs[0].value, s.filter
     if s.begun:
-        x = estimator.update_gps(
-            p.filter, x, r.latitude_deg, r.longitude_deg, r.height, r.position_variance, p.age, r.valid
-        )
+        east, north, up = r.position_variance
+        doubted = (east, north, up + p.height_variance)
+        x = estimator.update_gps(p.filter, x, r.latitude_deg, r.longitude_deg, r.height, doubted, p.age, r.valid)
         variance = r.velocity_variance if r.valid else -1.0
         x = estimator.update_gps_velocity(p.filter, x, r.velocity_world, variance, p.age, variance >= 0.0)
     return NavigationState(s.begun, x), (), GO_ON

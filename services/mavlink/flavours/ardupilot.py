@@ -8,11 +8,12 @@ from services.mavlink.px4_facts import Fact
 from services.mavlink.vehicle import VehicleDescription
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-HOME_FIRST = True
+HOME_FIRST = GUIDED = True
 TAKEOFF_ABOVE_SEA = False
 PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
 RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 
+_STABILIZE, _ACRO, _CIRCLE = 0, 1, 7
 _ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
 _SHOWN = {  # what a mode looks like
     "takeoff": _GUIDED,
@@ -25,8 +26,13 @@ _SHOWN = {  # what a mode looks like
     "descend": _LAND,
     "position_control": _LOITER,
     "altitude_control": _ALT_HOLD,
+    "stabilized": _STABILIZE,
+    "acro": _ACRO,
+    "orbit": _CIRCLE,
 }
 MODES = (
+    FlightMode("stabilized", "STABILIZE", _STABILIZE),
+    FlightMode("acro", "ACRO", _ACRO),
     FlightMode("altitude_control", "ALT_HOLD", _ALT_HOLD, advanced=False),
     FlightMode("mission", "AUTO", _AUTO, mavlink.MAV_STANDARD_MODE_MISSION),
     FlightMode("hold", "GUIDED", _GUIDED),

@@ -7,7 +7,7 @@ from services.mavlink.flight_mode import FlightMode
 from services.mavlink.px4_facts import px4_facts
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_PX4
-HOME_FIRST = False
+HOME_FIRST = GUIDED = False
 TAKEOFF_ABOVE_SEA = True
 PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 RATES: dict[str, float] = {}
@@ -22,6 +22,8 @@ def custom_mode(main: float, sub: float) -> int:
 MODES = (  # standard and advanced as PX4's lib/modes has them
     FlightMode("altitude_control", "Altitude", custom_mode(2, 0), mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, False),
     FlightMode("position_control", "Position", custom_mode(3, 0), mavlink.MAV_STANDARD_MODE_POSITION_HOLD, False),
+    FlightMode("stabilized", "Stabilized", custom_mode(7, 0)),
+    FlightMode("acro", "Acro", custom_mode(5, 0)),
     FlightMode("mission", "Mission", custom_mode(4, 4), mavlink.MAV_STANDARD_MODE_MISSION),
     FlightMode("hold", "Hold", custom_mode(4, 3)),
     FlightMode("return", "Return", custom_mode(4, 5), mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
@@ -29,8 +31,9 @@ MODES = (  # standard and advanced as PX4's lib/modes has them
     FlightMode("takeoff", "Takeoff", custom_mode(4, 2), mavlink.MAV_STANDARD_MODE_TAKEOFF),
     FlightMode("land", "Land", custom_mode(4, 6), mavlink.MAV_STANDARD_MODE_LAND),
 )
-_NUMBERS = {mode.kind: mode.number for mode in MODES}
-_KINDS = {mode.number: mode.kind for mode in MODES}
+ORBIT = custom_mode(3, 1)  # that is entered by DO_ORBIT alone
+_NUMBERS = {mode.kind: mode.number for mode in MODES} | {"orbit": ORBIT}
+_KINDS = {mode.number: mode.kind for mode in MODES} | {custom_mode(1, 0): "stabilized"}  # PX4's Manual of a multirotor
 _SHOWN_AS = {"goto": "hold", "descend": "land"}  # modes that PX4 has no number for
 
 

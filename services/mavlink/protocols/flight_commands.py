@@ -15,7 +15,9 @@ from services.mavlink.session import Session
 def set_mode(session: Session, m: Any) -> None:
     """The old way to change the mode, which is not acknowledged."""
     kind = session.vehicle.flavour.mode_kind(m.custom_mode)
-    if kind and session.trusted:
+    if kind is None:
+        session.say(f"no flight mode {m.custom_mode}")
+    elif session.trusted:
         session.command(kind)
 
 
@@ -24,9 +26,13 @@ def do_set_mode(session: Session, c: Command) -> Outcome:
     """A flight mode by its numbers."""
     flavour = session.vehicle.flavour
     if not int(c.params[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        session.say("flight modes only by their custom numbers")
         return UNSUPPORTED
     kind = flavour.mode_kind(flavour.custom_mode(c.params[1], c.params[2]))
-    return Request(kind) if kind else UNSUPPORTED
+    if kind is None:
+        session.say(f"no flight mode {c.params[1]:.0f}, {c.params[2]:.0f}")
+        return UNSUPPORTED
+    return Request(kind)
 
 
 @rule(mavlink.MAV_CMD_DO_SET_STANDARD_MODE)
@@ -38,6 +44,8 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
     return Request(kind) if kind else UNSUPPORTED
 
 
+SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; nothing measures the air's
+DEFAULT_ORBIT_SPEED = 1.0  # [m/s]
 FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the checks say
 
 
@@ -61,7 +69,7 @@ def takeoff(session: Session, c: Command) -> Outcome:
     return Request("takeoff", (height, math.nan))
 
 
-@rule(mavlink.MAV_CMD_NAV_LAND)
+@rule(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 def land(session: Session, c: Command) -> Outcome:
     """Down, where it is."""
     return Request("land")
@@ -90,17 +98,80 @@ def reposition(session: Session, c: Command) -> Outcome:
     """Go there; what of the place is not given stays as it is. Yaw is a heading [rad]."""
     estimate = session.vehicle.estimate
     there = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    yaw = swap_yaw(c.params[3])
     if estimate is None or all(map(math.isnan, there)):
-        return Request("hold")
+        return Request("hold", (yaw,))  # a heading alone turns it on the spot
     place = [here if math.isnan(asked) else asked for here, asked in zip(estimate.position_world, there, strict=True)]
     speed = c.params[0] if c.params[0] > 0.0 else math.nan
-    return Request("goto", (*place, swap_yaw(c.params[3]), speed))
+    return Request("goto", (*place, yaw, speed))
+
+
+@rule(mavlink.MAV_CMD_DO_ORBIT)
+def orbit(session: Session, c: Command) -> Outcome:
+    """Round a place, clockwise where the radius is above 0, as PX4 takes it."""
+    radius, speed, behaviour, turns = c.params
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    clockwise = math.copysign(1.0, radius) * math.copysign(1.0, speed) > 0.0
+    pace = DEFAULT_ORBIT_SPEED if math.isnan(speed) else abs(speed)
+    return Request("orbit", (x, y, z, abs(radius), -pace if clockwise else pace, behaviour, turns))
+
+
+@rule(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI)
+def set_roi(session: Session, c: Command) -> Outcome:
+    """Point the nose at a place."""
+    if c.number == mavlink.MAV_CMD_DO_SET_ROI and int(c.params[0]) != mavlink.MAV_ROI_LOCATION:
+        return Request("roi") if int(c.params[0]) == mavlink.MAV_ROI_NONE else UNSUPPORTED
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    return Request("roi", (x, y, z)) if math.isfinite(x) else DENIED
+
+
+@rule(mavlink.MAV_CMD_DO_SET_ROI_NONE)
+def no_roi(session: Session, c: Command) -> Outcome:
+    """Point it nowhere any more."""
+    return Request("roi")
+
+
+@rule(mavlink.MAV_CMD_DO_SET_HOME)
+def set_home(session: Session, c: Command) -> Outcome:
+    """Return to where it is, or to a place."""
+    if c.params[0] == 1.0:
+        return Request("set_home")
+    x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    if not math.isfinite(x):
+        return DENIED
+    return Request("set_home", (x, y, z - session.vehicle.description.standing_height))
+
+
+@rule(mavlink.MAV_CMD_DO_GRIPPER)
+def gripper(session: Session, c: Command) -> Outcome:
+    """Let the payload go; what is gone cannot be grabbed again."""
+    if not session.vehicle.description.gripper:
+        session.say("DO_GRIPPER: there is no payload to let go")
+        return UNSUPPORTED
+    return Request("gripper", (0.0,)) if c.params[1] == mavlink.GRIPPER_ACTION_RELEASE else UNSUPPORTED
+
+
+@rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)
+def change_altitude(session: Session, c: Command) -> Outcome:
+    """To another altitude, here; its frame is the second parameter."""
+    _, _, height = to_world(session.vehicle.datum, int(c.params[1]), math.nan, math.nan, c.params[0])
+    return Request("goto", (math.nan, math.nan, height))
+
+
+@rule(mavlink.MAV_CMD_CONDITION_YAW)
+def turn(session: Session, c: Command) -> Outcome:
+    """Turn on the spot to a heading [deg], or by an angle in a direction."""
+    heading, relative = math.radians(c.params[0]), c.params[3] == 1.0
+    if relative:
+        estimate = session.vehicle.estimate
+        heading = math.copysign(heading, c.params[2]) + (estimate.angles[2] if estimate else math.nan)
+    return Request("hold", (swap_yaw(heading),)) if math.isfinite(heading) else DENIED
 
 
 @rule(mavlink.MAV_CMD_MISSION_START)
 def mission_start(session: Session, c: Command) -> Outcome:
-    """Fly the mission from an item."""
-    return Request("mission", (c.params[0],))
+    """Arm and fly the mission from an item."""
+    return Request("mission_start", (c.params[0],))
 
 
 @rule(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
@@ -111,5 +182,10 @@ def set_mission_current(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_SPEED)
 def change_speed(session: Session, c: Command) -> Outcome:
-    """Fly at another speed; one below 0 is none."""
+    """Fly at another speed over the ground; -1 changes nothing, -2 is the parameter's again."""
+    if int(c.params[0]) not in (SPEED_AIR, SPEED_GROUND):
+        session.say("DO_CHANGE_SPEED: only the speed over the ground")
+        return UNSUPPORTED
+    if c.params[1] == DEFAULT_SPEED:
+        return Request("speed", (math.nan,))
     return Request("speed", (c.params[1],)) if c.params[1] >= 0.0 else ACCEPTED

@@ -1,4 +1,4 @@
-"""Log transfer and console, which this vehicle lacks; their clients are told so, rather than left to wait."""
+"""Log transfer: the run's own log; and the console, which this vehicle lacks, and says so."""
 
 from typing import Any
 
@@ -8,20 +8,27 @@ from services.mavlink.session import Session
 
 
 @handles("LOG_REQUEST_LIST")
-def list_no_logs(session: Session, m: Any) -> None:
-    """There are none to fetch: the log of a run is the MCAP file."""
-    session.send(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+def list_logs(session: Session, m: Any) -> None:
+    """The log of this run, as far as it is written; or that there is none."""
+    session.send(session.log.entries(m.start, m.end))
 
 
 @handles("LOG_REQUEST_DATA")
-def send_no_log_data(session: Session, m: Any) -> None:
-    """The end of a log that is not there."""
-    session.send(mavlink.MAVLink_log_data_message(m.id, m.ofs, 0, [0] * 90))
+def send_log_data(session: Session, m: Any) -> None:
+    """Bytes of it, from now on; reading is free to everybody, as of the other files."""
+    session.log.request(m.id, m.ofs, m.count)
 
 
-@handles("LOG_ERASE", "LOG_REQUEST_END")
-def ignore(session: Session, m: Any) -> None:
-    """Nothing to be done, as there is no log."""
+@handles("LOG_REQUEST_END")
+def stop(session: Session, m: Any) -> None:
+    """Enough of it."""
+    session.log.stop()
+
+
+@handles("LOG_ERASE")
+def refuse_to_erase(session: Session, m: Any) -> None:
+    """The log of a run stays."""
+    session.say("LOG_ERASE: the log of a run stays")
 
 
 @handles("SERIAL_CONTROL")

@@ -1,11 +1,14 @@
 """The mission protocol's messages: uploads go to the store, downloads are served item by item."""
 
+import math
 from typing import Any
 
+from services.mavlink.coordinates import degrees, to_world
 from services.mavlink.dialect import mavlink
 from services.mavlink.protocols.handler import handles
 from services.mavlink.session import Session
 
+GUIDED, GUIDED_ALTITUDE = 2, 3  # "current" of an item that is flown to at once, or whose altitude is
 EXACT = 1e7  # whole numbers of MISSION_ITEM_INT to a degree
 
 
@@ -15,20 +18,37 @@ def count(session: Session, m: Any) -> None:
     if session.trusted:
         session.missions.begin(session.endpoint, m.mission_type, m.count)
     else:
-        _refuse(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
 
 
 @handles("MISSION_ITEM_INT")
 def item_int(session: Session, m: Any) -> None:
-    """An item of an upload."""
-    session.missions.take(session.endpoint, m)
+    """An item of an upload; or, as ArduPilot's ground stations write it, a place to fly to."""
+    if m.current not in (GUIDED, GUIDED_ALTITUDE):
+        session.missions.take(session.endpoint, m)
+        return
+    try:
+        x, y, z = to_world(session.vehicle.datum, m.frame, degrees(m.x), degrees(m.y), m.z)
+    except ValueError:
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID)
+        return
+    if not session.trusted:
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
+        return
+
+    def acknowledged(a: Any) -> None:
+        taken = a.result == mavlink.MAV_RESULT_ACCEPTED
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_ACCEPTED if taken else mavlink.MAV_MISSION_DENIED)
+
+    nowhere = m.current == GUIDED_ALTITUDE
+    session.command("goto", (math.nan if nowhere else x, math.nan if nowhere else y, z), acknowledged)
 
 
 @handles("MISSION_ITEM")
 def item(session: Session, m: Any) -> None:
     """The same with coordinates as floats."""
     if not (abs(m.x) <= 180.0 and abs(m.y) <= 180.0):
-        _refuse(session, m.mission_type, mavlink.MAV_MISSION_INVALID)
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID)
         session.missions.cancel(session.endpoint, m.mission_type)
         return
     fields = m.frame, m.command, m.current, m.autocontinue, m.param1, m.param2, m.param3, m.param4
@@ -36,15 +56,16 @@ def item(session: Session, m: Any) -> None:
     exact = mavlink.MAVLink_mission_item_int_message(
         m.target_system, m.target_component, m.seq, *fields, *place, m.mission_type
     )
-    session.missions.take(session.endpoint, exact)
+    item_int(session, exact)
 
 
 @handles("MISSION_REQUEST_LIST")
 def request_list(session: Session, m: Any) -> None:
     """A download begins."""
+    session.missions.forget(session.endpoint, m.mission_type)
     held = session.missions.held.get(m.mission_type)
     if held is None:
-        _refuse(session, m.mission_type, mavlink.MAV_MISSION_UNSUPPORTED)
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_UNSUPPORTED)
     else:
         session.send(mavlink.MAVLink_mission_count_message(*session.address, len(held), m.mission_type))
 
@@ -54,7 +75,7 @@ def request_item(session: Session, m: Any) -> None:
     """One item of a download, as often as it is asked for."""
     held = session.missions.held.get(m.mission_type, [])
     if m.seq >= len(held):
-        _refuse(session, m.mission_type, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID_SEQUENCE)
         return
     i = held[m.seq]
     fields = i.command, int(session.vehicle.status.mission_current == m.seq), i.autocontinue
@@ -80,7 +101,7 @@ def clear(session: Session, m: Any) -> None:
     if session.trusted:
         session.missions.clear(session.endpoint, m.mission_type)
     else:
-        _refuse(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
 
 
 @handles("MISSION_SET_CURRENT")
@@ -90,5 +111,5 @@ def set_current(session: Session, m: Any) -> None:
         session.command("mission_current", (m.seq,))
 
 
-def _refuse(session: Session, kind: int, result: int) -> None:
+def _reply(session: Session, kind: int, result: int) -> None:
     session.send(mavlink.MAVLink_mission_ack_message(*session.address, result, kind))

@@ -1,16 +1,15 @@
-"""Setpoints of offboard flight, and sticks: streams of messages that nobody acknowledges."""
+"""Setpoints of offboard flight, and sticks: streams of messages that nobody acknowledges; what is refused is said."""
 
 import math
 from typing import Any
 
 from dynamics.vector import Vec3
-from services.mavlink.coordinates import degrees, to_world
+from services.mavlink.coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_world, to_world
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from services.mavlink.protocols.handler import handles
 from services.mavlink.session import Session
 
-NOT_GIVEN: Vec3 = (math.nan, math.nan, math.nan)
 _AHEAD = {mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD}  # positions from the vehicle, along its axes
 _FROM_HERE = _AHEAD | {mavlink.MAV_FRAME_LOCAL_OFFSET_NED}  # positions from the vehicle
 _BODY = _AHEAD | {mavlink.MAV_FRAME_BODY_NED}  # velocities along the vehicle's axes
@@ -18,7 +17,9 @@ _LOCAL = _BODY | _FROM_HERE | {mavlink.MAV_FRAME_LOCAL_NED}
 FORCE = mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET
 IGNORE_YAW = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 IGNORE_YAW_RATE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+THRUST_BODY = 1 << 5  # ATTITUDE_TARGET_TYPEMASK_THRUST_BODY_SET, which pymavlink leaves out
 CENTRE = 500.0  # of the throttle stick, which is the only one from 0 to 1000
+_GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED stands for
 
 
 def masked(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
@@ -28,17 +29,20 @@ def masked(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
 
 
 def rotated(v: Vec3, heading: float) -> Vec3:
-    """A vector of forward, right, down as north, east, down."""
+    """A vector of forward, right, down as north, east, down; of a pair of which one is given the other is 0."""
     s, c = math.sin(heading), math.cos(heading)
-    return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+    if math.isnan(v[0]) and math.isnan(v[1]):
+        return v
+    x, y = (0.0 if math.isnan(e) else e for e in v[:2])
+    return c * x - s * y, s * x + c * y, v[2]
 
 
 @handles("SET_POSITION_TARGET_LOCAL_NED")
 def local_target(session: Session, m: Any) -> None:
     """Position, velocity, acceleration from home, or from the vehicle along the world's or its own axes."""
     estimate = session.vehicle.estimate
-    if m.coordinate_frame not in _LOCAL or m.type_mask & FORCE or estimate is None:
-        session.count("senseless setpoint")
+    if m.coordinate_frame not in _LOCAL or estimate is None:
+        _refuse(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
         return
     position = masked(m.type_mask, 0, m.x, m.y, m.z)
     velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
@@ -51,17 +55,25 @@ def local_target(session: Session, m: Any) -> None:
     if m.coordinate_frame in _FROM_HERE:
         n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
-    _put(session, m, swap_world(position), velocity, acceleration)
+    turned = heading if session.vehicle.flavour.GUIDED and m.coordinate_frame in _BODY else 0.0
+    _put(session, m, swap_world(position), velocity, acceleration, turned)
 
 
 @handles("SET_POSITION_TARGET_GLOBAL_INT")
 def global_target(session: Session, m: Any) -> None:
     """The same with the position on the Earth."""
+    estimate = session.vehicle.estimate
+    if m.coordinate_frame not in ABOVE_SEA | ABOVE_HOME or estimate is None:
+        _refuse(session, f"SET_POSITION_TARGET_GLOBAL_INT: frame {m.coordinate_frame} unsupported")
+        return
     latitude, longitude, altitude = masked(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
+    if math.isnan(latitude) != math.isnan(longitude):
+        here = from_world(session.vehicle.datum, estimate.position_world)
+        latitude, longitude = (h if math.isnan(v) else v for v, h in zip((latitude, longitude), here[:2], strict=True))
     try:
         position_world = to_world(session.vehicle.datum, m.coordinate_frame, latitude, longitude, altitude)
     except ValueError:
-        session.count("senseless setpoint")
+        _refuse(session, "SET_POSITION_TARGET_GLOBAL_INT: no place on Earth")
         return
     velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
     acceleration = masked(m.type_mask, 6, m.afx, m.afy, m.afz)
@@ -72,31 +84,53 @@ def _unless(ignored: int, value: float) -> float:
     return math.nan if ignored else value
 
 
-def _put(session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
-    yaw, rate = swap_yaw(_unless(m.type_mask & IGNORE_YAW, m.yaw)), -_unless(m.type_mask & IGNORE_YAW_RATE, m.yaw_rate)
+def _put(
+    session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3, turned: float = 0.0
+) -> None:
+    """Hand a setpoint over; velocity and acceleration in NED, `turned` [rad] is what its yaw counts from."""
+    yaw = swap_yaw(turned + _unless(m.type_mask & IGNORE_YAW, m.yaw))
+    rate = -_unless(m.type_mask & IGNORE_YAW_RATE, m.yaw_rate)
     values = (*position_world, *swap_world(velocity), *swap_world(acceleration), yaw, rate)
-    _send(session, "offboard_position", values)
+    if m.type_mask & FORCE:
+        _refuse(session, f"{m.get_type()}: forces unsupported")
+    elif all(map(math.isnan, values)):
+        _refuse(session, f"{m.get_type()}: nothing to follow")
+    elif session.vehicle.flavour.GUIDED and all(map(math.isnan, values[3:9])):
+        if _guided(session, m):  # ArduPilot flies to a place that it is told once
+            _send(session, m, "goto", (*position_world, yaw))
+    else:
+        _send(session, m, "offboard_position", values)
 
 
 @handles("SET_ATTITUDE_TARGET")
 def attitude_target(session: Session, m: Any) -> None:
-    """Attitude or body rates, and collective thrust as a fraction of its maximum."""
+    """Attitude or body rates, and collective thrust as a fraction of its maximum; ArduPilot's is a climb rate."""
     ignored = m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
     norm = math.sqrt(sum(e * e for e in m.q))
     if not ignored and not 0.5 < norm < 2.0:  # NaN fails too
-        session.count("senseless setpoint")
+        _refuse(session, "SET_ATTITUDE_TARGET: no attitude")
         return
     unit = (math.nan,) * 4 if ignored else swap_attitude(tuple(e / norm for e in m.q))  # type: ignore[arg-type]
     rates = masked(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
-    thrust = _unless(m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE, m.thrust)
-    _send(session, "offboard_attitude", (*unit, *swap_body(rates), thrust))
+    if ignored and all(map(math.isnan, rates)):
+        _refuse(session, "SET_ATTITUDE_TARGET: nothing to follow")
+        return
+    thrust, climb_rate = _unless(m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE, m.thrust), 0.0
+    if m.type_mask & THRUST_BODY:
+        _refuse(session, "SET_ATTITUDE_TARGET: thrust_body unsupported")
+        return
+    if session.vehicle.flavour.GUIDED and not math.isnan(thrust):
+        climb_rate = (2.0 * thrust - 1.0) * session.parameters.value("MPC_Z_VEL_MAX_UP")
+        thrust = math.nan
+    _send(session, m, "offboard_attitude", (*unit, *swap_body(rates), thrust, climb_rate))
 
 
 @handles("MANUAL_CONTROL")
 def manual_control(session: Session, m: Any) -> None:
     """Sticks of a joystick, -1000 to 1000: forward, right, throttle from 0, turn to the right."""
     values = (_stick(m.x), -_stick(m.y), _stick(2.0 * (m.z - CENTRE)), -_stick(m.r))
-    _send(session, "manual", values)
+    if session.trusted:
+        session.command("manual", values)
 
 
 def _stick(value: float) -> float:
@@ -104,8 +138,27 @@ def _stick(value: float) -> float:
     return value * 1e-3 if abs(value) <= 1000.0 else 0.0
 
 
-def _send(session: Session, kind: str, values: tuple[float, ...]) -> None:
+def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> None:
     if any(map(math.isinf, values)):
-        session.count("senseless setpoint")
-    elif session.trusted:
-        session.command(kind, values)
+        _refuse(session, f"{m.get_type()}: not finite")
+        return
+    guided = session.vehicle.flavour.GUIDED
+    if not session.trusted or (guided and not _guided(session, m)):
+        return
+    session.command(kind, values)
+    if guided and kind != "goto" and session.vehicle.status.mode != "offboard":
+        session.command("offboard")  # ArduPilot's GUIDED follows setpoints at once
+
+
+def _guided(session: Session, m: Any) -> bool:
+    """Whether ArduPilot's GUIDED would follow a setpoint now."""
+    status = session.vehicle.status
+    if status.mode in _GUIDED and not status.landed:
+        return True
+    _refuse(session, f"{m.get_type()}: only in GUIDED, flying")
+    return False
+
+
+def _refuse(session: Session, reason: str) -> None:
+    session.count("senseless setpoint")
+    session.say(reason)

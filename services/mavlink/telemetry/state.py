@@ -11,6 +11,7 @@ from services.mavlink.telemetry.stream import stream
 from services.mavlink.view import VehicleView
 
 NONE = 0xFFFF  # no item of a mission
+MANUAL = ("position_control", "altitude_control", "stabilized", "acro")  # modes under the sticks
 CRITICAL = 2  # Status.battery_warning
 
 _CONTROL = (
@@ -37,7 +38,7 @@ def heartbeat(v: VehicleView) -> Any:
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if s.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if s.mode in ("position_control", "altitude_control"):
+    if s.mode in MANUAL:
         base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     else:
         base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED

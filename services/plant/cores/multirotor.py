@@ -10,6 +10,7 @@ from dynamics.tree import finite
 from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
 from services.common.ports import BatteryGauge, PerRotor, TrueState
 from services.plant.cores.ending import signal
+from services.plant.cores.gripper import let_go
 
 for _name in effects.names():
     effects.get(_name)  # registers its hooks: a set-up names an effect by the class of its parameters alone
@@ -43,6 +44,8 @@ def step(
     actuators, status = inputs
     command = actuators.value.motor_voltage if actuators.due else p.off
     vehicle = s.vehicle
+    if status.due and status.value.released:
+        vehicle = MultirotorState(vehicle.motion, let_go(p.vehicle.effects, vehicle.memory))
     if tick > 0:
         vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
     motion = seen(p.vehicle.layout, vehicle.motion)

@@ -2,6 +2,7 @@
 
 import math
 
+from dynamics.lie.quaternion import from_roll_pitch_yaw
 from services.autopilot.commander.commander import Commander
 from services.autopilot.commander.view import Constants, View
 from services.autopilot.estimate import EXACT
@@ -35,3 +36,48 @@ class Session:
         for _ in range(round(seconds / DT)):
             request = self.step(**told)
         return request
+
+
+class Flight(Session):
+    """A session whose vehicle is where its setpoint is, stands on the ground at first, and feels it again."""
+
+    def __init__(self, *commands, parameters=(), constants=CONSTANTS):
+        super().__init__(constants)
+        self.commander.state.guidance.parameters |= dict(parameters)
+        self.setpoint = Setpoint((0.0, 0.0, 0.35), (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
+        self.track, self.statuses = [], []
+        self.time = 0.0
+        self.told(*commands)
+
+    def told(self, *commands):
+        self._advance(commands)
+        return self
+
+    def _advance(self, commands=()):
+        x, y, z = self.setpoint.position_world
+        estimate = EXACT._replace(
+            position_world=(x, y, max(z, 0.35)),
+            velocity_world=self.setpoint.velocity_world,
+            attitude=from_roll_pitch_yaw(0.0, 0.0, self.setpoint.yaw),
+        )
+        down = self.setpoint.velocity_world[2] < 0.0 and z <= 0.36
+        request = self.step(estimate=estimate, motors_cut=down, commands=tuple(commands))
+        self.setpoint, self.status, self.time = request.setpoint, request.status, self.time + DT
+        self.track.append((self.setpoint, self.status))
+
+    def until(self, true, seconds=120.0):
+        """Fly on until something is so of the status; says whether it is."""
+        end = self.time + seconds
+        while not true(self.status) and self.time < end:
+            self._advance()
+        return true(self.status)
+
+    def on(self, seconds):
+        self.until(lambda status: False, seconds)
+        return self
+
+    def speeds(self, near, within):
+        """Horizontal speeds [m/s] near a place."""
+        return [
+            math.hypot(*s.velocity_world[:2]) for s, _ in self.track if math.dist(s.position_world[:2], near) < within
+        ]

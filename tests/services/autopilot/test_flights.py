@@ -20,8 +20,23 @@ from flights import (
     said,
 )
 
+from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
 from services.common.parameters import table
 from services.table import load
+
+
+def angles(flown, t):
+    """True roll, pitch and yaw [rad] at t [s]."""
+    q = at(flown, "truth", t, lambda m: tuple(m.pose.orientation))
+    return to_roll_pitch_yaw(Quaternion(q[3], *q[:3]))
+
+
+def roll(flown, t):
+    return angles(flown, t)[0]
+
+
+def pitch(flown, t):
+    return angles(flown, t)[1]
 
 
 def test_takeoff_goto_land_and_disarm_by_itself():
@@ -56,7 +71,7 @@ def test_a_mission_with_speed_jump_delay_and_return():
     assert flown.landed
     assert flown.times("truth")[-1] < 60.0
     assert place(flown, 60.0) == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
-    assert max(flown.column("truth", lambda m: m.pose.position.z)) == pytest.approx(4.0, abs=0.2)
+    assert max(flown.column("truth", lambda m: m.pose.position.z)) == pytest.approx(4.35, abs=0.2)
 
 
 def test_refusals_say_why():
@@ -74,7 +89,7 @@ def test_refusals_say_why():
     flown = fly(0.5, script)
     assert results(flown) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
     assert "mission: there is none; upload one first" in said(flown)
-    assert any("MPC_XY_CRUISE: expected a number from 0.1 to 15" in text for text in said(flown))
+    assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in said(flown))
 
 
 def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost():
@@ -167,14 +182,52 @@ def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
     east, north, up = (at(flown, "truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
     assert math.atan2(north, east) == pytest.approx(yaw, abs=0.1)
     assert math.hypot(east, north) == pytest.approx(9.80665 * math.tan(angle) * 2.3, rel=0.1)
-    assert up == pytest.approx(-9.80665 * (1.0 - math.cos(angle)) * 2.4, abs=0.1)  # the thrust of hovering, tilted
+    assert up == pytest.approx(0.0, abs=0.05)  # no thrust is given: the altitude is held
+
+
+def test_by_hand_from_the_ground_in_stabilized_and_acro():
+    sticks = {
+        (0.5, 3.0): [command("manual", 0.0, 0.0, 0.15, 0.0)],
+        (3.1, 4.0): [command("manual", 0.25, 0.0, 0.0, 0.0)],
+        (4.1, 5.0): [command("manual", 0.0, 0.0, 0.0, 0.5)],
+        (5.1, 5.6): [command("manual", 0.0, 0.15, 0.0, 0.0)],
+        (5.7, 8.0): [command("manual", 0.0, 0.0, 0.0, 0.0)],
+    }
+    flown = fly(9.5, {0.04: [command("stabilized", id=1), command("arm")], 5.04: [command("acro", id=2)]} | sticks)
+    assert results(flown)[1] == results(flown)[2] == ACCEPTED
+    assert height(flown, 3.0) > 1.0
+    assert math.degrees(pitch(flown, 3.9)) == pytest.approx(0.25 * 20.0, abs=1.0)  # nose down
+    assert math.degrees(pitch(flown, 4.9)) == pytest.approx(0.0, abs=1.0)
+    assert at(flown, "estimate", 5.0, lambda m: m.pose.orientation.z) == pytest.approx(math.sin(0.18), abs=0.03)
+    assert math.degrees(roll(flown, 7.0)) == pytest.approx(-0.15 * 100.0 * 0.55, abs=3.0)  # to the left, and kept
+    assert mode(flown, 9.4) == "hold"  # nobody holds the sticks
+
+
+def test_body_rates_tilt_it_on_and_a_yaw_rate_turns_it():
+    nan = float("nan")
+    rates = command("offboard_attitude", *[nan] * 4, 0.0, 0.2, 0.3, nan)
+    level = command("offboard_attitude", 1.0, 0.0, 0.0, 0.0, nan, nan, 0.3, nan)
+    flown = fly(8.6, UP | {(6, 6.9): [rates], (7.0, 8.6): [level], 6.1: [command("offboard", id=1)]})
+    assert results(flown)[1] == ACCEPTED
+    assert pitch(flown, 6.9) == pytest.approx(0.2 * 0.8, abs=0.05)
+    assert pitch(flown, 8.5) == pytest.approx(0.0, abs=0.03)
+    turned = 2.0 * math.asin(at(flown, "estimate", 8.5, lambda m: m.pose.orientation.z))
+    assert turned == pytest.approx(0.3 * 2.4, abs=0.06)
+    assert height(flown, 8.5) == pytest.approx(3.0, abs=0.3)  # no thrust is given: the altitude is held
+
+
+def test_altitude_control_takes_off_from_the_ground():
+    script = {0.04: [command("altitude_control", id=1), command("arm")], (0.5, 3.0): [command("manual", 0, 0, 0.5, 0)]}
+    flown = fly(3.0, script)
+    assert results(flown)[1] == ACCEPTED
+    assert height(flown, 3.0) > 1.5
 
 
 def test_gains_change_in_flight_and_act():
-    lift = table(load(SCENE))["MPC_Z_P"].default
+    lift = table(load(SCENE))["PID_Z_P"].default
     weak = [
-        command("parameter", 0.3 * lift, text="MPC_Z_P", id=1),
-        command("parameter", 99 * lift, text="MPC_Z_P", id=2),
+        command("parameter", 0.3 * lift, text="PID_Z_P", id=1),
+        command("parameter", 99 * lift, text="PID_Z_P", id=2),
     ]
     script = UP | {5: weak, 8: [command("goto", 0.0, 0.0, 6.0)]}
     changed, same = (fly(11, each) for each in (script, UP | {8: script[8]}))
@@ -202,3 +255,17 @@ def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
             assert 2.0 * abs(z[0] - z[1]) < 0.01  # yaw [rad]
             assert at(flown, "estimate", t, lambda m: m.health) == 0
         assert height(flown, 20.0) > 1.5
+
+
+def test_a_gripper_lets_the_payload_go():
+    items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
+             item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
+    script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
+    flown = fly(14, script, "effects.payload={}")
+    thrust = flown.column("actuators", lambda m: sum(m.thrust))
+    times, reached = flown.times("actuators"), flown.column("status", lambda m: m.mission_reached)
+    released = flown.times("status")[reached == 2][0]
+    before = thrust[(times > released - 0.5) & (times < released)].mean()
+    after = thrust[times > 13.0].mean()
+    assert (before - after) / 9.80665 == pytest.approx(2.0, abs=0.1)  # kg
+    assert height(flown, 14.0) == pytest.approx(3.0, abs=0.1)

@@ -17,10 +17,15 @@ def items(path):
 def test_the_delivery_mission_as_a_plan():
     found = items(DELIVERY)
     assert [i.action for i in found] == ["speed", "takeoff", *["waypoint"] * 4, "land"]
-    assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.35), abs=1e-3)
+    assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
     assert found[4].yaw == pytest.approx(0.0)  # heading east
     assert found[5].yaw == pytest.approx(math.pi / 2)  # heading north
     assert found[5].hold == 5.0
+
+
+def test_altitudes_above_home_count_from_where_the_vehicle_stands():
+    found = read(DELIVERY, 0.35)[0].items
+    assert [i.position.z for i in found[1:6]] == pytest.approx([10.35] * 5, abs=1e-3)
 
 
 def test_waypoints_skip_home_and_keep_jumps(tmp_path):

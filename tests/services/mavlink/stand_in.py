@@ -26,6 +26,7 @@ NONE = 65535
 PARAMETERS = (
     Parameter("MIS_TAKEOFF_ALT", "m", 2.5, 0.5, 100.0, ""),
     Parameter("MPC_XY_P", "1/s", 0.95, -100.0, 100.0, ""),
+    Parameter("SYS_FAILURE_EN", "", 1.0, 0.0, 1.0, "", True),
     Parameter("NAV_DLL_ACT", "", 2.0, 0.0, 3.0, "", True),
     *[Parameter(f"FILL_{k}", "", float(k), 0.0, 100.0, "") for k in range(40)],
 )
@@ -135,6 +136,10 @@ class StandIn:
         if not self.items or not self.armed:
             return 1
         self.mode, self.state, self.landed = "mission", 3, False
+
+    def do_mission_start(self, c):
+        self.armed = True
+        return self.do_mission(c)
 
     def do_mission_current(self, c):
         if not 0 <= c.values[0] < len(self.items):

@@ -69,7 +69,7 @@ def test_progress_is_passed_on_before_the_end():
     bench.step(2)
     ack = station.last("COMMAND_ACK")
     assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
-    number = bench.vehicle.kinds["mission"].id
+    number = bench.vehicle.kinds["mission_start"].id
     bench.vehicle.answers = [CommandAck(id=number, result=CommandAck.ACCEPTED)]
     bench.step()
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
@@ -91,7 +91,7 @@ def test_a_recorded_flight_takes_no_commands():
 
 @pytest.mark.parametrize("flavour", [px4, ardupilot])
 def test_every_mode_that_is_shown_can_be_entered(flavour):
-    for mode in ("hold", "mission", "return", "land", "position_control"):
+    for mode in ("hold", "mission", "return", "land", "position_control", "stabilized", "acro", "altitude_control"):
         assert flavour.mode_kind(flavour.mode_number(mode)) == mode
 
 
@@ -99,7 +99,137 @@ def test_px4s_numbers():
     assert px4.mode_number("offboard") == 6 << 16
     assert px4.mode_number("return") == 4 << 16 | 5 << 24
     assert px4.mode_kind(px4.custom_mode(4.0, 6.0)) == "land"
-    assert px4.mode_kind(1 << 16) is None  # manual
+    assert px4.mode_kind(1 << 16) == "stabilized"  # a multirotor's manual
+    assert px4.mode_kind(9 << 16) is None
+
+
+@pytest.mark.parametrize(("number", "params"), [(176, (1.0, 77.0, 3.0)), (176, (4.0,)), (178, (3.0, 5.0))])
+def test_what_does_not_exist_is_refused_aloud(number, params):
+    bench = Bench()
+    station = bench.station()
+    assert station.command(number, *params) == mavlink.MAV_RESULT_UNSUPPORTED
+    assert station.last("STATUSTEXT")
+    other = Bench().station()
+    other.send("set_mode", 1, 1, 77 << 16)
+    other.bench.step()
+    assert other.last("STATUSTEXT").text == f"no flight mode {77 << 16}"
+
+
+def test_a_heading_alone_is_turned_to_on_the_spot():
+    bench = Bench()
+    bench.vehicle.armed = True
+    bench.step()
+    station = bench.station()
+    station.command(192, -1.0, 1.0, 0.0, 0.5 * math.pi, NAN, NAN, NAN)
+    assert asked(bench, "hold") == pytest.approx((0.0,), abs=1e-6)  # east
+    station.command(115, 30.0, 10.0, -1.0, 1.0)
+    bench.step()
+    assert asked(bench, "hold") == pytest.approx((math.radians(30.0),), abs=1e-6)  # to the left of east
+    station.command(186, 12.0, 3.0)
+    assert asked(bench, "goto")[2] == pytest.approx(12.0 + 0.35)
+
+
+def test_home_region_of_interest_and_orbit():
+    bench = Bench()
+    bench.vehicle.do_set_home = bench.vehicle.do_roi = lambda c: 0
+    bench.vehicle.armed = True
+    bench.step()
+    station = bench.station()
+    there = 40.7686 + 10.0 / 111_049, 14.7907
+    station.command(179, 0.0, 0.0, 0.0, 0.0, *there, 290.0)
+    assert asked(bench, "set_home") == pytest.approx((0.0, 10.0, 9.65), abs=0.3)
+    station.command(179, 1.0)
+    assert asked(bench, "set_home") == ()
+    station.command(195, 0.0, 0.0, 0.0, 0.0, *there, 280.0)
+    assert asked(bench, "roi") == pytest.approx((0.0, 10.0, 0.0), abs=0.3)
+    station.command(197)
+    assert asked(bench, "roi") == ()
+    station.command(34, 12.0, 3.0, 0.0, NAN, *there, 290.0)
+    values = asked(bench, "orbit")
+    assert values[:6] == pytest.approx((0.0, 10.0, 10.0, 12.0, -3.0, 0.0), abs=0.3)  # clockwise
+    station.command(34, -12.0, NAN, NAN, NAN, NAN, NAN, NAN)
+    assert asked(bench, "orbit")[3:5] == pytest.approx((12.0, 1.0))
+
+
+def test_a_place_as_ardupilots_stations_write_it():
+    bench = Bench("mavlink.flavour=ardupilot")
+    bench.vehicle.armed = True
+    bench.step()
+    station = bench.station()
+    place = round((40.7686 + 10.0 / 111_049) * 1e7), 147907000, 20.0
+    station.send("mission_item_int", 1, 1, 0, 6, 16, 2, 0, 0.0, 0.0, 0.0, 0.0, *place, 0)
+    assert asked(bench, "goto") == pytest.approx((0.0, 10.0, 20.35), abs=0.05)
+    bench.step()
+    assert station.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+
+
+LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
+
+
+def position_target(station, name, frame, mask):
+    place = (3.0, 2.0) if name == LOCAL else (407686000, 147907000)
+    station.send(name.lower(), 0, 1, 1, frame, mask, *place, -4.0, 1.0, 0.5, -0.5, 0.1, 0.2, 0.3, 0.4, 0.1)
+
+
+@pytest.mark.parametrize("name", [LOCAL, GLOBAL])
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_every_setpoint_is_followed_or_refused_by_name(name, flavour):
+    bench = Bench(f"mavlink.flavour={flavour}")
+    bench.vehicle.armed, bench.vehicle.landed = True, False
+    bench.step()
+    station, kinds = bench.station(), bench.vehicle.kinds
+    legal = (1, 7, 8, 9, 12) if name == LOCAL else (0, 3, 5, 6)
+    for frame in (*legal, 2, 10, 11, 99):
+        for mask in [*range(0, 4096, 7), 4095 & ~512]:
+            kinds.clear()
+            station.got.clear()
+            station.bench.adapter.sessions[station.endpoint]._said.clear()
+            position_target(station, name, frame, mask)
+            bench.vehicle.mode, bench.vehicle.position = "hold", [0.0, 0.0, 3.0]
+            bench.step()
+            refused = frame not in legal or bool(mask & 512) or (mask | 512) == 4095
+            assert bool(kinds) != refused, (frame, mask)
+            assert bool(station.last("STATUSTEXT")) == refused
+            if refused:
+                assert name in "".join(m.text for m in station.all("STATUSTEXT"))
+
+
+def test_ardupilots_guided_follows_setpoints_at_once_and_a_place_for_good():
+    bench = Bench("mavlink.flavour=ardupilot")
+    bench.step()
+    station = bench.station()
+    position_target(station, LOCAL, 1, 0xDF8)
+    bench.step()
+    assert "only in GUIDED" in "".join(m.text for m in station.all("STATUSTEXT"))
+    bench.vehicle.armed, bench.vehicle.landed = True, False
+    bench.step()
+    position_target(station, LOCAL, 1, 0xDF8)
+    assert asked(bench, "goto")[:3] == pytest.approx((2.0, 3.0, 4.0))
+    bench.vehicle.mode = "hold"
+    bench.step()
+    position_target(station, LOCAL, 1, 0xDC7)
+    bench.step()
+    assert bench.vehicle.mode == "offboard"
+    station.send("set_attitude_target", 0, 1, 1, 0b111, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 1.0)
+    values = asked(bench, "offboard_attitude")
+    assert math.isnan(values[7])
+    assert math.isnan(values[8]) or values[8] > 0.0  # the thrust is a climb rate
+
+
+def test_body_rates_and_thrusts_of_either_kind():
+    bench = Bench()
+    station = bench.station()
+    level = [1.0, 0.0, 0.0, 0.0]
+    station.send("set_attitude_target", 0, 1, 1, 0b1000_0000, level, 0.1, 0.2, 0.3, 0.6)
+    values = asked(bench, "offboard_attitude")
+    assert math.isnan(values[0])
+    assert values[4:8] == pytest.approx((0.1, -0.2, -0.3, 0.6))
+    station.send("set_attitude_target", 0, 1, 1, 0b0010_0111, level, 0.0, 0.0, 0.0, 0.0)
+    station.send("set_attitude_target", 0, 1, 1, 0b1000_0111, level, 0.0, 0.0, 0.0, 0.5)
+    bench.step()
+    assert [m.text for m in station.all("STATUSTEXT")] == [
+        "SET_ATTITUDE_TARGET: thrust_body unsupported", "SET_ATTITUDE_TARGET: nothing to follow",
+    ]  # fmt: skip
 
 
 def test_velocities_along_the_vehicles_axes_are_turned():

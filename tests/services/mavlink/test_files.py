@@ -139,8 +139,9 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
 
     general = fetch(GENERAL)
     assert crc32(general) == m.file_crc
-    (entry,) = json.loads(general)["metadataTypes"]
+    entry, events = json.loads(general)["metadataTypes"]
     assert entry["uri"] == f"mftp://{PARAMETERS}"
+    assert crc32(fetch(events["uri"].removeprefix("mftp://"))) == events["fileCrc"]
     table = fetch(PARAMETERS)
     assert crc32(table) == entry["fileCrc"]
     described = {p["name"]: p for p in json.loads(table)["parameters"]}

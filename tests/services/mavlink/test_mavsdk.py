@@ -9,7 +9,8 @@ import pytest
 from stand_in import PARAMETERS, flying, free_port
 
 mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
-from mavsdk.action import ActionError  # noqa: E402
+from mavsdk.action import ActionError, OrbitYawBehavior  # noqa: E402
+from mavsdk.failure import FailureError, FailureType, FailureUnit  # noqa: E402
 from mavsdk.mission import MissionItem, MissionPlan  # noqa: E402
 from mavsdk.mission_raw import MissionItem as RawItem  # noqa: E402
 from mavsdk.mission_raw import MissionRawError  # noqa: E402
@@ -41,7 +42,7 @@ async def connected(port):
     return drone
 
 
-def session(story):
+def session(story, **options):
     """Tell a story, of a drone and the vehicle behind it, against the clock."""
     port = free_port()
 
@@ -52,7 +53,7 @@ def session(story):
         finally:
             drone._stop_mavsdk_server()
 
-    with flying(f"udpout:127.0.0.1:{port}", speed=SPEED) as running:
+    with flying(f"udpout:127.0.0.1:{port}", speed=SPEED, **options) as running:
         asyncio.run(asyncio.wait_for(tell(running), END))
     return running
 
@@ -205,3 +206,27 @@ def test_parameters_rates_and_sticks():
         assert vehicle.position[0] > 0.3
 
     session(story)
+
+
+def test_orbit_failures_and_the_log(tmp_path):
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(bytes(range(250)) * 200)
+
+    async def story(drone, vehicle):
+        vehicle.do_inject_failure = lambda c: 0
+        await drone.action.arm()
+        await drone.action.do_orbit(5.0, 2.0, OrbitYawBehavior.HOLD_FRONT_TO_CIRCLE_CENTER, 40.7687, 14.7907, 290.0)
+        assert vehicle.kinds["orbit"].values[3:5] == pytest.approx((5.0, -2.0))
+        await drone.failure.inject(FailureUnit.SYSTEM_MOTOR, FailureType.OFF, 2)
+        assert vehicle.kinds["inject_failure"].values == (7.0, 1.0, 2.0)
+        with pytest.raises(FailureError):
+            await drone.failure.inject(FailureUnit.SENSOR_AIRSPEED, FailureType.OFF, 0)
+        (entry,) = await drone.log_files.get_entries()
+        assert entry.size_bytes == path.stat().st_size
+        copy = tmp_path / "copy.mcap"
+        async for progress in drone.log_files.download_log_file(entry, str(copy)):
+            if progress.progress >= 1.0:
+                break
+        assert copy.read_bytes() == path.read_bytes()
+
+    session(story, log=path)

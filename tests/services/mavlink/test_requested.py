@@ -35,7 +35,7 @@ def test_all_modes_are_listed_and_each_can_be_chosen():
     ask(bench, station, "AVAILABLE_MODES")
     modes = station.all("AVAILABLE_MODES")
     assert [m.mode_index for m in modes] == list(range(1, modes[0].number_modes + 1))
-    assert {m.mode_name for m in modes if m.standard_mode == 0} == {"Hold", "Offboard"}
+    assert {m.mode_name for m in modes if m.standard_mode == 0} == {"Hold", "Offboard", "Stabilized", "Acro"}
     assert {m.standard_mode for m in modes} == {0, 1, 4, 5, 6, 7, 8}
     assert not any(m.properties & mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE for m in modes)
     for m in modes:

@@ -116,6 +116,38 @@ def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
     station = bench.station()
     station.send("log_request_list", 1, 1, 0, 0xFFFF)
     assert station.last("LOG_ENTRY").num_logs == 0
+    station.send("log_request_data", 1, 1, 1, 0, 90)
+    bench.step()
+    assert station.last("LOG_DATA").count == 0
+    station.send("log_erase", 1, 1)
+    assert "LOG_ERASE" in station.last("STATUSTEXT").text
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_the_runs_log_is_downloaded_while_it_grows(tmp_path, loss):
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(bytes(range(256)) * 99)
+    bench = Bench(log=path)
+    station = bench.station(loss=loss)
+    while station.last("LOG_ENTRY") is None:
+        station.send("log_request_list", 1, 1, 0, 0xFFFF)
+        bench.step()
+    entry = station.last("LOG_ENTRY")
+    assert (entry.num_logs, entry.size) == (1, 256 * 99)
+    path.write_bytes(path.read_bytes() + b"more")
+    got = bytearray(entry.size)
+    missing = set(range(0, entry.size, 90))
+    for _ in range(60):
+        station.got.clear()
+        first = min(missing)
+        station.send("log_request_data", 1, 1, entry.id, first, entry.size - first)
+        bench.step(6)
+        for m in station.all("LOG_DATA"):
+            got[m.ofs : m.ofs + m.count] = bytes(m.data[: m.count])
+            missing.discard(m.ofs)
+        if not missing:
+            break
+    assert got == path.read_bytes()[: entry.size]
 
 
 def test_the_battery_cell_by_cell_and_how_low_it_is():

@@ -26,8 +26,8 @@ class RetryingStation(Station):
 
     def upload(self, items):
         def answer(m):
-            self.age = 0
             if m.get_type() == "MISSION_REQUEST_INT":
+                self.age = 0
                 self.send("mission_item_int", *items[m.seq])
 
         def again():
@@ -99,6 +99,38 @@ def test_transfers_complete_over_a_bad_line(seed):
     client.got.clear()
     assert [(m.x, m.z) for m in client.download()] == [(i[11], i[13]) for i in items]
     assert {p.name for p in PARAMETERS} < {m.param_id for m in client.parameters().values()}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_transfers_are_quick_although_one_in_five_is_lost_each_way(seed):
+    bench = Bench()
+    client = retrying_station(bench, seed=seed, loss=0.2)
+    items = [item(k, north=float(k), up=2.0 + k) for k in range(50)]
+    start = bench.vehicle.seconds
+    assert client.upload(items) == mavlink.MAV_MISSION_ACCEPTED
+    assert bench.vehicle.seconds - start < 10.0
+    start = bench.vehicle.seconds
+    client.parameters()
+    assert bench.vehicle.seconds - start < 5.0
+
+
+def test_a_last_acknowledgement_that_is_lost_comes_again():
+    bench = Bench()
+    client = bench.station()
+    client.send("mission_count", 1, 1, 1, 0)
+    client.send("mission_item_int", *item(0))
+    bench.step(2)
+    assert len(client.all("MISSION_ACK")) == 1
+    client.got.clear()
+    bench.step(100)
+    assert [m.type for m in client.all("MISSION_ACK")] == [mavlink.MAV_MISSION_ACCEPTED] * 2
+    client.send("mission_count", 1, 1, 1, 0)
+    client.send("mission_item_int", *item(0))
+    bench.step(2)
+    client.got.clear()
+    client.send("mission_request_list", 1, 1, 0)  # it goes on: it has got it
+    bench.step(100)
+    assert not client.all("MISSION_ACK")
 
 
 def test_items_arrive_in_any_order_and_more_than_once():
@@ -182,6 +214,7 @@ def test_cameras_keep_their_number_in_the_mission_but_do_nothing():
         client.send("mission_item_int", *item(seq, command))
     bench.step(3)
     assert [(i.action, i.hold) for i in bench.vehicle.items] == [("waypoint", 0.0), ("delay", 0.0), ("waypoint", 0.0)]
+    assert [m.text for m in client.all("STATUSTEXT")] == ["item 1: IMAGE_START_CAPTURE skipped"]
 
 
 def test_everything_is_cleared_with_one_acknowledgement():

@@ -7,25 +7,28 @@ from services.autopilot.commander.view import Constants, View
 from services.autopilot.interface import Setpoint
 
 NAME = "altitude_control"
-TILT_FRACTION = 0.6  # of the maximum tilt at full stick: the rest is left to the wind
 
 
 class Mode(FlightMode):
     """Sticks: forward, left, up, yaw rate, each from -1 to 1; let go of, it stays at its altitude and drifts."""
 
-    needs_flight, needs_position = True, False
+    needs_position = False
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        self._flight = AltitudeFlight(guidance)
+        self._flight = AltitudeFlight(guidance) if guidance.flying else None
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
         """Fly as the sticks say; when nobody holds them any more, by itself."""
+        forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
+        if up > 0.0:
+            guidance.lift_off(constants, view)
         if not guidance.flying:
+            self._flight = None
             return None
+        self._flight = self._flight or AltitudeFlight(guidance)
         if not guidance.inputs.sticks_fresh:
             self.next_mode = "descend" if view.position_lost else "hold"
-        forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
-        limits, tilt = guidance.limits, TILT_FRACTION * guidance.parameters["MPC_TILT_MAX"]
+        limits, tilt = guidance.manual_limits, guidance.manual_tilt
         climb_rate = up * (limits.up if up > 0.0 else limits.down)
         tilts = (tilt * forward, tilt * left)
         return self._flight.step(constants, view, guidance, climb_rate, yaw * limits.yaw_rate, tilts)

@@ -4,13 +4,14 @@ import math
 
 from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.leg import Leg
 from services.autopilot.commander.view import Constants, View
 
 NAME = "goto"
 
 
 class Mode(FlightMode):
-    """Values: x, y, z [m], yaw [rad], speed [m/s]; what is not given stays as it is."""
+    """Values: x, y, z [m], yaw [rad], speed [m/s]; a place that is not given stays, a yaw is that of MPC_YAW_MODE."""
 
     needs_flight = True
 
@@ -20,11 +21,11 @@ class Mode(FlightMode):
             raise ValueError("go to: expected a place above the ground")
         if not guidance.fence.allows(self._target[0], self._target[1]):
             raise ValueError("go to: the place is outside of the fence")
+        self._leg = Leg(guidance.smoothing.position, self._target)
         self._yaw, speed = value(values, 3), value(values, 4)
         if speed > 0.0:
             guidance.speed = speed
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """Fly there."""
-        guidance.smoothing.move_to(self._target, guidance.limits, view.dt)
-        guidance.smoothing.turn_to(self._yaw, guidance.limits, view.dt)
+        self._leg.step(guidance, self._yaw, view.dt)

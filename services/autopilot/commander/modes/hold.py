@@ -1,8 +1,11 @@
 """Stop, and stay there."""
 
+import math
+
 from dynamics.vector import ZERO, Vec3, norm
-from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.flight_mode import FlightMode, value
 from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.leg import towards_roi
 from services.autopilot.commander.view import Constants, View
 
 NAME = "hold"
@@ -10,10 +13,11 @@ STOPPED = 0.05  # [m/s]
 
 
 class Mode(FlightMode):
-    """Brake first, then hold the position where the setpoint has come to rest."""
+    """Brake first, then hold the position where the setpoint has come to rest. Value: yaw [rad]; NaN: as it is."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._position: Vec3 | None = None
+        self._yaw = value(values, 0)
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """Brake or stay."""
@@ -26,4 +30,5 @@ class Mode(FlightMode):
                 self._position = smoothing.position
         else:
             smoothing.move_to(self._position, limits, view.dt)
-        smoothing.turn_at(0.0, limits, view.dt)
+        wanted = towards_roi(guidance) if math.isnan(self._yaw) else self._yaw
+        smoothing.turn_to(wanted, limits, view.dt)

@@ -1,9 +1,10 @@
-"""Setpoints from outside: positions, velocities, accelerations, or an attitude with its thrust."""
+"""Setpoints from outside: positions, velocities, accelerations, or an attitude or body rates with their thrust."""
 
 import math
 
-from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
+from dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, to_roll_pitch_yaw
 from dynamics.vector import Vec3, add, scale
+from services.autopilot.commander.attitude_flight import AttitudeFlight
 from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from services.autopilot.commander.guidance import Guidance
 from services.autopilot.commander.smoothing import clamp_norm
@@ -20,6 +21,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         if not guidance.offboard_fresh:
             raise ValueError("offboard: no setpoints are coming")
+        self._attitude: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
         """Towards the setpoint, within the limits."""
@@ -27,7 +29,8 @@ class Mode(FlightMode):
         if not guidance.armed:
             return None
         if guidance.inputs.offboard_kind == "offboard_attitude":
-            return _follow_attitude(constants, view, guidance, values)
+            return self._follow_attitude(constants, view, guidance, values)
+        self._attitude = None
         position, velocity, acceleration = (vector(values, 3 * row) for row in range(3))
         if position[2] > guidance.smoothing.position[2] or velocity[2] > 0.0 or acceleration[2] > 0.0:
             guidance.lift_off(constants, view)
@@ -40,6 +43,31 @@ class Mode(FlightMode):
                 guidance.smoothing.turn_at(rate, guidance.limits, view.dt)
         return None
 
+    def _follow_attitude(
+        self, constants: Constants, view: View, guidance: Guidance, values: tuple[float, ...]
+    ) -> Setpoint | None:
+        """An attitude (w, x, y, z) or body rates [rad/s], a thrust over the maximum or a climb rate [m/s]; NaN: none.
+
+        The yaw rate goes before the attitude's yaw.
+        """
+        thrust, climb_rate = value(values, 7), value(values, 8)
+        if thrust > constants.hover_thrust or climb_rate > 0.0:
+            guidance.lift_off(constants, view)
+        if not guidance.flying:
+            return None
+        flight = self._attitude = self._attitude or AttitudeFlight(view)
+        q, rates = Quaternion(*(value(values, k) for k in range(4))), _or_zero(vector(values, 4))
+        if math.isnan(q.w):
+            flight.turn(rates, guidance, view.dt)
+        elif math.isnan(value(values, 6)):
+            flight.take(q, guidance)
+        else:
+            roll, pitch, _ = to_roll_pitch_yaw(q)
+            flight.take(from_roll_pitch_yaw(roll, pitch, flight.yaw + rates[2] * view.dt), guidance)
+        return flight.setpoint(
+            constants, view, guidance, rates[2], thrust, 0.0 if math.isnan(climb_rate) else climb_rate
+        )
+
 
 def _follow_position(view: View, guidance: Guidance, position: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
     """Move the setpoint by what is given of position [m], velocity [m/s] and acceleration [m/s^2]; NaN: not given."""
@@ -51,29 +79,6 @@ def _follow_position(view: View, guidance: Guidance, position: Vec3, velocity: V
         for v, p, asked, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
     )  # where an acceleration alone is given, it adds to the present velocity
     smoothing.move_at(add(add(approach, _or_zero(velocity)), add(gained, (x, y, z))), limits, view.dt)
-
-
-def _follow_attitude(
-    constants: Constants, view: View, guidance: Guidance, values: tuple[float, ...]
-) -> Setpoint | None:
-    """An attitude as what the controller makes it of: tilts are accelerations, a thrust one upwards."""
-    thrust = value(values, 7)
-    if thrust > constants.hover_thrust:
-        guidance.lift_off(constants, view)
-    if not guidance.flying:
-        return None
-    q = Quaternion(*(value(values, k) for k in range(4)))
-    roll, pitch, yaw = (0.0, 0.0, guidance.smoothing.yaw) if math.isnan(q.w) else to_roll_pitch_yaw(q)
-    s, c, g = math.sin(yaw), math.cos(yaw), constants.gravity
-    forward, left = g * pitch, -g * roll
-    share = constants.hover_thrust if math.isnan(thrust) else thrust
-    up = g * (share / constants.hover_thrust * math.cos(roll) * math.cos(pitch) - 1.0)
-    rate = value(values, 6)
-    acceleration = (c * forward - s * left, s * forward + c * left, up)
-    e = view.estimate
-    setpoint = Setpoint(e.position_world, e.velocity_world, acceleration, yaw, 0.0 if math.isnan(rate) else rate)
-    guidance.follow(setpoint)
-    return setpoint
 
 
 def _or_zero(v: Vec3) -> Vec3:

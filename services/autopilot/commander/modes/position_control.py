@@ -26,7 +26,7 @@ class Mode(FlightMode):
             guidance.lift_off(constants, view)
         if not guidance.flying:
             return
-        smoothing, limits = guidance.smoothing, guidance.limits
+        smoothing, limits = guidance.smoothing, guidance.manual_limits
         s, c = math.sin(smoothing.yaw), math.cos(smoothing.yaw)
         vertical = up * (limits.up if up > 0.0 else limits.down)
         full = limits.horizontal

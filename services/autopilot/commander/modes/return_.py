@@ -1,45 +1,83 @@
-"""Home, or to the nearest rally point: up, across, down."""
+"""Home, to a rally point or to the mission's landing, as RTL_TYPE says: up, across and round the fence, down."""
 
 import math
 
 from dynamics.vector import norm, subtract
+from services.autopilot.commander.avoidance import Point, way_round
 from services.autopilot.commander.flight_mode import FlightMode
 from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.leg import Leg
 from services.autopilot.commander.view import Constants, View
 
 NAME = "return"
 ACCEPTANCE_RADIUS = 0.3  # [m] around a corner of the way
 OVERHEAD = 1.0  # [m] across from home, within which it does not climb
-_PHASES = ("climb", "home")
+HOME_OR_RALLY, TO_LANDING, ALONG_MISSION, NEAREST = range(4)  # RTL_TYPE
+_CLIMB, _HOME, _WAIT = "climb", "home", "wait"
 
 
 class Mode(FlightMode):
-    """Climb to the height of return (or stay where it is higher), cross, land."""
+    """Climb to the height of return (or stay where it is higher), cross, wait if asked to, land."""
 
     needs_flight = True
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         x, y, z = guidance.smoothing.position
-        places = guidance.rally_points or ((*guidance.home, 0.0),)
-        home_x, home_y, _ = min(places, key=lambda p: math.hypot(p[0] - x, p[1] - y))
-        overhead = math.hypot(home_x - x, home_y - y) < OVERHEAD
-        height = z if overhead else max(z, guidance.parameters["RTL_RETURN_ALT"])
-        self._corners = [(x, y, height), (home_x, home_y, height)]
-        self._index = 0
+        way = _way(guidance)
+        end = way[-1]
+        overhead = len(way) == 1 and math.dist(end, (x, y)) < OVERHEAD
+        height = z if overhead else max(z, guidance.above_home(constants, "RTL_RETURN_ALT"))
+        self._corners = [(x, y, height), *((*corner, height) for corner in way)]
+        self._landing_delay = guidance.parameters["RTL_LAND_DELAY"]
+        if self._landing_delay != 0.0:
+            self._corners.append((*end, min(height, guidance.above_home(constants, "RTL_DESCEND_ALT"))))
+        self._index, self._waited = 0, 0.0
+        self._leg = Leg(guidance.smoothing.position, self._corners[0])
 
     @property
     def phase(self) -> str:
         """Which part of the way."""
-        return _PHASES[self._index]
+        return _WAIT if self._index == len(self._corners) else _HOME if self._index else _CLIMB
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """One corner after the other, then land."""
         if not guidance.flying:
             return
-        corner, smoothing = self._corners[self._index], guidance.smoothing
-        smoothing.move_to(corner, guidance.limits, view.dt)
-        smoothing.turn_at(0.0, guidance.limits, view.dt)
-        if norm(subtract(corner, smoothing.position)) < ACCEPTANCE_RADIUS:
-            if self._index == 1:
+        self._leg.step(guidance, math.nan, view.dt)
+        if self._index == len(self._corners):
+            self._waited += view.dt
+            if 0.0 <= self._landing_delay <= self._waited:
                 self.next_mode = "land"
-            self._index = 1
+        elif norm(subtract(self._leg.target, guidance.smoothing.position)) < ACCEPTANCE_RADIUS:
+            self._index += 1
+            if self._index < len(self._corners):
+                self._leg = Leg(self._leg.target, self._corners[self._index])
+            elif self._landing_delay == 0.0:
+                self.next_mode = "land"
+
+
+def _way(guidance: Guidance) -> list[Point]:
+    """Corners [m] of the way back."""
+    x, y, _ = guidance.smoothing.position
+    kind, route = guidance.parameters["RTL_TYPE"], guidance.route
+    landing = next(((k, i) for k, i in enumerate(route.items) if i.action == "land"), None)
+    place = _place(landing[1]) if landing else None
+    safe = [(x, y) for x, y, _ in (guidance.home, *guidance.rally_points)]
+    if kind == ALONG_MISSION and route.items:
+        if landing and place:
+            ahead = [_place(i) for i in route.items[route.current : landing[0]]]
+            return [*(p for p in ahead if p), place]
+        behind = [_place(i) for i in reversed(route.items[: route.current])]
+        return [*(p for p in behind if p), safe[0]]
+    if place and kind in (TO_LANDING, ALONG_MISSION):
+        goal = place
+    else:
+        goal = min([*safe, *([place] if place and kind == NEAREST else [])], key=lambda p: math.dist(p, (x, y)))
+    return way_round(guidance.fence, (x, y), goal)
+
+
+def _place(item: object) -> Point | None:
+    """Where an item leads [m], None where it says nothing of a place."""
+    action, position = item.action, item.position  # type: ignore[attr-defined]
+    known = math.isfinite(position.x) and math.isfinite(position.y)
+    return (position.x, position.y) if known and action in ("waypoint", "loiter_time", "land") else None

@@ -12,11 +12,11 @@ REACHED = 0.1  # [m]
 
 
 class Mode(FlightMode):
-    """Straight up to a height above home [m], at the yaw given or the present one."""
+    """Straight up to a world z [m], else MIS_TAKEOFF_ALT above home, at the yaw given or the present one."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         asked, ground = value(values, 0), constants.resting_height
-        self._height = guidance.parameters["MIS_TAKEOFF_ALT"] if math.isnan(asked) else asked
+        self._height = guidance.above_home(constants, "MIS_TAKEOFF_ALT") if math.isnan(asked) else asked
         if not ground < self._height <= MAXIMUM_TAKEOFF_HEIGHT:
             raise ValueError(f"take-off: expected a height from {ground:g} to 1000 m, got {self._height:g} m")
         if guidance.flying and guidance.smoothing.position[2] > self._height:

@@ -1,0 +1,69 @@
+"""Flight by attitude: tilts and a thrust as what the controller makes them of, accelerations that it feeds forward."""
+
+import math
+
+from dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, retract, to_roll_pitch_yaw
+from dynamics.vector import Vec3
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
+from services.autopilot.stage import CUT_HEIGHT
+
+_RISING = 0.01  # [m/s]
+LEAST_THRUST = 0.08  # over the maximum at the lower end of the stick, PX4's MPC_MANTHR_MIN
+
+
+def stick_thrust(constants: Constants, up: float) -> float:
+    """Thrust over the maximum of a throttle stick from -1 to 1; in the middle the vehicle hovers (MPC_THR_CURVE 0)."""
+    least, hover = min(LEAST_THRUST, constants.hover_thrust), constants.hover_thrust
+    return hover + up * ((1.0 - hover) if up > 0.0 else (hover - least))
+
+
+class AttitudeFlight:
+    """Makes setpoints of attitudes, turned on by body rates where those are given; what leans on the wind stays."""
+
+    def __init__(self, view: View):
+        """From the attitude [rad] that the vehicle has."""
+        self.roll, self.pitch, self.yaw = to_roll_pitch_yaw(view.estimate.attitude)
+        self._altitude = view.estimate.position_world[2]
+
+    def turn(self, rates_body: Vec3, guidance: Guidance, dt: float) -> None:
+        """Turn the attitude on at body rates [rad/s] for a tick of dt [s], up to the maximum tilt."""
+        q = retract(from_roll_pitch_yaw(self.roll, self.pitch, self.yaw), tuple(dt * rate for rate in rates_body))
+        self.take(q, guidance)
+
+    def take(self, attitude: Quaternion, guidance: Guidance) -> None:
+        """Another attitude, tilted no further than is allowed."""
+        limit = math.radians(guidance.parameters["MPC_TILTMAX_AIR"])
+        roll, pitch, self.yaw = to_roll_pitch_yaw(attitude)
+        self.roll, self.pitch = (max(-limit, min(limit, angle)) for angle in (roll, pitch))
+
+    def setpoint(
+        self, constants: Constants, view: View, guidance: Guidance, yaw_rate: float, thrust: float, climb_rate: float
+    ) -> Setpoint:
+        """The setpoint of the present attitude.
+
+        Args:
+            constants: of the vehicle.
+            view: of the tick, with the estimate of the same tick.
+            guidance: goes along, for the mode that follows.
+            yaw_rate: of the attitude [rad/s].
+            thrust: over the maximum; NaN: the altitude changes at the climb rate.
+            climb_rate: [m/s].
+        """
+        e, g = view.estimate, constants.gravity
+        (x, y, z), (vx, vy, vz) = e.position_world, e.velocity_world
+        s, c = math.sin(self.yaw), math.cos(self.yaw)
+        forward, left = g * self.pitch, -g * self.roll
+        if thrust > constants.hover_thrust or climb_rate > 0.0:  # what stands is asked to leave the ground
+            z, vz = max(z, constants.resting_height + CUT_HEIGHT), max(vz, _RISING)
+        if math.isnan(thrust):
+            self._altitude = max(self._altitude, constants.resting_height) + view.dt * climb_rate
+            z, vz, up = self._altitude, climb_rate, 0.0
+        else:
+            self._altitude = z
+            up = g * (thrust / constants.hover_thrust * math.cos(self.roll) * math.cos(self.pitch) - 1.0)
+        acceleration = (c * forward - s * left, s * forward + c * left, up)
+        setpoint = Setpoint((x, y, z), (vx, vy, vz), acceleration, self.yaw, yaw_rate)
+        guidance.follow(setpoint)
+        return setpoint

@@ -1,0 +1,44 @@
+"""By hand: the sticks ask for tilts, a thrust and a yaw rate; let go of, it levels itself and drifts."""
+
+import math
+
+from dynamics.lie.quaternion import from_roll_pitch_yaw
+from services.autopilot.commander.attitude_flight import AttitudeFlight, stick_thrust
+from services.autopilot.commander.flight_mode import FlightMode
+from services.autopilot.commander.guidance import Guidance
+from services.autopilot.commander.view import Constants, View
+from services.autopilot.interface import Setpoint
+
+NAME = "stabilized"
+
+
+class Mode(FlightMode):
+    """Sticks: forward, left, thrust, yaw rate, each from -1 to 1; in the middle it hovers."""
+
+    needs_position = False
+
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        self._flight: AttitudeFlight | None = None
+
+    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+        """Fly as the sticks say; when nobody holds them any more, by itself."""
+        forward, left, up, turn = (guidance.inputs.stick(k) for k in range(4))
+        thrust = stick_thrust(constants, up)
+        if not guidance.flying:
+            if guidance.armed and thrust > constants.hover_thrust:
+                guidance.lift_off(constants, view)
+            self._flight = None
+            return None
+        if not guidance.inputs.sticks_fresh:
+            self.next_mode = "descend" if view.position_lost else "hold"
+        self._flight = self._flight or AttitudeFlight(view)
+        rate = self._turn(view, guidance, forward, left, turn, self._flight)
+        return self._flight.setpoint(constants, view, guidance, rate, thrust, 0.0)
+
+    def _turn(
+        self, view: View, guidance: Guidance, forward: float, left: float, turn: float, flight: AttitudeFlight
+    ) -> float:
+        """Turn the attitude on by a tick; its yaw rate [rad/s]."""
+        tilt, rate = guidance.manual_tilt, turn * math.radians(guidance.parameters["MPC_MAN_Y_MAX"])
+        flight.take(from_roll_pitch_yaw(-tilt * left, tilt * forward, flight.yaw + rate * view.dt), guidance)
+        return rate

@@ -1,0 +1,72 @@
+"""The operator's commands about missions, fences and places: what each kind does."""
+
+import math
+from typing import Any
+
+from services.autopilot.commander import transitions
+from services.autopilot.commander.command_handlers import Denied, denied_if_wrong, handles
+from services.autopilot.commander.fence import Fence, rally_points
+from services.autopilot.commander.flight_mode import fill_in, value, vector
+from services.autopilot.commander.route import GRAB, Route
+from services.autopilot.commander.transitions import Context
+
+
+@handles("mission_upload")
+def mission_upload(context: Context, command: Any) -> None:
+    """A new mission, in place of the one there is."""
+    state = context.state
+    state.guidance.route = denied_if_wrong(Route, command.items)
+    if state.mode_name == "mission" and not state.on_trajectory:
+        flies_on = state.guidance.route.items and state.guidance.flying
+        transitions.enter(context.constants, state, "mission" if flies_on else "hold")
+
+
+@handles("mission_clear")
+def mission_clear(context: Context, command: Any) -> None:
+    """No mission any more."""
+    state = context.state
+    state.guidance.route = Route()
+    if state.mode_name == "mission" and not state.on_trajectory:
+        transitions.enter(context.constants, state, "hold")
+
+
+@handles("mission_current")
+def mission_current(context: Context, command: Any) -> None:
+    """Go on with another item."""
+    number = value(command.values, 0)
+    denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
+
+
+@handles("fence_upload")
+def fence_upload(context: Context, command: Any) -> None:
+    """A new fence; without items, none."""
+    context.state.guidance.fence = denied_if_wrong(Fence, command.items)
+
+
+@handles("rally_upload")
+def rally_upload(context: Context, command: Any) -> None:
+    """New places to return to; without items, home."""
+    context.state.guidance.rally_points = denied_if_wrong(rally_points, command.items)
+
+
+@handles("set_home")
+def set_home(context: Context, command: Any) -> None:
+    """Return elsewhere. Values: x, y, z of the ground [m]; what is not given is as where the vehicle is."""
+    x, y, z = context.view.estimate.position_world
+    home = fill_in((x, y, z - context.constants.resting_height), vector(command.values, 0))
+    if not all(map(math.isfinite, home)):
+        raise Denied("set home: expected a place")
+    context.state.guidance.home = home
+
+
+@handles("roi")
+def region_of_interest(context: Context, command: Any) -> None:
+    """Point the nose there on the way. Values: x, y, z [m]; without a place, nowhere any more."""
+    place = vector(command.values, 0)
+    context.state.guidance.roi = place if all(map(math.isfinite, place[:2])) else None
+
+
+@handles("gripper")
+def gripper(context: Context, command: Any) -> None:
+    """Open it (0) or close it (1); what it has let go of does not come back."""
+    context.state.guidance.released = value(command.values, 0) != GRAB

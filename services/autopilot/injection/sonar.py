@@ -1,0 +1,30 @@
+"""The sonar's failures; a wrong one reads too far."""
+
+from typing import Any, NamedTuple
+
+from cosim.part import GO_ON, Received
+from dynamics.kernel import leaf
+from services.autopilot.injection.memory import Memory, silent
+from services.common.failures import STUCK, WRONG
+from services.common.ports import SonarReading
+
+EXCESS = 1.5  # [m]
+
+
+class SonarInjection(NamedTuple):
+    """What is wrong."""
+
+    faults: Any  # cell of `Faults`
+
+
+@leaf
+def step(p: SonarInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+    """What arrives of the reading of the tick."""
+    r, kind = inputs[0].value, p.faults.value.sonar
+    last = s.last if kind == STUCK else r
+    x = last
+    if kind == WRONG:
+        x = SonarReading(r.range + EXCESS, r.variance, r.valid)
+    if silent(kind, s.readings):
+        x = SonarReading(r.range, r.variance, False)
+    return Memory(last, s.readings + 1), (x,), GO_ON

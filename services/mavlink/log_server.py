@@ -1,0 +1,68 @@
+"""The run's log as an endpoint downloads it: a file that may still be growing (MAVLink guide, "Log protocol")."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from services.mavlink.dialect import mavlink
+
+NUMBER = 1  # of the only log there is
+PIECE = 90  # [bytes] of one LOG_DATA
+PER_STEP = 100  # messages at each step of the telemetry
+
+
+class LogServer:
+    """Lists the log, and sends what is asked for of it, a few messages at a time."""
+
+    def __init__(self, path: Path | None):
+        """`path`: of the log; None: there is none."""
+        self._path = path
+        self._next = self._end = 0  # bytes that are still to be sent
+        self._due = False  # whether a request is not answered yet, if only by the word that there is no more
+
+    @property
+    def _size(self) -> int:
+        try:
+            return self._path.stat().st_size if self._path else 0
+        except OSError:
+            return 0
+
+    def entries(self, first: int, last: int) -> Any:
+        """LOG_ENTRY of the logs of these numbers: what has been written of the one there is by now."""
+        if self._path is None or not self._size or not first <= NUMBER <= last:
+            return mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0)
+        return mavlink.MAVLink_log_entry_message(NUMBER, 1, NUMBER, int(self._path.stat().st_mtime), self._size)
+
+    def request(self, number: int, offset: int, count: int) -> None:
+        """Send so many bytes from an offset on, in place of what was asked for before."""
+        self._next = offset
+        self._end = min(self._size, offset + count) if number == NUMBER else offset
+        self._end = max(self._end, offset)
+        self._due = True
+
+    def stop(self) -> None:
+        """Send no more."""
+        self._next = self._end = 0
+        self._due = False
+
+    def step(self) -> Iterator[Any]:
+        """The next LOG_DATA messages."""
+        if not self._due:
+            return
+        data = self._read(self._next, min(PER_STEP * PIECE, self._end - self._next))
+        for start in range(0, max(1, len(data)), PIECE):
+            piece = data[start : start + PIECE]
+            padded = list(piece.ljust(PIECE, b"\0"))
+            yield mavlink.MAVLink_log_data_message(NUMBER, self._next + start, len(piece), padded)
+        self._next += len(data)
+        self._due = bool(data) and self._next < self._end
+
+    def _read(self, offset: int, count: int) -> bytes:
+        if self._path is None or count <= 0:
+            return b""
+        try:
+            with self._path.open("rb") as file:
+                file.seek(offset)
+                return file.read(count)
+        except OSError:
+            return b""

@@ -1,0 +1,34 @@
+"""The command that injects failures."""
+
+from services.common import failures
+from services.mavlink.dialect import mavlink
+from services.mavlink.protocols.commands import UNSUPPORTED, Command, Outcome, Request, rule
+from services.mavlink.session import Session
+
+_FAILURES = {  # by FAILURE_TYPE
+    mavlink.FAILURE_TYPE_OK: failures.SOUND,
+    mavlink.FAILURE_TYPE_OFF: failures.OFF,
+    mavlink.FAILURE_TYPE_STUCK: failures.STUCK,
+    mavlink.FAILURE_TYPE_WRONG: failures.WRONG,
+    mavlink.FAILURE_TYPE_SLOW: failures.SLOW,
+}
+_UNITS = {  # by FAILURE_UNIT
+    mavlink.FAILURE_UNIT_SENSOR_GYRO: "gyro",
+    mavlink.FAILURE_UNIT_SENSOR_ACCEL: "accelerometer",
+    mavlink.FAILURE_UNIT_SENSOR_MAG: "magnetometer",
+    mavlink.FAILURE_UNIT_SENSOR_BARO: "barometer",
+    mavlink.FAILURE_UNIT_SENSOR_GPS: "gps",
+    mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR: "sonar",
+    mavlink.FAILURE_UNIT_SYSTEM_BATTERY: "battery",
+    mavlink.FAILURE_UNIT_SYSTEM_MOTOR: "motor",
+}
+
+
+@rule(mavlink.MAV_CMD_INJECT_FAILURE)
+def inject_failure(session: Session, c: Command) -> Outcome:
+    """Let a unit fail, or make it sound again."""
+    unit, kind = _UNITS.get(int(c.params[0])), _FAILURES.get(int(c.params[1]))
+    if unit is None or kind is None:
+        session.say(f"INJECT_FAILURE: unit {c.params[0]:.0f}, type {c.params[1]:.0f} unsupported")
+        return UNSUPPORTED
+    return Request("inject_failure", (failures.UNITS.index(unit), kind, c.params[2]))

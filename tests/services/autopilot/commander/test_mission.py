@@ -1,0 +1,183 @@
+"""Missions from start to end, by a vehicle that is where it is asked to be."""
+
+import math
+from itertools import groupby
+
+import pytest
+from commander_session import Flight
+from flights import command, item
+
+NAN = math.nan
+START = command("mission"), command("arm")
+
+
+def mission(*items, **more):
+    return Flight(command("mission_upload", items=items), *START, **more)
+
+
+def reached(flight):
+    return [number for number, _ in groupby(s.mission_reached for _, s in flight.track) if number != 65535]
+
+
+@pytest.mark.parametrize("last", [item("land", 4.0, 0.0, 0.0), item("return")], ids=["land", "return"])
+def test_a_mission_that_ends_on_the_ground_completes_disarms_and_flies_again(last):
+    flight = mission(item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0), last, parameters={"RTL_RETURN_ALT": 3.0})
+    for _ in range(2):
+        assert flight.until(lambda s: s.mission_state == 5)
+        assert flight.status.armed
+        assert flight.until(lambda s: not s.armed, 3.0)
+        assert (flight.status.mission_current, flight.status.mission_reached) == (2, 2)
+        assert flight.status.mode == "hold"
+        assert max(s.mission_current for _, s in flight.track) == 2
+        flight.told(*START)
+        assert (flight.status.mission_state, flight.status.mission_current) == (3, 0)
+    assert reached(flight) == [0, 1, 2] * 2
+
+
+def test_a_mission_is_started_and_armed_by_one_command():
+    items = item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0), item("land")
+    flight = Flight(command("mission_upload", items=items)).told(command("mission_start", 1.0))
+    assert (flight.status.mode, flight.status.armed, flight.status.mission_current) == ("mission", True, 1)
+    assert flight.until(lambda s: s.mission_state == 5)
+    other = Flight(command("mission_start"))
+    assert not other.status.armed
+    assert other.texts == ["mission: there is none; upload one first"]
+
+
+def test_a_landing_amid_a_mission_takes_off_again_without_being_disarmed():
+    flight = mission(
+        item("takeoff", z=3.0), item("land", 4.0, 0.0), item("delay", hold=5.0), item("takeoff", z=3.0),
+        item("land", 0.0, 0.0),
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert all(s.armed for _, s in flight.track)
+    assert reached(flight) == [0, 1, 2, 3, 4]
+    assert flight.setpoint.position_world == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
+
+
+def test_a_straight_line_is_flown_without_braking_and_a_corner_within_its_radius():
+    far = [item("waypoint", 15.0 * k, 0.0, 3.0) for k in range(1, 5)]
+    flight = mission(item("takeoff", z=3.0), *far, item("waypoint", 60.0, 40.0, 3.0))
+    assert flight.until(lambda s: s.mission_state == 5)
+    for k in (1, 2, 3):
+        assert min(flight.speeds((15.0 * k, 0.0), 1.0)) > 4.9
+    corner = flight.speeds((60.0, 0.0), 2.0)
+    assert 1.0 < min(corner) < 3.0
+    along = [
+        s.position_world for s, _ in flight.track if 2.0 < s.position_world[0] < 57.0 and s.position_world[1] < 1.0
+    ]
+    assert max(abs(y) for _, y, _ in along) < 0.05
+    up = [s.position_world[0] for s, _ in flight.track if s.position_world[1] > 15.0]
+    assert max(abs(x - 60.0) for x in up) < 0.3  # on the line of the next leg
+    assert flight.until(lambda s: s.mode == "hold")
+    assert flight.setpoint.position_world == pytest.approx((60.0, 40.0, 3.0), abs=0.1)
+
+
+def test_an_item_that_waits_is_stopped_at():
+    flight = mission(
+        item("takeoff", z=3.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0), item("waypoint", 40.0, 0.0, 3.0)
+    )
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert min(flight.speeds((20.0, 0.0), 0.2)) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("mode", "yaw"), [(0, -0.5 * math.pi), (1, math.pi), (2, 0.0), (3, -0.5 * math.pi), (4, -0.5 * math.pi), (5, 0.0)]
+)
+def test_the_nose_points_where_the_parameter_says(mode, yaw):
+    flight = mission(
+        item("takeoff", z=3.0), item("waypoint", 20.0, 0.0, 3.0, hold=0.1), item("waypoint", 20.0, -6.0, 3.0),
+        item("waypoint", 20.0, -6.1, 3.0, hold=9.0), parameters={"MPC_YAW_MODE": mode, "NAV_ACC_RAD": 0.2},
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_current == 3)
+    assert math.cos(flight.setpoint.yaw - yaw) > math.cos(0.5)
+
+
+def test_an_items_own_yaw_goes_before_and_must_be_reached():
+    flight = mission(item("takeoff", z=3.0), item("waypoint", 6.0, 0.0, 3.0, yaw=2.0), item("waypoint", 9.0, 0.0, 3.0))
+    assert flight.until(lambda s: s.mission_current == 2)
+    assert flight.setpoint.yaw == pytest.approx(2.0, abs=math.radians(12.0))
+
+
+def test_a_speed_of_the_mission_ends_with_it():
+    flight = mission(item("takeoff", z=3.0), item("speed", values=(2.0,)), item("waypoint", 20.0, 0.0, 3.0))
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert max(flight.speeds((10.0, 0.0), 3.0)) == pytest.approx(2.0, abs=0.01)
+    flight.told(command("goto", 60.0, 0.0, 3.0)).on(20.0)
+    assert max(flight.speeds((40.0, 0.0), 3.0)) == pytest.approx(5.0, abs=0.01)
+
+
+def test_heights_count_from_where_it_stands():
+    flight = Flight(command("takeoff"), command("arm"))
+    assert flight.until(lambda s: s.mode == "hold")
+    assert flight.on(2.0).setpoint.position_world[2] == pytest.approx(2.85, abs=0.05)
+    flight.told(command("goto", 30.0, 0.0, 3.0)).on(12.0).told(command("return")).on(10.0)
+    assert flight.setpoint.position_world[2] == pytest.approx(15.35, abs=0.05)
+
+
+def test_what_has_nothing_to_do_does_not_stop_it():
+    far = [i for k in range(1, 4) for i in (item("waypoint", 15.0 * k, 0.0, 3.0), item("delay"), item("delay"))]
+    flight = mission(item("takeoff", z=3.0), *far)
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert min(flight.speeds((15.0, 0.0), 1.0)) > 4.9
+    assert reached(flight)[-1] == 9
+
+
+def test_loiter_to_an_altitude_and_for_ever():
+    flight = mission(item("takeoff", z=3.0), item("loiter_to_alt", 9.0, 0.0, 8.0), item("loiter", 9.0, 9.0, 8.0))
+    assert flight.until(lambda s: s.mission_current == 2)
+    over = [s.position_world for s, _ in flight.track if s.position_world[2] > 3.2]
+    assert all(math.dist(p[:2], (9.0, 0.0)) < 0.5 for p in over)  # first there, then up
+    flight.on(30.0)
+    assert (flight.status.mission_current, flight.status.mission_state) == (2, 3)
+    assert flight.setpoint.position_world == pytest.approx((9.0, 9.0, 8.0), abs=0.05)
+
+
+def test_the_nose_points_at_the_region_of_interest_until_it_is_none():
+    flight = mission(
+        item("takeoff", z=3.0), item("roi", 20.0, 20.0, 0.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0),
+        item("roi"), item("waypoint", 40.0, 0.0, 3.0, hold=2.0),
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_current == 4)
+    assert flight.setpoint.yaw == pytest.approx(0.5 * math.pi, abs=0.05)
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert flight.setpoint.yaw == pytest.approx(0.0, abs=0.05)
+    flight.told(command("roi", 40.0, -30.0, 0.0)).on(6.0)
+    assert flight.setpoint.yaw == pytest.approx(-0.5 * math.pi, abs=0.05)
+
+
+def test_conditions_are_waited_for_on_the_way():
+    for condition in (item("condition", radius=10.0), item("condition", hold=4.0)):
+        flight = mission(
+            item("takeoff", z=3.0), condition, item("speed", values=(2.0,)), item("waypoint", 40.0, 0.0, 3.0)
+        )
+        assert flight.until(lambda s: s.mission_state == 5)
+        assert max(flight.speeds((10.0, 0.0), 2.0)) > 3.5
+        assert max(flight.speeds((36.0, 0.0), 1.0)) == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_relative_turn_and_another_home():
+    flight = mission(
+        item("takeoff", z=3.0), item("waypoint", 0.0, 9.0, 3.0, hold=3.0), item("yaw", yaw=-1.0, values=(1.0,)),
+        item("set_home"), item("waypoint", 9.0, 9.0, 3.0), item("return"), parameters={"MPC_YAW_MODE": 5},
+    )  # fmt: skip
+    assert flight.until(lambda s: s.mission_current == 4)
+    assert flight.setpoint.yaw == pytest.approx(-1.0, abs=math.radians(12.0))
+    assert flight.until(lambda s: s.mission_state == 5)
+    assert flight.setpoint.position_world[:2] == pytest.approx((0.0, 9.0), abs=0.3)
+
+
+def test_it_circles_a_place_facing_it():
+    flight = Flight(command("takeoff", 5.0), command("arm"))
+    assert flight.until(lambda s: s.mode == "hold")
+    flight.told(command("orbit", 20.0, 0.0, 8.0, 8.0, 2.0)).on(25.0)
+    flight.track.clear()
+    flight.on(25.0)
+    places = [s.position_world for s, _ in flight.track]
+    assert all(math.dist(p[:2], (20.0, 0.0)) == pytest.approx(8.0, abs=0.2) for p in places)
+    assert all(p[2] == pytest.approx(8.0, abs=0.1) for p in places)
+    turned = [math.atan2(p[1], p[0] - 20.0) for p in places]
+    assert math.remainder(turned[250] - turned[0], 2.0 * math.pi) == pytest.approx(0.25, abs=0.03)  # to the left
+    facing = flight.setpoint.yaw - turned[-1] - math.pi
+    assert math.cos(facing) > 0.9
+    assert flight.status.mode == "orbit"
