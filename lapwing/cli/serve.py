@@ -45,8 +45,8 @@ def service(
     from services import processes
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan
-        from services.participant import Participation, take_part
     from services.common.vehicle import start_height
+    from services.participant import Participation, take_part
     from services.table import resolve
 
     with user_errors():

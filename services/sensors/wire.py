@@ -112,7 +112,8 @@ def _magnetometer(r: MagnetometerReading, time_ns: np.ndarray) -> Fields:
 
 def _late(r: GpsReading, time_ns: np.ndarray) -> np.ndarray:
     """The instants [ns] that fixes are valid for."""
-    return time_ns - np.round(np.asarray(r.age) * 1e9).astype(np.int64)
+    # what was measured before the start is as true at the start: the vehicle stood there
+    return np.maximum(time_ns - np.round(np.asarray(r.age) * 1e9).astype(np.int64), 0)
 
 
 def _gps_sample(frame: str) -> Any:

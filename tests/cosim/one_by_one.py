@@ -138,7 +138,7 @@ def magnetometer(given, time_ns, r):
 def gps(given, time_ns, r):
     status = NavSatStatus.STATUS_GBAS_FIX if r.valid else NavSatStatus.STATUS_NO_FIX
     return NavSatFix(
-        header(time_ns - round(r.age * 1e9), given.vehicle),
+        header(max(time_ns - round(r.age * 1e9), 0), given.vehicle),
         NavSatStatus(status, NavSatStatus.SERVICE_GPS),
         r.latitude_deg,
         r.longitude_deg,
@@ -152,7 +152,7 @@ def gps_velocity(given, time_ns, r):
     covariance = [0.0] * 36
     covariance[0] = covariance[7] = covariance[14] = r.velocity_variance if r.valid else -1.0
     twist = TwistWithCovariance(Twist(Vector3(*r.velocity_world), Vector3()), tuple(covariance))
-    return TwistWithCovarianceStamped(header(time_ns - round(r.age * 1e9), "world"), twist)
+    return TwistWithCovarianceStamped(header(max(time_ns - round(r.age * 1e9), 0), "world"), twist)
 
 
 def barometer(given, time_ns, r):

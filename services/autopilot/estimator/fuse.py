@@ -6,9 +6,9 @@ the rows of one reading are all taken about the same estimate.
 
 from dynamics.kernel import kernel, leaf
 from dynamics.vector import Mat3, Vec3
-from services.autopilot.estimator.state import ACCELEROMETER, POSITION, SIZE, THETA, VELOCITY, WANDER, Memory
+from services.autopilot.estimator.state import ACCELEROMETER, SIZE, THETA, Memory
 
-_FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
+FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
 
 
 @leaf
@@ -26,7 +26,7 @@ def innovation_variance(m: Memory, variance: float) -> float:
         if h != 0.0:
             for i in range(SIZE):
                 m.product[i] += h * m.covariance[j, i]
-    total = variance + _FLOOR
+    total = variance + FLOOR
     for i in range(SIZE):
         total += m.row[i] * m.product[i]
     return total
@@ -35,7 +35,12 @@ def innovation_variance(m: Memory, variance: float) -> float:
 @kernel
 def fuse(m: Memory, innovation: float, variance: float) -> float:
     """Take in the row's measurement; returns its normalised innovation squared."""
-    s = innovation_variance(m, variance)
+    return absorb(m, innovation, innovation_variance(m, variance))
+
+
+@kernel
+def absorb(m: Memory, innovation: float, s: float) -> float:
+    """`fuse` with the innovation's variance s, and its covariance with the error in `m.product`."""
     y = innovation
     for i in range(SIZE):
         y -= m.row[i] * m.correction[i]
@@ -60,21 +65,3 @@ def acceleration_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, k: float)
     for i in range(3):
         m.row[THETA + i] += k * theta[i]
         m.row[ACCELEROMETER + i] -= k * r[3 * axis + i]
-
-
-@leaf
-def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
-    """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30))."""
-    clear(m)
-    m.row[POSITION + axis] = 1.0
-    m.row[VELOCITY + axis] = -delay
-    m.row[WANDER + axis] = 1.0
-    acceleration_row(m, force_world, r, axis, 0.5 * delay * delay)
-
-
-@leaf
-def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
-    """Row of the velocity `delay` seconds ago."""
-    clear(m)
-    m.row[VELOCITY + axis] = 1.0
-    acceleration_row(m, force_world, r, axis, -delay)

@@ -5,7 +5,13 @@ from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import ZERO, Vec3, add, scale, subtract
 from services.autopilot.estimator.doubt import doubt
-from services.autopilot.estimator.fuse import fuse, innovation_variance, late_position_row, late_velocity_row
+from services.autopilot.estimator.fuse import absorb
+from services.autopilot.estimator.late import (
+    Noise,
+    late_innovation_variances,
+    late_position_row,
+    late_velocity_row,
+)
 from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import GPS, GPS_VELOCITY, HISTORY, State, corrected
 from services.autopilot.estimator.watch import judge, repeated
@@ -25,6 +31,19 @@ def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float]:
     position = add(subtract(s.nominal.position_world, scale(delay, s.nominal.velocity_world)), moment)
     velocity = subtract(s.nominal.velocity_world, subtract(i.velocity_gain, velocity_gain))
     return position, velocity, delay
+
+
+@leaf
+def _noise_since(p: Estimator, s: State, age: int) -> Noise:
+    """What the last `age` ticks added to the covariance of velocity and position."""
+    tick, history = s.inertial.tick, s.memory.history
+    v = vp = pp = 0.0
+    for k in range(min(age, tick, HISTORY - 1)):
+        q = history[(tick - k) % HISTORY, 6]
+        v += q
+        vp += q * (k * p.interval)
+        pp += q * (k * p.interval) ** 2
+    return Noise(v, vp, pp)
 
 
 @leaf
@@ -61,6 +80,7 @@ def update_gps(
         return s
     measured = geodetic_to_enu(p.home, latitude_deg, longitude_deg, height)
     position, _, delay = _past(p, s, age)
+    since = _noise_since(p, s, age)
     innovation = subtract(measured, add(position, s.nominal.gps_wander))
     r = rotation_matrix(s.nominal.attitude)
     accepted = True
@@ -68,7 +88,8 @@ def update_gps(
     for axis in range(3):
         late_position_row(m, s.inertial.force_world, r, axis, delay)
         white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
-        ratio = innovation[axis] ** 2 / innovation_variance(m, white)
+        _, largest = late_innovation_variances(m, axis, since, white)
+        ratio = innovation[axis] ** 2 / largest
         nis += ratio
         accepted = accepted and ratio < p.gate**2
     if accepted:
@@ -76,7 +97,8 @@ def update_gps(
         for axis in range(3):
             late_position_row(m, s.inertial.force_world, r, axis, delay)
             white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
-            nis += fuse(m, innovation[axis], white)
+            s_gain, _ = late_innovation_variances(m, axis, since, white)
+            nis += absorb(m, innovation[axis], s_gain)
     judge(m, GPS, accepted, nis)
     if not accepted:
         doubt(p, m, GPS)
@@ -100,20 +122,23 @@ def update_gps_velocity(p: Estimator, s: State, velocity_world: Vec3, variance: 
         judge(m, GPS_VELOCITY, False, 0.0)
         return s
     _, velocity, delay = _past(p, s, age)
+    since = _noise_since(p, s, age)
     innovation = subtract(velocity_world, velocity)
     r = rotation_matrix(s.nominal.attitude)
     accepted = True
     nis = 0.0
     for axis in range(3):
         late_velocity_row(m, s.inertial.force_world, r, axis, delay)
-        ratio = innovation[axis] ** 2 / innovation_variance(m, variance)
+        _, largest = late_innovation_variances(m, axis, since, variance)
+        ratio = innovation[axis] ** 2 / largest
         nis += ratio
         accepted = accepted and ratio < p.gate**2
     if accepted:
         nis = 0.0
         for axis in range(3):
             late_velocity_row(m, s.inertial.force_world, r, axis, delay)
-            nis += fuse(m, innovation[axis], variance)
+            s_gain, _ = late_innovation_variances(m, axis, since, variance)
+            nis += absorb(m, innovation[axis], s_gain)
     judge(m, GPS_VELOCITY, accepted, nis)
     if not accepted:
         doubt(p, m, GPS_VELOCITY)

@@ -140,6 +140,7 @@ def predict(
     if not valid or frozen:  # flying on old readings: they may be wrong by as much as a manoeuvre changes them
         q_velocity += dt * 1.0
         q_theta += dt * 0.1
+    m.history[tick % HISTORY, 6] = q_velocity
     for k in range(3):
         c[THETA + k, THETA + k] += q_theta
         c[VELOCITY + k, VELOCITY + k] += q_velocity

@@ -60,7 +60,7 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) not yet added to the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    history: np.ndarray  # (HISTORY, 6) velocity_gain and distance_gain
+    history: np.ndarray  # (HISTORY, 7) velocity_gain, distance_gain, variance that the tick added to the velocity
     since: np.ndarray  # (6,) ticks since a source was last accepted, or NEVER
     refused: np.ndarray  # (6,) 1 where the last reading of a source was refused
     repeats: np.ndarray  # (6,) equal readings in a row
@@ -122,7 +122,7 @@ def initial(p: Estimator, position_world: Vec3, specific_force_body: Vec3, field
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
-        np.zeros((HISTORY, 6)),
+        np.zeros((HISTORY, 7)),
         np.full(count, NEVER),
         np.zeros(count, np.int64),
         np.zeros(count, np.int64),

@@ -26,7 +26,7 @@ def blank() -> NavigationState:
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
-        np.zeros((HISTORY, 6)),
+        np.zeros((HISTORY, 7)),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),

@@ -1,0 +1,91 @@
+"""Measurements of the past: what came in since they were taken has no part in them."""
+
+import numpy as np
+import pytest
+
+from dynamics.geodesy import MAGNETIC_FIELD_WORLD
+from dynamics.vector import ZERO
+from services.autopilot import estimator
+from services.autopilot.estimator import fuse, late, state
+from services.autopilot.estimator.late import Noise
+
+P = estimator.PRESETS["rtk"]
+AGE = 25  # ticks by which a fix is late: 0.1 s
+REST = (0.0, 0.0, P.gravity)
+
+
+def at_rest():
+    return estimator.initial(P, ZERO, REST, MAGNETIC_FIELD_WORLD)
+
+
+def predicted(s, ticks, force=REST):
+    for _ in range(ticks):
+        s = estimator.predict(
+            P, s, ZERO, force, 0.0, 1e-4, True
+        )  # no noise in the rates: equal readings are not frozen
+    return s
+
+
+def velocity_std(s):
+    return np.sqrt(np.diag(s.memory.covariance)[state.VELOCITY : state.VELOCITY + 3])
+
+
+def velocity_fix(s, velocity, tick):
+    noise = 1e-6 * (tick % 7)  # no two fixes alike: those would count as frozen
+    return estimator.update_gps_velocity(P, s, (noise, noise, velocity + noise), 0.02**2, AGE, True)
+
+
+def test_a_fix_of_before_an_impact_leaves_open_what_the_impact_did():
+    """The vehicle comes down at 1 m/s and stops; of that the accelerometer sees one reading."""
+    s = velocity_fix(predicted(at_rest(), 100), 0.0, 0)
+    assert np.all(velocity_std(s) < 0.05)
+    s = predicted(predicted(predicted(s, 10), 1, force=(0.0, 0.0, 78.0)), 4)  # clipped at 8 g
+    before = velocity_std(s)
+    assert np.all(before > 0.4)
+    hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s ago, 0.08 s before the impact
+    assert np.all(velocity_std(hit) > 0.99 * before)
+    after = velocity_fix(predicted(hit, 25), 1.0, 2)  # the first that was measured after it
+    assert after.memory.refused[state.GPS_VELOCITY] == 0
+    assert np.all(velocity_std(after) < 0.05)
+    assert after.nominal.velocity_world[2] == pytest.approx(1.0, abs=0.01)
+
+
+def random_memory(rng):
+    m = at_rest().memory
+    a = rng.normal(size=(state.SIZE, state.SIZE))
+    m.covariance[:] = a @ a.T / state.SIZE
+    return m
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0, 10.0])
+def test_the_covariance_against_dense_matrices(share):
+    """The row sees the error now less what came in since, which has its part of the covariance with the row."""
+    rng = np.random.default_rng(round(share * 10))
+    m = random_memory(rng)
+    m.row[:] = rng.normal(size=state.SIZE)
+    before, h, variance = m.covariance.copy(), m.row.copy(), 0.02
+    since = Noise(0.8 * share, 0.3 * share, 0.2 * share)
+    block = h[[state.VELOCITY, state.POSITION]]
+    now, noise = h @ before @ h, block @ np.array([[0.8, 0.3], [0.3, 0.2]]) @ block * share
+    part = min(noise / now, 1.0)
+    s, largest = late.late_innovation_variances(m, 0, since, variance)
+    assert s == pytest.approx(now * (1.0 - part) + variance)
+    assert largest == pytest.approx(now + noise + variance)
+    fuse.absorb(m, 0.7, s)
+    gain = before @ h * (1.0 - part) / s
+    np.testing.assert_allclose(m.correction, gain * 0.7, atol=1e-10)
+    rest, cross = np.eye(state.SIZE) - np.outer(gain, h), np.outer(before @ h * part, gain)
+    joseph = rest @ before @ rest.T + (now * part + variance) * np.outer(gain, gain) + rest @ cross + (rest @ cross).T
+    np.testing.assert_allclose(m.covariance, joseph, atol=1e-10)
+    np.testing.assert_array_equal(m.covariance, m.covariance.T)
+    assert np.linalg.eigvalsh(m.covariance).min() > 0.0
+
+
+def test_an_exact_measurement_of_the_past_leaves_just_what_came_in_since():
+    m = at_rest().memory
+    m.covariance[:] = np.eye(state.SIZE)
+    m.row[:] = 0.0
+    m.row[state.VELOCITY + 1] = 1.0
+    s, _ = late.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0), 0.0)
+    fuse.absorb(m, 0.3, s)
+    assert m.covariance[state.VELOCITY + 1, state.VELOCITY + 1] == pytest.approx(0.25)
