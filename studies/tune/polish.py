@@ -87,6 +87,9 @@ def polish(
     simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
     options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
     minimize(cost, at, method="Nelder-Mead", options=options)
+    if not seen:
+        what = next((str(f.verdict) for f in before if f.failed), "none of those near it holds its margins and lands")
+        raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
     bandwidths, gains, after = seen[min(seen)]
     return Polished(gains, bandwidths, before, after, len(seen))
 

@@ -56,6 +56,8 @@ def show(console: Console, found: Tuned) -> None:
 
 def cell(m: Margins) -> str:
     """Margins in few words."""
+    if not 0.0 < m.crossover < math.inf:
+        return f"no crossover: gain {'above' if m.crossover else 'below'} 1"
     up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
     return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
 
