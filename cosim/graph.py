@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from cosim.part import END, FAILED, GO_ON, LOOK, Code, Part, bind, run, schedule
-from cosim.schedule import KEPT, LockStepError, Port
+from cosim.schedule import KEPT, DivergedError, LockStepError, Port
 from cosim.setup import Setup
 from cosim.wire import Page, Wire, due_ticks, encode
 from dynamics.cell import Cell
@@ -211,4 +211,4 @@ def _ring(port: Port, ticks: int) -> np.ndarray:
 
 
 def _unsound(name: str) -> Any:
-    return lambda tick: LockStepError(f"{name}: the state is not sound at tick {tick}")
+    return lambda tick: DivergedError(f"{name}: the state is not sound at tick {tick}")

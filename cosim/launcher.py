@@ -106,7 +106,9 @@ def _follow(
                 raise ValueError(f"{name}{_last_words(errors[name])}")
         for name, child in children.items():
             code = child.poll()
-            if code is not None and (code != 0 or (not watch.ended and ended_at is None and not _grace(watch))):
+            if code is None or (code != 0 and (watch.diverged or _diverges(watch))):
+                continue
+            if code != 0 or (not watch.ended and ended_at is None and not _grace(watch)):
                 raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
         if not watch.ended and (lost := sorted(watch.gone & external)) and not _grace(watch):
             raise RunFailed(f"{', '.join(lost)}: gone {_at(watch)}")
@@ -141,6 +143,12 @@ def _grace(watch: Watch) -> bool:
     """Whether the news of the end arrives now, just after a process that knew of it has ended."""
     watch.poll(0.5)
     return watch.ended
+
+
+def _diverges(watch: Watch) -> bool:
+    """Whether the news arrives now that a state is no longer sound."""
+    watch.poll(0.5)
+    return watch.diverged
 
 
 def _at(watch: Watch) -> str:

@@ -4,8 +4,9 @@ import os
 import time
 
 from cosim.graph import NEVER, Graph, Service
+from cosim.keys import DIVERGED_KEY
 from cosim.process import Process, Stopped
-from cosim.schedule import Port
+from cosim.schedule import DivergedError, Port
 from cosim.transfer import PAGE, EndOfRun, Outlets, Source, sources
 
 
@@ -45,6 +46,9 @@ def run_lockstep(process: Process, service: Service, owns_time: bool) -> None:
                 return
     except EndOfRun:
         return
+    except DivergedError as error:  # said before the end is
+        process.bus.publisher(f"{process.space}/{DIVERGED_KEY}/{process.name}")(str(error).encode(), 0)
+        raise
     finally:
         outlets.end(graph.tick)
     raise Stopped

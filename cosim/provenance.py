@@ -10,6 +10,7 @@ from cosim.serialise import digest, to_json
 from cosim.setup import Setup
 
 SETUP_FILE = "setup.json"
+FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended before its time: why, and whether it diverged
 
 
 def metadata(setup: Setup, mode: str) -> dict[str, str]:
@@ -27,6 +28,16 @@ def metadata(setup: Setup, mode: str) -> dict[str, str]:
         "coupling": setup.coupling,
         **{f"solver_{key}": str(value) for key, value in solver.items()},
     }
+
+
+def failure(text: str, diverged: bool = False) -> dict[str, str]:
+    """Further entries for a run that ended before its time.
+
+    Args:
+        text: why.
+        diverged: whether a state was no longer sound.
+    """
+    return {FAILURE: text, **({DIVERGED: "yes"} if diverged else {})}
 
 
 def attachments(setup: Setup, sources: Mapping[str, str]) -> dict[str, bytes]:

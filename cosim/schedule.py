@@ -32,6 +32,10 @@ class LockStepError(RuntimeError):
     """The lock step cannot go on; the text says who waits for what."""
 
 
+class DivergedError(LockStepError):
+    """A state is not sound: no longer finite, or where its coordinates end."""
+
+
 @leaf
 def due(tick: int, period: int, delay: int) -> int:
     """The tick with which the message due at `tick` is stamped; -1 where none is."""

@@ -5,11 +5,12 @@ from collections.abc import Iterable
 
 from cosim.bundle import unpack_batch
 from cosim.bus import ZenohBus
-from cosim.keys import ALIVE_KEY, BATCH_KEY, COMPILING_KEY, WAITING_KEY
+from cosim.keys import ALIVE_KEY, BATCH_KEY, COMPILING_KEY, DIVERGED_KEY, WAITING_KEY
 from messages.topics import Topic
 
 STALL = 2.5  # [s] without any message after which somebody is held to be frozen
 WATCHER = "mission"  # whoever watches, among the participants
+HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY)
 
 
 class Watch:
@@ -21,6 +22,7 @@ class Watch:
         self.newest: dict[Topic, bytes] = {}
         self.waiting: dict[str, str] = {}
         self.compiling = False  # somebody compiles kernels
+        self.diverged = False  # a state is no longer sound: the run ends, and its log says why
         self.present: set[str] = set()
         self.gone: set[str] = set()
         self.time_ns = 0  # up to which everybody who has spoken has come
@@ -29,7 +31,7 @@ class Watch:
         self.wall = 0.0  # [s] from the first batch to the newest
         self.ended = False  # somebody has handed over the last tick
         self.last_news = time.monotonic()
-        self._news = bus.subscribe(*(f"{space}/{key}/*" for key in (BATCH_KEY, WAITING_KEY, COMPILING_KEY)))
+        self._news = bus.subscribe(*(f"{space}/{key}/*" for key in HEARD))
         bus.watch_alive(f"{space}/{ALIVE_KEY}/*", self._alive)
 
     def _alive(self, key: str, alive: bool) -> None:
@@ -51,6 +53,9 @@ class Watch:
             head, _, name = key.removeprefix(f"{self._space}/").partition("/")
             if head == COMPILING_KEY:
                 self.compiling = True
+                continue
+            if head == DIVERGED_KEY:
+                self.diverged = True
                 continue
             if head == WAITING_KEY:
                 self.waiting[name] = payload.decode()

@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from lapwing.flight import Flight
     from lapwing.simulator import Observation, Simulator
     from services.common.ports import Reference
+    from studies.events import Event
+    from studies.verdict import Verdict
 
 _WHERE = {
+    "Event": "studies.events",
     "Flight": "lapwing.flight",
     "LockStepError": "cosim.schedule",
     "Observation": "lapwing.simulator",
@@ -31,6 +34,7 @@ _WHERE = {
     "Scene": "cosim.scene",
     "SceneError": "cosim.scene",
     "Simulator": "lapwing.simulator",
+    "Verdict": "studies.verdict",
     "campaign": "lapwing.api",
     "choice": "lapwing.distributions",
     "fly": "lapwing.api",
@@ -41,6 +45,7 @@ _WHERE = {
 }
 
 __all__ = [
+    "Event",
     "Flight",
     "LockStepError",
     "Observation",
@@ -48,6 +53,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulator",
+    "Verdict",
     "campaign",
     "choice",
     "fly",

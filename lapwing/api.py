@@ -45,8 +45,8 @@ def fly(
 ) -> Flight:
     """Fly a scene in this process, as fast as it goes; the flight stays in memory.
 
-    Where a state ceases to be sound, or the controller fails in the air, the flight ends there, and
-    `Flight.failure` says why.
+    Where a state ceases to be sound, or the controller fails in the air, the flight ends there; its `verdict` says so,
+    and `failure` why.
 
     Args:
         scene: what to fly: a path, a name, or a loaded one.

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.graph import pages_of
 from cosim.log import LogWriter
-from cosim.provenance import attachments, metadata
+from cosim.provenance import attachments, failure, metadata
 from cosim.recording import Recording
 from studies import flight as studied
 from studies.flight import topic_of
@@ -51,7 +51,8 @@ class Flight(studied.Flight):
             said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
         pages = pages_of(said)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
-        with LogWriter(target, metadata(setup, "memory"), attachments(setup, {})) as writer:
+        about = metadata(setup, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
+        with LogWriter(target, about, attachments(setup, {})) as writer:
             Recording(writer, setup).write(pages, last)
         return target
 

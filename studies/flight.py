@@ -9,19 +9,19 @@ import numpy as np
 
 from cosim.graph import Graph
 from cosim.log import LogReader
+from cosim.provenance import DIVERGED, FAILURE
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
 from messages.topics import Topic, topic_named
 from studies import tracking
+from studies.events import Event, events
 from studies.origin import Origin
 from studies.port_columns import columns_of
 from studies.topic_view import TopicView
+from studies.verdict import Verdict, judge
 
 AXES = tuple(tracking.AXES)
-SLOW = 0.5  # [m/s] a vehicle that has landed moves less
-UPRIGHT = np.cos(np.radians(30.0))  # and is tilted less
-RESTING = 0.1  # [m] from the height at which it stood at first; for plants that tell of no contact
 
 
 class Flight:
@@ -33,11 +33,12 @@ class Flight:
         origin: where it comes from, with the log's metadata.
         vehicle: name.
         failure: why it ended before its time; "" where it did not, or where a log does not say.
+        diverged: whether that is a state that was no longer finite.
     """
 
-    def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = ""):
+    def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
         """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
-        self.origin, self.vehicle, self.failure = origin, origin.vehicle, failure
+        self.origin, self.vehicle, self.failure, self.diverged = origin, origin.vehicle, failure, diverged
         self._topics = dict(topics)
 
     @classmethod
@@ -62,24 +63,26 @@ class Flight:
                 name.removeprefix(prefix).removeprefix("/"): TopicView(*columns)
                 for name, columns in log.histories(own).items()
             }
-            return cls(views, Origin.of_log(str(path), named, log.metadata, log.attachments))
+            failure = log.metadata.get(FAILURE, "")
+            diverged = log.metadata.get(DIVERGED) == "yes"
+            return cls(views, Origin.of_log(str(path), named, log.metadata, log.attachments), failure, diverged)
 
     @classmethod
-    def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "") -> Self:
+    def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False) -> Self:
         """A flight that was flown in this process.
 
         Args:
             graph: at the end; its rows keep all ticks of what these topics are made of.
             only: the topics wanted, None for all that are recorded.
             failure: why it ended before its time.
+            diverged: whether that is a state that was no longer finite.
         """
         said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
-        return cls(said, Origin.of_setup(graph.setup), failure)
+        return cls(said, Origin.of_setup(graph.setup), failure, diverged)
 
     def __repr__(self) -> str:
-        end = self.truth.times[-1] if len(self.truth) else 0.0
-        how = self.failure or ("landed" if self.landed else "not landed")
-        return f"<Flight of {self.metadata.get('scene', self.origin.source)}, {end:.2f} s: {how}>"
+        said = str(self.verdict) if len(self.truth) else "nothing was flown"
+        return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {said}>"
 
     @property
     def setup(self) -> Setup:
@@ -204,15 +207,22 @@ class Flight:
         return self.has("status") and bool(self.status.finished[-1])
 
     @cached_property
+    def verdict(self) -> Verdict:
+        """How it ended: `kind` is "landed", "crashed", "timed out", "diverged", "broken off" or "flown"."""
+        no_end = self.origin.recorded and not self.digest
+        failure = self.failure or ("the log has no end" if no_end else "")
+        return judge(self.truth, self.status if self.has("status") else None, failure, self.diverged)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """What happened, in order: arming, modes, phases, failsafes, faults, saturation, contact."""
+        status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
+        return events(self.truth, status, setpoint, self.armed, self.origin.scene)
+
+    @property
     def landed(self) -> bool:
         """Whether the mission has ended on the ground: as the autopilot says, and upright, slow and in contact."""
-        if not (self.finished and self.status.landed[-1]):
-            return False
-        truth = self.truth
-        height, (x, y) = truth.position[:, 2], truth.orientation[-1, :2]
-        resting = truth.ground_contact[-1] or abs(height[-1] - height[0]) < RESTING
-        upright = 1.0 - 2.0 * (x * x + y * y) > UPRIGHT
-        return bool(resting and upright and np.linalg.norm(truth.velocity[-1]) < SLOW)
+        return self.verdict.kind == "landed"
 
     def to_dataframe(self, topic: str = "truth") -> Any:
         """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from cosim.graph import Graph
 from cosim.scene import Scene
-from cosim.schedule import LockStepError
+from cosim.schedule import DivergedError, LockStepError
 from cosim.setup import Setup
 from messages.topics import Topic
 from services.common.operator import Operator, nobody
@@ -24,7 +24,7 @@ def fly(
     operator: Operator = nobody,
     kind: type[F] = Flight,  # type: ignore[assignment]
 ) -> F:
-    """Fly to the end, or until a state is not sound: `Flight.failure` then says why.
+    """Fly to the end, or until a state is not sound: the verdict then says so.
 
     Args:
         run: what to fly.
@@ -36,9 +36,9 @@ def fly(
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
     wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else wire.topic in only)}
-    graph, failure = Graph(setup, services, PAGE, wanted), ""
+    graph, failure, diverged = Graph(setup, services, PAGE, wanted), "", False
     try:
         graph.advance(setup.last_tick + 1)
     except LockStepError as error:
-        failure = str(error)
-    return kind.of(graph, only, failure)
+        failure, diverged = str(error), isinstance(error, DivergedError)
+    return kind.of(graph, only, failure, diverged)

@@ -6,6 +6,13 @@ from scipy.spatial.transform import Rotation
 TURN = 2.0 * np.pi
 AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
 
+DEGREE = np.pi / 180.0  # [rad]
+
+
+def shown(axis: str) -> tuple[str, float]:
+    """The unit in which people are shown an axis, and how many of it are 1 m or 1 rad: angles in degrees."""
+    return ("°", 1.0 / DEGREE) if AXES[axis] == "rad" else ("m", 1.0)
+
 
 def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw [rad] of unit quaternions of shape (n, 4), shape (n, 3); yaw without jumps."""

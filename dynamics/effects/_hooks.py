@@ -27,6 +27,8 @@ and between evaluations:
     substeps  (e, memory, motion, h) -> int            how many steps to split the next one into, when awake
     settle    (e, memory, motion, h) -> memory         after every step, when awake
     contact   (e, memory, s) -> bool                   does the vehicle touch the ground?
+    wind      (e, memory, wind) -> wind                [m/s] world: for the log, of an effect that blows without moving
+                                                       the air that others feel
 
 While all effects that can sleep are asleep, steps are taken without them, at no cost but the question.
 
@@ -74,6 +76,7 @@ settle = _hook("settle")
 substeps = _hook("substeps")
 contact = _hook("contact")
 asleep = _hook("asleep")
+wind = _hook("wind")
 
 
 def initial_memory(e: Any) -> tuple:
@@ -125,6 +128,7 @@ all_air = _chain("air", "s, ")
 all_factors = _chain("factors", "s, ")
 all_loads = _chain("loads", "s, factors, ")
 all_supply = _chain("supply")
+all_winds = _chain("wind")
 all_torques = _written_out(
     "all_torques",
     "torque",

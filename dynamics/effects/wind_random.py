@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from dynamics.effects._hooks import sample, wrench
+from dynamics.effects._hooks import sample, wind, wrench
 from dynamics.noise import normal3
 from dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
 
@@ -28,20 +28,26 @@ class WindRandom(NamedTuple):
     density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
     shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
 
-    def initial_memory(self) -> Vec3:
-        """No force before the first exchange."""
-        return ZERO
+    def initial_memory(self) -> tuple[Vec3, Vec3]:
+        """The force and the wind: none before the first exchange."""
+        return ZERO, ZERO
 
 
 @sample(WindRandom)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """The force [N] in world coordinates for the next interval."""
-    wind = add(e.mean, scale(e.sigma, normal3(key, tick, LANE)))
-    v = subtract(wind, s.motion.velocity_world)
-    return scale(0.5 * e.shape_coefficient * e.area * e.density * norm(v), v)
+    """Force [N] and wind [m/s] in world coordinates for the next interval."""
+    drawn = add(e.mean, scale(e.sigma, normal3(key, tick, LANE)))
+    v = subtract(drawn, s.motion.velocity_world)
+    return scale(0.5 * e.shape_coefficient * e.area * e.density * norm(v), v), drawn
 
 
 @wrench(WindRandom)
 def wind_random(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
-    return memory, NOTHING
+    return memory[0], NOTHING
+
+
+@wind(WindRandom)
+def told(e, memory, before):
+    """The wind [m/s] that the force is made of, added."""
+    return add(before, memory[1])

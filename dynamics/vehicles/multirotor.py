@@ -89,7 +89,7 @@ class MultirotorObservation(NamedTuple):
     motor_current: PerRotor  # [A]
     motor_power: PerRotor  # [W] taken by each motor
     air_density: float  # [kg/m^3]
-    wind_world: Vec3  # [m/s]
+    wind_world: Vec3  # [m/s] of the air and of winds that are forces only
     mass: float  # [kg]
     in_contact: bool
     battery: tuple[float, float, float]  # charge (fraction, NaN where no effect counts it), voltage [V], current [A]
@@ -296,7 +296,7 @@ def observe(p, tick, interval, state, command):
         rotors.current,
         each(_product, 0.0, rotors.voltage, rotors.current),
         s.air.density,
-        s.air.wind_world,
+        hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
         hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current))),

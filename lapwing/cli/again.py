@@ -88,13 +88,12 @@ def refly(
     run_code: Annotated[bool, typer.Option("--run-code", help="run the Python modules that the log carries")] = False,
 ) -> None:
     """Fly a log's scene again with the recorded commands at their ticks: the same digest, or exit code 1."""
-    from rich.console import Console
-
     from lapwing.cli.progress import Display
     from lapwing.runs import refly as again
+    from studies.terminal import console
 
     with user_errors():
-        with Display(Console(), 0.0) as display:
+        with Display(console(), 0.0) as display:
             before, after = again.refly(log, display, run_code)
         if before != after:
             fail(f"{log}: digest {before}, flown again {after}: not the same", 1)

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import typer
 
 USER_ERROR = 2
+FLIGHT_FAILED = 4  # the scene's `run.failed` names the verdict on the flight
 
 
 @contextmanager

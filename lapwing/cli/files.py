@@ -42,6 +42,14 @@ def left_as_it_was(log: Path) -> Iterator[None]:
             log.parent.rmdir()
 
 
+def written(path: Path) -> int | None:
+    """When a file was written last [ns]; None where it is not there."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return None
+
+
 def check_distinct(paths: dict[str, Path | None]) -> None:
     """Refuse two options that name the same file."""
     names: dict[Path, str] = {}

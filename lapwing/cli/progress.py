@@ -31,7 +31,7 @@ class Display:
                 BarColumn(bar_width=24),
                 TextColumn("{task.completed:6.1f} / {task.total:.0f} s"),
                 _Factor(),
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 console=console,
                 transient=True,
             )

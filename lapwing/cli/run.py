@@ -7,8 +7,8 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided, warn_of_gains
-from lapwing.cli.errors import user_errors
-from lapwing.cli.files import check_distinct, check_report, check_writable, left_as_it_was, log_path
+from lapwing.cli.errors import FLIGHT_FAILED, fail, user_errors
+from lapwing.cli.files import check_distinct, check_report, check_writable, left_as_it_was, log_path, written
 from lapwing.cli.links import check_links
 from lapwing.cli.options import (
     Insecure,
@@ -24,7 +24,6 @@ from lapwing.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from cosim.scene import Scene
     from lapwing.runs.observer import Elapsed
     from services.participant import Participation
 
@@ -58,6 +57,7 @@ def run(
 ) -> None:
     """Fly a scene, record it, and report."""
     from cosim.watch import WATCHER
+    from lapwing.cli import summary
     from lapwing.runs.joined import check_endpoint, parse_external, parse_peers
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan
@@ -105,17 +105,25 @@ def run(
             insecure=insecure,
             external=parse_external(external or [], setup),
         )
-        _conclude(loaded, given, path, _fly(given, path), json, report)
+        elapsed, before = None, written(path)
+        try:
+            elapsed = _fly(given, path)
+        finally:  # what was flown before an error or Ctrl-C has its verdict, too
+            mine = elapsed is not None or (table is None and written(path) != before)
+            flown = summary.flown(path) if mine else None
+            if flown is not None:
+                summary.conclude(loaded, given, flown, elapsed, json, report)
+        if flown is not None and flown.verdict.kind in loaded[Run].failed:
+            fail(f"the flight has failed: {flown.verdict.kind}", FLIGHT_FAILED)
 
 
 def _fly(given: "Participation", log: Path) -> "Elapsed":
-    from rich.console import Console
-
     from lapwing.cli.progress import Display
     from services.processes import MAVLINK
+    from studies.terminal import console
 
     setup = given.setup
-    with left_as_it_was(log), Display(Console(), setup.duration) as display:
+    with left_as_it_was(log), Display(console(), setup.duration) as display:
         if given.mode == "single":
             from lapwing.runs.single import fly_single
 
@@ -127,30 +135,3 @@ def _fly(given: "Participation", log: Path) -> "Elapsed":
         from lapwing.runs.processes import fly_processes
 
         return fly_processes(given, display, [MAVLINK] if given.mavlink else [])
-
-
-def _conclude(
-    scene: "Scene", given: "Participation", log: Path, elapsed: "Elapsed", json: Path | None, report: Path | None
-) -> None:
-    from rich.console import Console
-
-    from lapwing.cli import summary
-    from lapwing.flight import Flight
-
-    flown = Flight.read(log)
-    result = {
-        "scene": scene.name,
-        "seed": given.setup.seed,
-        "mode": given.mode,
-        "digest": flown.digest,
-        "sim_time_s": elapsed.simulated,
-        "wall_time_s": elapsed.wall,
-        "real_time_factor": elapsed.simulated / elapsed.wall if elapsed.wall else 0.0,
-        "rmse": flown.rmse,
-        "landed": flown.landed,
-        "log": str(log),
-        "report": str(flown.report(report)),
-    }
-    if json:
-        summary.write_json(json, result)
-    summary.show(Console(), scene, result)

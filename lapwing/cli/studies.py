@@ -55,12 +55,11 @@ def performance(
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures as JSON")] = None,
 ) -> None:
     """Hover time, payload, range, ceiling, tilt and speed from the models, beside published figures."""
-    from rich.console import Console
-
     from studies import performance as study
+    from studies.terminal import console
 
     with user_errors():
-        _study("SCENE|VEHICLE", subject, json, None, Console(), lambda: study.card(subject), study)
+        _study("SCENE|VEHICLE", subject, json, None, console(), lambda: study.card(subject), study)
 
 
 @app.command()
@@ -72,21 +71,20 @@ def effects(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
 ) -> None:
     """What each effect of a scene costs and changes, and which of them it could do without."""
-    from rich.console import Console
-
     from services.table import load
     from studies.effects import show
     from studies.effects.study import Study, study
+    from studies.terminal import console
 
     with user_errors():
         if not within > 0.0:
             raise ValueError(f"--within {within:g}: expected a distance above 0 m")
-        console = Console()
+        screen = console()
 
         def find() -> Study:
-            return study(load(scene, set_ or []), within, lambda text: console.print(text, highlight=False))
+            return study(load(scene, set_ or []), within, screen.print)
 
-        _study("SCENE", scene, json, plot, console, find, show)
+        _study("SCENE", scene, json, plot, screen, find, show)
 
 
 @app.command()
@@ -141,24 +139,24 @@ def campaign(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the distribution (PNG, SVG or PDF)")] = None,
 ) -> None:
     """Fly a scene with many seeds, in one compiled closed loop: errors as a distribution, and crashes."""
-    from rich.console import Console
     from rich.progress import Progress
 
     from services.table import load
     from studies.campaign import show, study
+    from studies.terminal import console
 
     with user_errors():
         if seeds < 1:
             raise ValueError(f"--seeds {seeds}: expected at least 1")
-        console = Console()
+        screen = console()
 
         def fly() -> study.Campaign:
             loaded = load(scene, set_ or [])
-            with Progress(console=console, transient=True) as progress:
+            with Progress(console=screen, transient=True) as progress:
                 task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
                 return study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
 
-        _study("SCENE", scene, json, plot, console, fly, show)
+        _study("SCENE", scene, json, plot, screen, fly, show)
 
 
 @app.command()
@@ -186,10 +184,10 @@ def tune(
     ] = None,
 ) -> None:
     """Design gains about hover for bandwidth, 45 degrees and 6 dB in every loop, then polish them in flight."""
-    from rich.console import Console
     from rich.progress import Progress
 
     from services.table import load
+    from studies.terminal import console
     from studies.tune import polish, show, study
     from studies.tune import report as page
 
@@ -199,15 +197,15 @@ def tune(
             if path and path.suffix != ending:
                 raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
             check_writable(path)
-        wanted, console = Bandwidths(altitude, yaw, attitude, position), Console()
-        with Progress(console=console, transient=True) as progress:
+        wanted, screen = Bandwidths(altitude, yaw, attitude, position), console()
+        with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
 
             def say(text: str) -> None:
                 progress.console.print(text, highlight=False, soft_wrap=True)
 
             found = study.tune(load(scene, set_ or []), wanted, say, log, lambda: progress.advance(task))
-        show.show(console, found)
+        show.show(screen, found)
         if out:
             study.write(out, found.gains)
             typer.echo(f'{out}: a scene beside it names it with [autopilot] gains = "{out.name}"')

@@ -1,16 +1,73 @@
-"""What a run comes to: the figures that `lapwing run` prints and writes as JSON."""
+"""What a run comes to: the verdict, the events and the figures that `lapwing run` prints and writes as JSON."""
 
 import json
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
 from cosim.scene import Scene
+from lapwing.flight import Flight
 from services.common.sections import Published
+from studies import terminal
+from studies.tracking import shown
 
-AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}
+if TYPE_CHECKING:
+    from lapwing.runs.observer import Elapsed
+    from services.participant import Participation
+
+MOST = 60  # events that are printed
+COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all others
+
+
+def flown(log: Path) -> Flight | None:
+    """The flight of a log, None where nothing was flown."""
+    try:
+        found = Flight.read(log)
+    except ValueError:
+        return None
+    return found if len(found.truth) else None
+
+
+def conclude(
+    scene: Scene,
+    given: "Participation",
+    flight: Flight,
+    elapsed: "Elapsed | None",
+    write_to: Path | None,
+    report: Path | None,
+) -> None:
+    """Write report and figures, and print them.
+
+    Args:
+        scene: that was flown.
+        given: how.
+        flight: as its log has it.
+        elapsed: how long it took; None where it was ended before its time.
+        write_to: the JSON file, if any.
+        report: the report's path, None for the log's with another ending.
+    """
+    verdict, simulated = flight.verdict, float(flight.truth.times[-1])
+    result = {
+        "scene": scene.name,
+        "seed": given.setup.seed,
+        "mode": given.mode,
+        "digest": flight.digest,
+        "verdict": {"text": str(verdict), **verdict._asdict()},
+        "events": [event._asdict() for event in flight.events],
+        "sim_time_s": elapsed.simulated if elapsed else simulated,
+        "wall_time_s": elapsed.wall if elapsed else None,
+        "real_time_factor": (elapsed.simulated / elapsed.wall if elapsed.wall else 0.0) if elapsed else None,
+        "rmse": flight.rmse,
+        "landed": flight.landed,
+        "log": str(flight.origin.source),
+        "report": str(flight.report(report)),
+    }
+    if write_to:
+        write_json(write_to, result)
+    show(terminal.console(), scene, result)
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
@@ -20,26 +77,46 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print `result` for people."""
-    published = scene[Published]
-    if result["rmse"]:
-        console.print("Root-mean-square error against the reference")
-        table = Table()
-        table.add_column("axis")
-        table.add_column("this run", justify="right")
+    _events(console, result["events"])
+    _errors(console, scene[Published], result["rmse"])
+    verdict = result["verdict"]
+    console.print(verdict["text"], style=f"bold {COLOURS.get(verdict['kind'], 'red')}")
+    if result["wall_time_s"] is not None:
+        console.print(
+            f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
+            f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
+            highlight=False,
+        )
+    for name in ("digest", "log", "report"):
+        if result[name]:
+            console.print(f"{name:<7} {result[name]}", soft_wrap=True)
+
+
+def _events(console: Console, events: list[dict[str, Any]]) -> None:
+    if not events:
+        return
+    table = Table("time [s]", "event", "", box=None, pad_edge=False, header_style="dim")
+    table.columns[0].justify = "right"
+    for event in events[:MOST]:
+        table.add_row(f"{event['time']:.2f}", event["kind"], event["text"])
+    console.print(table)
+    if len(events) > MOST:
+        console.print(f"and {len(events) - MOST} more events: the report and --json have all of them")
+
+
+def _errors(console: Console, published: Published, rmse: dict[str, float]) -> None:
+    if not any(map(math.isfinite, rmse.values())):
+        return  # there is no reference, or the motors were never armed
+    console.print("Root-mean-square error against the reference")
+    table = Table()
+    table.add_column("axis")
+    table.add_column("this run", justify="right")
+    if published.rmse:
+        table.add_column(published.source, justify="right")
+    for axis, value in rmse.items():
+        unit, scale = shown(axis)
+        row = [f"{axis} [{unit}]", f"{scale * value:.4f}"]
         if published.rmse:
-            table.add_column(published.source, justify="right")
-        for axis, value in result["rmse"].items():
-            row = [f"{axis} [{AXES[axis]}]", f"{value:.4f}"]
-            if published.rmse:
-                row.append(f"{published.rmse[axis]:.4f}" if axis in published.rmse else "")
-            table.add_row(*row)
-        console.print(table)
-    console.print(
-        f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
-        f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
-        highlight=False,
-    )
-    console.print(f"digest  {result['digest']}", soft_wrap=True, highlight=False)
-    console.print(f"log     {result['log']}", soft_wrap=True, highlight=False)
-    if result["report"]:
-        console.print(f"report  {result['report']}", soft_wrap=True, highlight=False)
+            row.append(f"{scale * published.rmse[axis]:.4f}" if axis in published.rmse else "")
+        table.add_row(*row)
+    console.print(table)

@@ -25,7 +25,7 @@ take body to world; they are (w, x, y, z) in tuples, and (x, y, z, w) in message
 numpy's, and their first axis is time.
 
 Whatever a user can mend is a `lapwing.SceneError` or another `ValueError` of one line: where, which key, what is wrong,
-what would be right. A flight that ends before its time says why in `Flight.failure`.
+what would be right. How a flight ended is its `Flight.verdict`.
 """
 
 TOPICS_HEAD = """\
@@ -42,10 +42,11 @@ Named in a scene, or given to `lapwing.fly(scene, estimator=MyEstimator)`."""
 
 SECTION = re.compile(r"^(Args|Returns|Raises|Attributes|Yields):$")
 FUNCTIONS = ("load", "fly", "read", "campaign", "normal", "uniform", "choice")
-CLASSES = ("Flight", "Simulator", "Observation", "Scene", "SceneError", "LockStepError")
+CLASSES = ("Flight", "Verdict", "Event", "Simulator", "Observation", "Scene", "SceneError", "LockStepError")
 SHOWN = {  # of classes that have more than what a user calls
     "Flight": (
-        *("rmse", "errors", "reference", "armed", "landed", "finished", "energy", "truth", "estimate", "setpoint"),
+        *("rmse", "errors", "reference", "armed", "verdict", "events", "landed", "finished"),
+        *("energy", "truth", "estimate", "setpoint"),
         *("actuators", "status", "topics", "setup", "metadata", "digest"),
         *("topic", "has", "times", "to_dataframe", "save", "report", "plot"),
     ),

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from cosim.graph import Graph
-from cosim.interrupt import Stop
+from cosim.interrupt import Interrupted, Stop
 from cosim.log import LogWriter
-from cosim.provenance import attachments, metadata
+from cosim.provenance import attachments, failure, metadata
 from cosim.recording import Recording
+from cosim.schedule import DivergedError, LockStepError
 from cosim.setup import Setup
 from cosim.single import PAGE, run_single
 from lapwing.runs.compiling import told
@@ -27,7 +28,7 @@ def fly_single(
     operator: Callable[[int], Iterable[Any]] | None = None,
     last: int | None = None,
 ) -> Elapsed:
-    """Fly with all services in this process.
+    """Fly with all services in this process, to the end or until a state is not sound; the log then says so.
 
     Args:
         setup: what to fly.
@@ -39,7 +40,7 @@ def fly_single(
         last: the tick after which to stop, None for the end of the run.
 
     Raises:
-        LockStepError: a state is not sound.
+        LockStepError: an own controller or estimator failed.
         ValueError: the log cannot be written.
         Interrupted: ended by a signal.
     """
@@ -56,7 +57,14 @@ def fly_single(
 
         watcher.begin()
         started = time.perf_counter()
-        run_single(graph, recording, speed, observe, last)
+        try:
+            run_single(graph, recording, speed, observe, last)
+        except LockStepError as error:
+            writer.metadata |= failure(str(error), isinstance(error, DivergedError))
+            if not isinstance(error, DivergedError):
+                raise
         wall = time.perf_counter() - started
+        if stop.number is not None:
+            writer.metadata |= failure(str(Interrupted(stop.number)))
         stop.check()
     return Elapsed((graph.tick - 1) * setup.interval, wall)

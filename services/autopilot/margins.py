@@ -14,8 +14,10 @@ FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 25
 class Margins(NamedTuple):
     """How far a loop is from instability."""
 
-    crossover: float  # the highest frequency of unit gain [rad/s]
-    phase: float  # least phase margin over all crossings of unit gain [rad]
+    crossover: (
+        float  # the highest frequency of unit gain [rad/s]; inf or 0 where the gain is above or below 1 throughout
+    )
+    phase: float  # least phase margin over all crossings of unit gain [rad]; inf without one
     gain: float  # factor on the gain that makes the loop unstable, from above
     reduction: float  # factor below 1 on the gain that makes it unstable, 0 where none does
 
@@ -79,8 +81,8 @@ def margins(loop: np.ndarray) -> Margins:
     at = size[turn]
     above, below = at[at < 1.0], at[at >= 1.0]
     return Margins(
-        crossover=float(FREQUENCIES[unit[-1]]),
-        phase=float(np.min(np.abs(np.angle(-loop[unit])))),
+        crossover=float(FREQUENCIES[unit[-1]]) if unit.size else np.inf if size[-1] > 1.0 else 0.0,
+        phase=float(np.min(np.abs(np.angle(-loop[unit])), initial=np.inf)),
         gain=float(1.0 / above.max()) if above.size else np.inf,
         reduction=float(1.0 / below.min()) if below.size else 0.0,
     )

@@ -21,6 +21,9 @@ class Run(Section):
     seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
     duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
     settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
+    failed: tuple[Literal["crashed", "timed out", "diverged"], ...] = Field(
+        default=("crashed", "diverged"), strict=False
+    )  # verdicts with which a run has failed: exit code 4
     speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
 
 

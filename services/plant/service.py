@@ -8,7 +8,7 @@ from numba import types
 
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
-from cosim.schedule import LockStepError
+from cosim.schedule import DivergedError
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks
@@ -49,17 +49,17 @@ def create(setup: Setup) -> Service:
 
 
 def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:
-    def error(tick: int) -> LockStepError:
+    def error(tick: int) -> DivergedError:
         x, t = read(state), tick * setup.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
-            return LockStepError(
+            return DivergedError(
                 f"the multirotor: {plant.wiring.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
                 'Euler angles end; multibody.coordinates = "se3" has no such place'
             )
         system = "the multirotor" if isinstance(x, MultirotorPlantState) else plant.model
         motion = x.vehicle.motion if isinstance(x, MultirotorPlantState) else x
         where = f"{system}: not finite at t = {t:g} s: {not_finite(motion)}"
-        return LockStepError(f"{where}; take a smaller step than {plant.core.step:g} s")
+        return DivergedError(f"{where}; take a smaller step than {plant.core.step:g} s")
 
     return error
 

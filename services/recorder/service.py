@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from cosim.bundle import unpack_batch
-from cosim.keys import BATCH_KEY
+from cosim.keys import BATCH_KEY, DIVERGED_KEY
 from cosim.log import LogWriter
 from cosim.process import Process, Stopped
-from cosim.provenance import attachments, metadata
+from cosim.provenance import attachments, failure, metadata
 from cosim.recording import Recording
 from cosim.wire import Page
 
@@ -17,7 +17,8 @@ from cosim.wire import Page
 def run(process: Process, given: Any) -> None:
     """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
     setup, prefix = process.setup, f"{process.space}/{BATCH_KEY}"
-    batches = process.bus.subscribe(f"{prefix}/*")
+    diverged = f"{process.space}/{DIVERGED_KEY}"
+    news = process.bus.subscribe(f"{prefix}/*", f"{diverged}/*")
     pending = Pending(setup.services)
     about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
     with LogWriter(Path(given.log), about, attachments(setup, given.sources or {})) as writer:
@@ -25,13 +26,16 @@ def run(process: Process, given: Any) -> None:
         try:
             process.join()
             while not pending.ended:
-                key, _, payload = process.patient(batches.get_with_key, pending.waits_for)
+                key, _, payload = process.patient(news.get_with_key, pending.waits_for)
+                if key.startswith(diverged):
+                    writer.metadata |= failure(payload.decode(), diverged=True)
+                    continue
                 pending.add(key.rsplit("/", 1)[1], payload)
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)
         except Stopped:
-            pass
+            writer.metadata = failure("the run was ended") | writer.metadata
 
 
 class Pending:

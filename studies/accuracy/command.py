@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
+from studies import terminal
 from studies.accuracy import apart, scenes, table
 from studies.accuracy import plot as picture
 from studies.accuracy.apart import Part
@@ -30,7 +31,7 @@ class Study(NamedTuple):
 
 def console() -> Console:
     """Where it is shown."""
-    return Console(width=None if sys.stdout.isatty() else WIDTH)
+    return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 
 def study(screen: Console, target: str, overrides: list[str], goal: float | None) -> Study:

@@ -30,17 +30,19 @@ def sentence(point: Point, unit: str) -> str:
 def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
     """Print, of each method, its cheapest points at a few errors."""
     console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
-    table = Table(box=SIMPLE, pad_edge=False)
-    table.add_column("method (order)", no_wrap=True)
-    for name in ("step", "error", "time (ms)", "evaluations", *[f"drift of\n{n}" for n in _drifts(points)]):
+    table = Table(box=None, pad_edge=False, collapse_padding=True)
+    table.add_column("method (order)\n    step")
+    drifts = ["drift of\n" + name.replace(" ", "\n") for name in _drifts(points)]
+    for name in ("error", "time\n[ms]", "evaluations", *drifts):
         table.add_column(name, justify="right", no_wrap=True)
     before = None
     for point in telling(points, LEVELS):
-        head = f"{point.way} ({point.order})" if point.way != before else ""
-        drifts = [f"{point.drift[n]:.0e}" for n in _drifts(points)]
+        if point.way != before:
+            table.add_row(f"{point.way} ({point.order})")
         table.add_row(
-            head, setting(point, problem.unit), f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
-            "" if point.evaluations is None else str(point.evaluations), *drifts,
+            f"    {setting(point, problem.unit)}", f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
+            "" if point.evaluations is None else str(point.evaluations),
+            *(f"{point.drift[n]:.0e}" for n in _drifts(points)),
         )  # fmt: skip
         before = point.way
     console.print(table)

@@ -6,9 +6,8 @@ import numpy as np
 
 from studies import tracking
 from studies.flight import Flight
+from studies.verdict import Verdict
 
-HARD = 2.0  # [m/s] downwards at the first touch: a crash
-UPSIDE = 0.0  # cosine of the tilt below which the vehicle has turned over: a crash
 SURE = 3.0  # standard deviations of its own that the estimate is given
 
 
@@ -23,7 +22,12 @@ class Figures(NamedTuple):
     touchdown: float  # [m/s] speed downwards at the hardest touch
     energy: float  # [J] electrical
     duration: float  # [s]
-    crash: str  # "", or how
+    verdict: Verdict
+
+    @property
+    def failed(self) -> bool:
+        """Whether it did not land."""
+        return self.verdict.kind != "landed"
 
 
 def figures(seed: int, flight: Flight) -> Figures:
@@ -34,33 +38,14 @@ def figures(seed: int, flight: Flight) -> Figures:
     estimated = tracking.errors(flight.reference, estimate.position[:n], estimate.attitude[:n], armed)
     off = np.abs(estimate.position[:n] - truth.position[:n])[armed]
     inside = (off <= SURE * estimate.position_std[:n][armed]).mean(axis=0) if armed.any() else np.full(3, np.nan)
-    touchdown = _touchdown(flight)
     return Figures(
         seed,
         flight.rmse,
         tracking.rmse(estimated),
         float(np.linalg.norm(true[:, :3], axis=1).max(initial=0.0)),
         (float(inside[0]), float(inside[1]), float(inside[2])),
-        touchdown,
+        flight.verdict.touchdown,
         flight.energy,
         len(truth) * flight.setup.interval,
-        _crash(flight, touchdown),
+        flight.verdict,
     )
-
-
-def _touchdown(flight: Flight) -> float:
-    """The greatest speed downwards [m/s] one tick before a touch; 0 without a touch."""
-    contact = flight.truth.ground_contact
-    touched = np.flatnonzero(contact[1:] & ~contact[:-1])
-    return float(max(-flight.truth.velocity[touched, 2].min(initial=0.0), 0.0))
-
-
-def _crash(flight: Flight, touchdown: float) -> str:
-    x, y = flight.truth.orientation[:, 0], flight.truth.orientation[:, 1]
-    if flight.failure:
-        return "numbers are not finite"
-    if (1.0 - 2.0 * (x * x + y * y) < UPSIDE).any():
-        return "turned over"
-    if touchdown > HARD:
-        return f"hit the ground at {touchdown:.1f} m/s"
-    return "" if flight.finished else "the mission did not end"

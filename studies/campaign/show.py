@@ -12,8 +12,9 @@ from rich.table import Table
 from studies.campaign.study import Campaign, Spread
 from studies.report.paper import styled
 from studies.report.style import AXIS_COLOURS, DPI, FLOWN, REFERENCE, WIDTH
-from studies.tracking import AXES
+from studies.tracking import AXES, shown
 
+LISTED = 10  # flights that did not land, in the terminal
 THIRD = 1.0 / 3.0  # of the published error: what a well-tuned flight is to stay below
 
 
@@ -32,9 +33,11 @@ def show(console: Console, found: Campaign) -> None:
         console.print(f"Least of a flight: {least}", highlight=False)
     if len(seeds) > 1 and all(s.low == s.worst for s in found.rmse.values()):
         console.print("Every seed gives the same flight: nothing in this scene is random", highlight=False)
-    console.print(f"Crashes: {len(found.crashes)} of {len(seeds)}", highlight=False)
-    for f in found.crashes[:10]:
-        console.print(f"  seed {f.seed}: {f.crash}", highlight=False)
+    console.print(f"{len(seeds)} flights: {found.counts}", highlight=False)
+    for f in found.failed[:LISTED]:
+        console.print(f"  seed {f.seed}: {f.verdict}", highlight=False)
+    if len(found.failed) > LISTED:
+        console.print(f"  and {len(found.failed) - LISTED} more: --json has all of them", highlight=False)
 
 
 def _table(console: Console, title: str, spreads: dict[str, Spread], found: Campaign) -> None:
@@ -45,11 +48,11 @@ def _table(console: Console, title: str, spreads: dict[str, Spread], found: Camp
     if found.published:
         table.add_column(found.source, justify="right")
         table.add_column("worst / that", justify="right")
-    for axis, unit in AXES.items():
-        s = spreads[axis]
-        row = [f"{axis} [{unit}]", *(f"{v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.seed)]
+    for axis in AXES:
+        s, (unit, scale) = spreads[axis], shown(axis)
+        row = [f"{axis} [{unit}]", *(f"{scale * v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.seed)]
         if axis in found.published:
-            row += [f"{found.published[axis]:.4f}", f"{s.worst / found.published[axis]:.3f}"]
+            row += [f"{scale * found.published[axis]:.4f}", f"{s.worst / found.published[axis]:.3f}"]
         table.add_row(*row)
     console.print(table)
 
@@ -62,11 +65,11 @@ def write_json(path: Path, found: Campaign) -> None:
 
     data = {
         **found._asdict(),
-        "flights": [f._asdict() for f in found.flights],
+        "flights": [{**f._asdict(), "verdict": f.verdict._asdict()} for f in found.flights],
         "rmse": plain(found.rmse),
         "rmse_estimate": plain(found.rmse_estimate),
         "inside": plain(found.inside),
-        "crashes": [f.seed for f in found.crashes],
+        "failed": [f.seed for f in found.failed],
     }
     path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
 
@@ -97,5 +100,5 @@ def plot(path: Path, found: Campaign) -> None:
             row[0].set_ylabel("share of flights with a smaller error")
         lines, names = panels[0, 0].get_legend_handles_labels()
         figure.legend(lines, names, loc="outside lower center", ncols=len(names))
-        figure.suptitle(f"{found.scene}: {len(found.flights)} flights, {len(found.crashes)} crashes", fontsize=10)
+        figure.suptitle(f"{found.scene}: {found.counts}", fontsize=10)
         figure.savefig(path)

@@ -14,6 +14,7 @@ from studies.campaign.figures import Figures, figures
 from studies.campaign.setup import TOPICS, campaign_setup
 from studies.fly import fly
 from studies.tracking import AXES
+from studies.verdict import KINDS
 
 
 class Spread(NamedTuple):
@@ -36,7 +37,13 @@ class Campaign(NamedTuple):
     rmse: dict[str, Spread]
     rmse_estimate: dict[str, Spread]
     inside: dict[str, Spread]  # x, y, z; the worst is the least
-    crashes: list[Figures]
+    failed: list[Figures]  # that did not land
+
+    @property
+    def counts(self) -> str:
+        """How many flights ended how: "97 landed, 3 crashed"."""
+        kinds = [f.verdict.kind for f in self.flights]
+        return ", ".join(f"{kinds.count(kind)} {kind}" for kind in KINDS if kind in kinds)
 
 
 def campaign(scene: Scene, seeds: Iterable[int], progress: Callable[[], None]) -> Campaign:
@@ -83,7 +90,7 @@ def summary(scene: Scene, flights: list[Figures]) -> Campaign:
         over("rmse"),
         over("rmse_estimate"),
         {axis: spread([(f.inside[i], f.seed) for f in flights], least=True) for i, axis in enumerate("xyz")},
-        [f for f in flights if f.crash],
+        [f for f in flights if f.failed],
     )
 
 

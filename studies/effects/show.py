@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -34,9 +35,9 @@ def show(console: Console, found: Study) -> None:
 
 def _table(console: Console, title: str, found: Study, active: bool) -> None:
     console.print(title)
-    table = Table()
+    table = Table(box=SIMPLE, pad_edge=False)
     table.add_column("effect", no_wrap=True)
-    for column in ("hovering, ns", "share", "standing, ns", "path, m", "end, m", "energy"):
+    for column in ("hovering\n[ns]", "share", "standing\n[ns]", "path [m]", "end [m]", "energy"):
         table.add_column(column, justify="right", no_wrap=True)
     for row in _of(found, active):
         if row.influence is None:

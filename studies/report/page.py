@@ -8,10 +8,11 @@ from jinja2 import Environment, FileSystemLoader
 
 from studies.flight import AXES, Flight
 from studies.report.browser import script
-from studies.report.outcome import differences, facts, verdict
+from studies.report.facts import differences, facts
 from studies.report.sections import Section, labels, sections
-from studies.report.whole import DEGREES
+from studies.tracking import shown
 
+LOOKS = {"landed": "good", "flown": ""}  # of a verdict; "bad" for all others
 _HERE = Path(__file__).parent
 _TEMPLATES = Environment(loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True)
 
@@ -36,7 +37,8 @@ def flight_page(flights: Sequence[Flight]) -> str:
         name=" and ".join(names) if len(flights) > 1 else flights[0].metadata.get("scene") or names[0],
         title=" · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
         labels=names if len(flights) > 1 else (),
-        verdicts=[verdict(flight) for flight in flights],
+        verdicts=[(LOOKS.get(flight.verdict.kind, "bad"), flight.verdict) for flight in flights],
+        events=[flight.events for flight in flights],
         facts={key: [one.get(key, "") for one in told] for key in dict.fromkeys(k for one in told for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},
         accuracy=accuracy(flights, published.get("rmse", {})),
@@ -60,8 +62,8 @@ def accuracy(flights: Sequence[Flight], published: dict[str, float]) -> list[Acc
     if not any(flight.rmse for flight in flights):
         return []
     found = []
-    for index, axis in enumerate(AXES):
-        unit, scale = ("m", 1.0) if index < 3 else ("°", DEGREES)
+    for axis in AXES:
+        unit, scale = shown(axis)
         values = [flight.rmse.get(axis) for flight in flights] + ([published.get(axis)] if published else [])
         found.append(Accuracy(axis, unit, tuple(None if v is None else scale * v for v in values)))
     return found

@@ -7,7 +7,7 @@ import numpy as np
 
 from services.autopilot.gains import GainSet
 from services.autopilot.law import Airframe, build
-from services.autopilot.margins import margins, open_loops, stable
+from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.linearise import Hover
 
@@ -67,6 +67,8 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
         scaled = CORNERS if name in ("altitude", "yaw", "x_plant_input", "y_plant_input") else ()
         if not stable(response):
             found[name] = "unstable"
+        elif not 0.0 < m.crossover < math.inf:
+            found[name] = f"its gain is {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
         elif math.degrees(m.phase) < PHASE:
             found[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
         elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN:

@@ -52,8 +52,8 @@ def polish(
 ) -> Polished:
     """Nelder and Mead's search over the bandwidths that the scene's path says something about, from `start`.
 
-    Its aim is the mean over the axes of the RMSE, each over that of `start`. What crashes or lacks a margin counts
-    as worse than anything that flies. Deterministic: the same scene gives the same gains.
+    Its aim is the mean over the axes of the RMSE, each over that of `start`. What does not land or lacks a margin
+    counts as worse than anything that flies. Deterministic: the same scene gives the same gains.
     """
     plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
     seen: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
@@ -75,7 +75,7 @@ def polish(
         if lacking:
             return 10.0 + len(lacking)
         found = fly(gains)
-        if any(f.crash for f in found):
+        if any(f.failed for f in found):
             return 10.0
         ratio = float(np.mean([rmse(found, axis) / rmse(before, axis) for axis in judged]))
         seen[ratio] = bandwidths, gains, found
@@ -87,6 +87,9 @@ def polish(
     simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
     options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
     minimize(cost, at, method="Nelder-Mead", options=options)
+    if not seen:
+        what = next((str(f.verdict) for f in before if f.failed), "none of those near it holds its margins and lands")
+        raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
     bandwidths, gains, after = seen[min(seen)]
     return Polished(gains, bandwidths, before, after, len(seen))
 

@@ -57,12 +57,13 @@ def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
         for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
             response = control.frequency_response(systems_of[name], OMEGA)
             phase = np.degrees(np.unwrap(response.phase))
-            at = judged.margins[name].crossover
+            crossover = judged.margins[name].crossover
+            at = float(np.clip(crossover, OMEGA[0], OMEGA[-1]))  # for a loop that has one
             phase -= 360.0 * math.ceil(np.interp(math.log(at), np.log(OMEGA), phase) / 360.0)  # in (-360, 0] there
             sizes.append(Line(OMEGA, np.asarray(response.magnitude), judged.name, colour, dash=dash))
             phases.append(Line(OMEGA, phase, judged.name, colour, dash=dash))
             crossing = float(np.interp(math.log(at), np.log(OMEGA), phase))
-            for marks, y in ((sizes, 1.0), (phases, crossing)):
+            for marks, y in ((sizes, 1.0), (phases, crossing)) if at == crossover else ():
                 marks.append(Line(np.array([at]), np.array([y]), colour=colour, marker="circle", joined=False))
         place: dict[str, Any] = {"column": column, "timed": False, "log_x": True}
         label = ("gain", "phase [°]") if column == 0 else ("", "")
@@ -78,7 +79,8 @@ def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
         said = []
         for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
             seconds = 1.5 if axis == "yaw" else 4.0
-            if loop in judged.shortfalls and judged.shortfalls[loop] == "unstable":
+            inner = f"{loop}_plant_input"  # an outer loop falls with its inner one
+            if "unstable" in (judged.shortfalls.get(loop), judged.shortfalls.get(inner)):
                 said.append(f"{judged.name}: unstable")
                 continue
             found = step(systems_of[loop], seconds)

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from services.autopilot.margins import Margins
-from studies.tracking import AXES
+from studies.tracking import AXES, shown
 from studies.tune.identify import LOOPS
 from studies.tune.polish import rmse
 from studies.tune.study import Tuned
@@ -56,6 +56,8 @@ def show(console: Console, found: Tuned) -> None:
 
 def cell(m: Margins) -> str:
     """Margins in few words."""
+    if not 0.0 < m.crossover < math.inf:
+        return f"no crossover: gain {'above' if m.crossover else 'below'} 1"
     up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
     return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
 
@@ -74,15 +76,16 @@ def _errors(found: Tuned) -> Rows:
     assert p is not None
     title = f"RMSE of {len(p.after)} flights of the scene: as designed, and polished ({p.candidates} gain sets flown)"
     rows = Rows(title, "axis", "designed", "polished")
-    for axis, unit in AXES.items():
-        rows.add(f"{axis} [{unit}]", f"{rmse(p.before, axis):.4f}", f"{rmse(p.after, axis):.4f}")
+    for axis in AXES:
+        unit, scale = shown(axis)
+        rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
     return rows
 
 
 def _corners(found: Tuned) -> Rows:
     rows = Rows("The flight with a vehicle that is not as the controller believes", "vehicle", "furthest off, m", "end")
     for corner, f in found.corners.items():
-        rows.add(str(corner), f"{f.worst:.3f}", f.crash or "landed")
+        rows.add(str(corner), f"{f.worst:.3f}", f.verdict.kind)
     return rows
 
 

@@ -11,9 +11,12 @@ from cosim.setup import Setup
 from cosim.single import PAGE, run_single
 from cosim.wire import Page
 from messages.digest import Digest
+from messages.history import history
 from messages.topics import Topic
 from services.processes import create_all
 from services.table import resolve
+from studies.topic_view import TopicView
+from studies.verdict import judge
 
 
 class MemoryLog:
@@ -64,9 +67,13 @@ class MemoryLog:
 
     @property
     def landed(self) -> bool:
-        """Whether the mission has ended on the ground with the motors off."""
-        last = self.messages("status")[-1]
-        return bool(last.finished and last.landed)
+        """Whether the flight's verdict is that it has landed."""
+        return judge(self.view("truth"), self.view("status")).kind == "landed"
+
+    def view(self, name: str) -> TopicView:
+        """A topic as columns."""
+        ticks, payloads = zip(*self.payloads(name), strict=True)
+        return TopicView(np.array(ticks) * self.setup.interval_ns, history(self._topics[name].message, payloads))
 
     @property
     def digest(self) -> str:

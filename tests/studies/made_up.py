@@ -14,7 +14,7 @@ def setup(ticks, rate=100, **resolved):
     return Setup("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "sequential", "drone1", {}, {}, resolved)
 
 
-def flight(ticks, rate=100, failure="", **topics):
+def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
     """A flight of so many ticks; of each topic the columns by dotted name, a value standing for one at every tick."""
     views = {}
     for name, columns in topics.items():
@@ -23,7 +23,7 @@ def flight(ticks, rate=100, failure="", **topics):
             column = np.asarray(value)
             rows[field] = column if column.shape[:1] == (ticks,) else np.broadcast_to(column, (ticks, *column.shape))
         views[name] = TopicView(np.arange(ticks) * (10**9 // rate), rows)
-    return Flight(views, Origin.of_setup(setup(ticks, rate)), failure)
+    return Flight(views, Origin.of_setup(setup(ticks, rate, **(scene or {}))), failure, diverged)
 
 
 def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):

@@ -18,7 +18,7 @@ from cosim.provenance import attachments as attachments_of
 from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
 from studies.flight import AXES, Flight
 from studies.report import browser, picture, plots, write
-from studies.report.outcome import MANY, differences
+from studies.report.facts import MANY, differences
 from studies.report.overlay import overlay
 from studies.report.plots import estimator, motors, position, propulsion
 from studies.report.style import POINTS

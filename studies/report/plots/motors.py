@@ -6,13 +6,13 @@ from studies.flight import Flight
 from studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
 from studies.report.style import BOUND, COLOURS, STEERED
 from studies.report.whole import over
+from studies.saturation import saturation
 
 ORDER = 50
 TITLE = "Motors: speed, voltage and power"
 NEEDS = ("truth",)
 MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
-NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
 
 
 def draw(flight: Flight) -> Plot:
@@ -48,18 +48,13 @@ def limits(flight: Flight) -> tuple[tuple[Level | Line, ...], str]:
     levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")
     if not len(flight.armed):
         return levels, f"Limits of the voltage: 0 and {highest:g} V."
-    n = len(flight.armed)
-    t, voltage = flight.truth.times[:n], flight.truth.motor_voltage[:n]
-    flying = (flight.armed & ~flight.truth.ground_contact[:n])[:, None]
-    low, high = flying & (voltage < NEAR * highest), flying & (voltage > (1.0 - NEAR) * highest)
-    step = np.diff(t, append=t[-1])
-    lasted = step[(low | high).any(axis=1)].sum()
-    if not lasted:
+    t, found = flight.truth.times[: len(flight.armed)], saturation(flight.truth, flight.armed, highest)
+    if not found.lasted:
         return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
-    marks = (*_stretches(t, low, 0.0), *_stretches(t, high, highest))
+    marks = (*_stretches(t, found.low, 0.0), *_stretches(t, found.high, highest))
     return (*levels, *marks), (
-        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for {lasted:.2f} s, "
-        f"{100.0 * lasted / max(step[flying[:, 0]].sum(), 1e-9):.2g} % of that time."
+        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for "
+        f"{found.lasted:.2f} s, {100.0 * found.share(found.lasted):.2g} % of that time."
     )
 
 

@@ -28,6 +28,12 @@ def test_double_integrator_with_pid_can_also_be_too_weak():
     assert m.reduction == pytest.approx(i / (p * d), rel=1e-2)  # Routh on s^3 + k d s^2 + k p s + k i
 
 
+@pytest.mark.parametrize(("gain", "crossover"), [(1e9, math.inf), (1e-9, 0.0)])
+def test_a_gain_that_is_never_one_has_no_crossover(gain, crossover):
+    s = 1j * FREQUENCIES
+    assert margins(gain / s)[:2] == (crossover, math.inf)
+
+
 def discrete_radius(pid, gain, delay):
     """Largest closed-loop eigenvalue of a PID on 1/s^2 behind the motor's lag, exactly discretised."""
     a = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / AIRFRAME.motor.time_constant]])

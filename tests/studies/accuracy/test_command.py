@@ -10,6 +10,7 @@ from studies.accuracy.measure import Point, cheapest, check_target, measure, tel
 from studies.accuracy.plot import draw
 from studies.accuracy.problem import Outcome, Problem, Way
 from studies.accuracy.targets import find
+from studies.terminal import console
 
 
 def decay():
@@ -101,3 +102,14 @@ def test_the_command_prints_the_choice(capsys, tmp_path, monkeypatch):
     found = json.loads((tmp_path / "a.json").read_text())
     assert found["cheapest"]["error"] <= 1e-3
     assert {"rkmk54", "lie_euler", "erk4m"} == {p["way"] for p in found["points"]}
+
+
+def test_the_table_fits_80_columns_and_cuts_no_digit(capsys):
+    drift = dict.fromkeys(("manifold", "energy", "vertical momentum"), 1.23e-123)
+    wide = Point("implicit_lie_midpoint", 2, "s", 5.7220458984375e-05, 3.2e-13, 0.15, 12_345_678, drift)
+    table.show(console(80), decay(), [wide], wide)
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 80
+    assert "…" not in said
+    assert "5.72e-05 s" in said
+    assert "12345678" in said

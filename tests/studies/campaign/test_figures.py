@@ -5,7 +5,6 @@ import json
 import made_up
 import numpy as np
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
@@ -13,6 +12,7 @@ from services.table import load
 from studies.campaign import show
 from studies.campaign.figures import figures
 from studies.campaign.study import campaign, spread, summary
+from studies.terminal import console
 from studies.tracking import AXES
 
 HOVER = "scenes/hover.toml"
@@ -22,18 +22,19 @@ N = 400
 ZERO = (0.0, 0.0, 0.0)
 
 
-def flown(failure="", finished=True, setpoint=None, truth=None, estimate=None, armed=True):
+def flown(failure="", diverged=False, finished=True, setpoint=None, truth=None, estimate=None, armed=True):
     """A flight at 100 Hz: columns of some topics besides what stands still."""
     pose = {"pose.position": ZERO, "pose.orientation": made_up.LEVEL}
     still = {**pose, "velocity": ZERO, "motor_power": (100.0,), "ground_contact": False}
     return made_up.flight(
         N,
         failure=failure,
+        diverged=diverged,
         truth={**still, **(truth or {})},
         setpoint={"position": ZERO, "yaw": 0.0, **(setpoint or {})},
         actuators={"attitude_reference": ZERO, "armed": armed},
         estimate={**pose, "position_std": (0.1, 0.1, 0.1), **(estimate or {})},
-        status={"finished": finished},
+        status={"finished": finished, "landed": True},
     )
 
 
@@ -53,7 +54,7 @@ def test_errors_of_known_offsets():
     assert f.worst == pytest.approx(np.hypot(0.1, 0.2))
     assert f.inside == (1.0, 1.0, 1.0)
     assert f.energy == pytest.approx(400.0)
-    assert f.crash == ""
+    assert f.verdict.kind == "landed"
 
 
 def test_share_of_the_time_within_three_sigma():
@@ -68,18 +69,13 @@ def test_only_the_armed_part_counts():
     assert figures(1, flown(truth={"pose.position": off}, armed=armed)).worst == 0.0
 
 
-def test_crashes_are_named():
+def test_a_campaign_judges_as_a_single_run_does():
     touch = np.arange(N) > 300
-
-    def touching(velocity):
-        return flown(truth={"ground_contact": touch, "velocity": velocity})
-
     falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
-    assert figures(1, touching(falling)).crash == "hit the ground at 3.0 m/s"
-    assert figures(1, touching(falling / 3)).touchdown == pytest.approx(1.0)
-    assert figures(1, flown(truth={"pose.orientation": (1.0, 0.0, 0.0, 0.0)})).crash == "turned over"
-    assert figures(1, flown("not finite at t = 1 s")).crash == "numbers are not finite"
-    assert figures(1, flown(finished=False)).crash == "the mission did not end"
+    hit = figures(1, flown(truth={"ground_contact": touch, "velocity": falling}))
+    assert (hit.verdict.kind, hit.touchdown, hit.failed) == ("crashed", 3.0, True)
+    assert figures(1, flown("not finite at t = 1 s", diverged=True)).verdict.kind == "diverged"
+    assert figures(1, flown(finished=False)).verdict.kind == "timed out"
 
 
 def test_spread_names_the_worst():
@@ -91,7 +87,7 @@ def test_spread_names_the_worst():
 def test_on_the_truth_every_seed_flies_the_same_windless_path():
     found = campaign(load(HOVER), [3, 4, 5], lambda: None)
     assert [f.seed for f in found.flights] == [3, 4, 5]
-    assert not found.crashes
+    assert not found.failed
     assert len({f.worst for f in found.flights}) == 1
     assert found.rmse == found.rmse_estimate
 
@@ -101,19 +97,22 @@ def test_order_of_the_flights_does_not_matter():
     assert summary(scene, [one(1), one(2)]).rmse == summary(scene, [one(2), one(1)]).rmse
 
 
-def test_table_json_and_plot(tmp_path):
+def test_table_json_and_plot(tmp_path, capsys):
     scene = load("scenes/delivery_mission.toml")
     crashed = figures(2, flown(finished=False, estimate={"pose.position": (0.2, 0.0, 0.0)}))
     found = summary(scene, [figures(1, flown(truth={"pose.position": (0.1, 0.1, 0.1)})), crashed])
-    console = Console(record=True, width=120)
-    show.show(console, found)
-    said = console.export_text()
+    show.show(console(80), found)
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 80
+    assert "roll [°]" in said
+    assert "x [m]" in said
     assert "2 flights, seeds 1 to 2" in said
-    assert "paper, Table 7" in said
-    assert "Crashes: 1 of 2" in said
-    assert "seed 2: the mission did not end" in said
+    assert "…" not in said  # no digit is cut
+    assert "0.2373" in said
+    assert "2 flights: 1 landed, 1 timed out" in said
+    assert "seed 2: Timed out at 3.99 s" in said
     show.write_json(tmp_path / "c.json", found)
-    assert json.loads((tmp_path / "c.json").read_text())["crashes"] == [2]
+    assert json.loads((tmp_path / "c.json").read_text())["failed"] == [2]
     show.plot(tmp_path / "c.png", found)
     assert (tmp_path / "c.png").stat().st_size > 10_000
 

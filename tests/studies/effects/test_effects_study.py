@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from made_up import moved
-from rich.console import Console
 
 from services.common.vehicle import Effects
 from services.table import load
@@ -16,6 +15,7 @@ from studies.effects.study import Row, Study, _smallest
 from studies.effects.study import study as run_study
 from studies.effects.variants import refusal, variant
 from studies.fly import fly
+from studies.terminal import console
 
 HOVER = Path(__file__).parents[3] / "scenes/hover.toml"
 
@@ -81,6 +81,7 @@ def study():
     rows = (
         Row("gravity", True, Influence(math.inf, math.inf, math.inf, "falls"), 1.0, 2.0),
         Row("wind", False, Influence(0.5, 0.1, 0.02), 20.0, 30.0),
+        Row("gyroscopic_torque", False, Influence(0.00012, 0.00011, -0.0123), -1234.5, -1234.0),
         Row("gust", False, None, math.nan, math.nan, "gust.peak: field required"),
     )
     return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0)
@@ -89,8 +90,11 @@ def study():
 def test_table_json_and_plot(tmp_path, capsys):
     found = study()
     assert [row.name for row in found.missing] == ["wind"]
-    show.show(Console(width=100), found)
+    show.show(console(80), found)
     text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text  # no digit is cut
+    assert "path [m]" in text
     assert "ends early" in text
     assert "not flown: gust.peak: field required" in text
     assert "Left out, and worth more than 0.01 m: wind" in text

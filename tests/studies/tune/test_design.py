@@ -94,3 +94,25 @@ def test_unstable_and_weak_gains_are_named(airframe):
     assert shortfalls(open_loops(build(fast.plain(), airframe), airframe, TICK))["altitude"] == "unstable"
     assert "phase margin 2" in shortfalls(open_loops(build(load("paper").plain(), airframe), airframe, TICK))["roll"]
     assert shortfalls(open_loops(build(load("tuned").plain(), airframe), airframe, TICK)) == {}
+
+
+RACER = {"vehicle.airframe": str(Path(__file__).parent / "racer.toml"), "effects.gyroscopic_torque": {}}
+
+
+def test_a_racer_is_designed_for_although_the_scenes_gains_are_another_vehicles():
+    """Its yaw under the delivery drone's gains has a gain above 1 throughout, which once was an IndexError."""
+    scene, said = load_scene("hover", RACER), []
+    model, airframe = hover(scene), known_airframe(scene)
+    plant = assumed_airframe(airframe, model)
+    own = open_loops(build(load("tuned").plain(), airframe), plant, TICK)
+    assert margins(own["yaw"]).crossover == math.inf
+    assert shortfalls(own)["yaw"]
+    found = gain_set(model, design(model, airframe, TICK, Bandwidths(), said.append))
+    assert not shortfalls(open_loops(build(found.plain(), airframe), plant, TICK))
+    assert [line.partition(":")[0] for line in said] == ["yaw"]
+
+
+def test_a_loop_that_cannot_be_had_is_named():
+    scene = load_scene("hover", {"airframe.motor.time_constant": 20.0})
+    with pytest.raises(ValueError, match=r"no gains with 45 deg and 6 dB found: \w+: .*; ask for lower bandwidths"):
+        design(hover(scene), known_airframe(scene), TICK, Bandwidths(), lambda _: None)

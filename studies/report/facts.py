@@ -1,35 +1,12 @@
-"""How a flight ended, and what flew, for the head of the page."""
+"""What flew, for the head of the page."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from studies.flight import Flight
 
 LONG = 60  # letters of an effect's keys that are still listed
 MANY = 12  # keys in which two scenes differ that are listed
-
-
-class Verdict(NamedTuple):
-    """How a flight ended; `kind` is "good", "bad" or "" where there is nothing to judge."""
-
-    kind: str
-    text: str
-
-
-def verdict(flight: Flight) -> Verdict:
-    """Whether it landed, when, or why it ended before."""
-    lasted = f"{flight.truth.times[-1]:.2f} s"
-    if flight.failure:
-        return Verdict("bad", f"Ended before its time, at {lasted}: {flight.failure}")
-    if flight.origin.recorded and not flight.digest:
-        return Verdict("bad", f"The log has no end: it breaks off at {lasted}")
-    if not flight.has("status"):
-        return Verdict("", f"Flown to the end, {lasted}; nobody steers, so nothing has to land")
-    if flight.landed:
-        return Verdict("good", f"Landed: upright, at rest and on the ground at {lasted}")
-    if flight.finished:
-        return Verdict("bad", f"Not landed: the mission is over at {lasted}, the vehicle not upright or not at rest")
-    return Verdict("bad", f"Not landed: the mission was not over at {lasted}")
 
 
 def facts(flight: Flight) -> dict[str, str]:

@@ -1,0 +1,106 @@
+"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, saturation, contact."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from studies.faults import planned
+from studies.saturation import saturation, stretches
+from studies.topic_view import TopicView
+from studies.touches import touches
+
+BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
+ORDER = ("fault", "failsafe", "mode", "phase", "arming", "contact", "motors", "battery")  # at the same time
+
+
+class Event(NamedTuple):
+    """Something that happened."""
+
+    time: float  # [s]
+    kind: str  # arming, mode, phase, failsafe, fault, battery, motors, contact
+    text: str
+
+
+def events(
+    truth: TopicView, status: TopicView | None, setpoint: TopicView | None, armed: np.ndarray, scene: dict[str, Any]
+) -> list[Event]:
+    """All events of a flight in their order.
+
+    Args:
+        truth: the true state.
+        status: of the autopilot; None where nobody steers: then only planned faults are told.
+        setpoint: that was followed, if any.
+        armed: whether the motors are armed, at the first n times of `truth`, shape (n,).
+        scene: its tables.
+    """
+    end = float(truth.times[-1]) if len(truth) else 0.0
+    found = [Event(time, "fault", text) for time, text in planned(scene) if time <= end]
+    if status is not None and len(status):
+        found += _said(status)
+        found += _contacts(truth)
+        highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+        if highest is not None and len(armed):
+            found += _saturations(truth, armed, highest)
+    if setpoint is not None and len(setpoint):
+        phases = changes(setpoint.times, setpoint.phase)
+        found += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
+    found = [event._replace(time=round(event.time, 9)) for event in found]  # nanoseconds, as the log counts
+    return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
+
+
+def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
+    """Time [s] and value at the beginning and wherever the value becomes another."""
+    rows = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
+    return ((float(t[k]), values[k]) for k in rows)
+
+
+def _said(status: TopicView) -> Iterator[Event]:
+    """What the autopilot said of itself."""
+    t, known = status.times, set(status.fields)
+    if "armed" in known:
+        for time, armed in list(changes(t, status.armed)):
+            if armed or time > t[0]:
+                yield Event(time, "arming", "armed" if armed else "disarmed")
+    if "mode" in known:
+        yield from (Event(time, "mode", str(mode)) for time, mode in changes(t, status.mode) if mode)
+    if {"failsafe", "text"} <= known:
+        before = ""
+        for time, reason in changes(t, np.where(status.failsafe, status.text.astype(object), "")):
+            if reason or before:
+                yield Event(time, "failsafe", str(reason) or f"{before}: over")
+            before = reason
+    if "failed_motor" in known:
+        yield from (
+            Event(time, "fault", f"motor {k} noticed to have failed")
+            for time, k in changes(t, status.failed_motor)
+            if k
+        )
+    if "battery_warning" in known:
+        for time, level in changes(t, status.battery_warning):
+            if level:
+                yield Event(time, "battery", BATTERY[min(int(level), len(BATTERY) - 1)])
+
+
+def _contacts(truth: TopicView) -> Iterator[Event]:
+    t = truth.times
+    for touch in touches(truth):
+        if touch.start > 0:
+            yield Event(float(t[touch.start]), "contact", f"touches the ground at {touch.speed:.2f} m/s")
+        if touch.stop < len(t):
+            yield Event(float(t[touch.stop]), "contact", "leaves the ground")
+
+
+def _saturations(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
+    found, t = saturation(truth, armed, highest), truth.times
+    for first, stop in stretches(found, t):
+        some = slice(first, stop)
+        low, high = (np.flatnonzero(at[some].any(axis=0)) + 1 for at in (found.low, found.high))
+        where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
+        lasted = float(found.step[some][found.any[some]].sum())
+        share = 100.0 * found.share(lasted)
+        yield Event(float(t[first]), "motors", f"{', '.join(where)} for {lasted:.2f} s, {share:.2g} % of the flight")
+
+
+def _motors(numbers: np.ndarray) -> str:
+    return f"motor{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"

@@ -1,0 +1,31 @@
+"""When a vehicle touches the ground, how hard, and when it leaves it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from studies.topic_view import TopicView
+
+BOUNCE = 0.5  # [s] without contact that still belong to the same touch
+
+
+class Touch(NamedTuple):
+    """A stretch on the ground, its bounces included."""
+
+    start: int  # row of the truth with the first contact
+    stop: int  # row after the last contact
+    speed: float  # [m/s] downwards just before the hardest contact; 0 where the vehicle stands there from the beginning
+
+
+def touches(truth: TopicView) -> list[Touch]:
+    """All stretches on the ground, in order; empty for a plant that tells of no contact."""
+    edges = np.diff(truth.ground_contact.astype(np.int8), prepend=0, append=0)
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    found: list[Touch] = []
+    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+        speed = max(-float(truth.velocity[start - 1, 2]), 0.0) if start else 0.0
+        if found and truth.times[start] - truth.times[found[-1].stop - 1] < BOUNCE:
+            found[-1] = Touch(found[-1].start, stop, max(found[-1].speed, speed))
+        else:
+            found.append(Touch(start, stop, speed))
+    return found

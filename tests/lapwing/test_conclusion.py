@@ -1,0 +1,78 @@
+"""What a run says at its end: the verdict in terminal, report and JSON, and the exit code."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+from lapwing.runs import single
+from studies.flight import Flight
+
+HOVER = ["run", "hover", "--mode", "single", "--log", "a.mcap", "--json", "a.json"]
+FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
+RUN_AWAY = ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]
+
+
+def sets(*texts):
+    return [part for text in texts for part in ("--set", text)]
+
+
+def test_a_landing_is_told_with_speed_place_events_and_degrees(lapwing):
+    code, out, err = lapwing(*HOVER)
+    assert (code, err) == (0, "")
+    assert "Landed at 8.52 s: upright on its feet, touched down at 0.95 m/s; ends at (0.00," in out
+    assert "0.10  contact  leaves the ground" in out
+    assert "roll [°]" in out
+    told = json.loads(Path("a.json").read_text())
+    assert (told["verdict"]["kind"], told["landed"]) == ("landed", True)
+    assert {"time": 6.0, "kind": "phase", "text": "descend"} in told["events"]
+    page = Path("a.html").read_text()
+    assert "Landed at 8.52 s" in page
+    assert "<td>leaves the ground</td>" in page
+
+
+def test_a_crash_is_no_landing_and_ends_with_its_own_exit_code(lapwing):
+    code, out, err = lapwing(*HOVER, *sets(FALL))
+    assert (code, err) == (4, "lapwing: the flight has failed: crashed\n")
+    assert "hit the ground at 4.4 m/s" in out
+    told = json.loads(Path("a.json").read_text())
+    assert (told["verdict"]["kind"], told["landed"]) == ("crashed", False)
+    assert "Crashed at " in Path("a.html").read_text()
+
+
+@pytest.mark.parametrize(("failed", "code"), [('["timed out"]', 4), ('["crashed"]', 0)])
+def test_the_scene_says_what_is_a_failure(lapwing, failed, code):
+    found, out, _ = lapwing(*HOVER, *sets("run.duration=2.0", f"run.failed={failed}"))
+    assert found == code
+    assert "Timed out at 2.00 s: the mission was not over, in mission (climb)" in out
+
+
+@pytest.mark.parametrize("mode", ["single", "processes"])
+def test_a_divergence_has_its_verdict_in_both_modes(lapwing, mode):
+    code, out, err = lapwing(
+        *("run", "gyrostat_feedback", "--mode", mode, "--space", "test-diverge", "--log", "a.mcap"), *sets(*RUN_AWAY)
+    )
+    assert (code, err) == (4, "lapwing: the flight has failed: diverged\n")
+    assert "Diverged at 0.00 s: gyrostat: not finite at t = 1 s" in out
+    assert Flight.read("a.mcap").verdict.kind == "diverged"
+
+
+def test_ctrl_c_has_its_verdict_too(lapwing, monkeypatch):
+    advance = single.run_single
+
+    def interrupted(graph, recording, speed, observe, last):
+        advance(graph, recording, speed, lambda graph: signal.raise_signal(signal.SIGINT) or observe(graph), 500)
+
+    monkeypatch.setattr(single, "run_single", interrupted)
+    code, out, err = lapwing(*HOVER)
+    assert (code, err) == (130, "lapwing: ended by SIGINT\n")
+    assert "Broken off at 2.00 s: ended by SIGINT" in out
+    assert Flight.read("a.mcap").verdict.kind == "broken off"
+    assert Path("a.html").exists()
+
+
+def test_a_run_that_is_refused_says_nothing_of_the_log_that_was_there(lapwing, monkeypatch):
+    lapwing(*HOVER)
+    monkeypatch.setattr(single, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
+    assert lapwing(*HOVER)[1:] == ("", "lapwing: ended by SIGTERM\n")
