@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from cosim.setup import Setup
 from services.common import plan
-from services.common.sections import start_height
+from services.common.vehicle import start_height
 from services.table import load, resolve
 
 SCENES = Path(__file__).parents[2] / "scenes"
