@@ -34,7 +34,7 @@ def free_port():
 
 
 def start(scene, folder, *more):
-    command = [sys.executable, "-m", "lapwing", "run", scene, "--space", "bench-mavlink", *more]
+    command = [sys.executable, "-m", "lapwing", "run", scene, "--key-prefix", "bench-mavlink", *more]
     command += ["--log", str(folder / "flight.mcap"), "--json", str(folder / "figures.json")]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 

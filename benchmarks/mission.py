@@ -19,7 +19,7 @@ def fly(mode, folder):
     """The figures of one run."""
     figures = Path(folder, "figures.json")
     arguments = ["run", SCENE, "--mode", mode, "--log", str(Path(folder, "log.mcap")), "--json", str(figures)]
-    subprocess.run([sys.executable, "-m", "lapwing", *arguments, "--space", "benchmark"], check=True,
+    subprocess.run([sys.executable, "-m", "lapwing", *arguments, "--key-prefix", "benchmark"], check=True,
                    stdout=subprocess.DEVNULL)  # fmt: skip
     return json.loads(figures.read_text())
 

@@ -1,4 +1,4 @@
-"""Keys of the lock step on the bus: what follows the key space of a run, and comes before the name of a participant."""
+"""Keys of the lock step on the bus: what follows the key prefix of a run, before the name of a participant."""
 
 STEP_KEY = "_step"  # bundles
 BATCH_KEY = "_batch"  # what the recorder is given

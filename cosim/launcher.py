@@ -35,7 +35,7 @@ def loopback_endpoints(names: Iterable[str]) -> dict[str, str]:
 def launch(
     names: list[str],
     give: Callable[[str, dict[str, str], IO[bytes]], None],
-    space: str,
+    key_prefix: str,
     observe: Callable[[Watch], bool],
     beside: Iterable[str] = (),
     external: Mapping[str, str] = MappingProxyType({}),
@@ -45,7 +45,7 @@ def launch(
     Args:
         names: the processes.
         give: writes what a process of this name is given, with everybody's endpoints, to its standard input.
-        space: the key space.
+        key_prefix: the key prefix.
         observe: called about five times a second; says whether to stop.
         beside: processes without which the run goes on.
         external: endpoints of those among `names` that somebody else starts; everybody connects to them.
@@ -77,7 +77,7 @@ def launch(
         listen, connect = mesh(WATCHER, endpoints)
         with ZenohBus(listen, connect) as bus:
             try:
-                _follow(Watch(bus, space), children, set(names), set(external), observe, errors)
+                _follow(Watch(bus, key_prefix), children, set(names), set(external), observe, errors)
             finally:
                 early = {name for name in beside if children[name].poll() is not None}
                 _ask_to_end(children)  # before this session closes, which takes a while

@@ -47,7 +47,7 @@ def run_lockstep(process: Process, service: Service, owns_time: bool) -> None:
     except EndOfRun:
         return
     except DivergedError as error:  # said before the end is
-        process.bus.publisher(f"{process.space}/{DIVERGED_KEY}/{process.name}")(str(error).encode(), 0)
+        process.bus.publisher(f"{process.key_prefix}/{DIVERGED_KEY}/{process.name}")(str(error).encode(), 0)
         raise
     finally:
         outlets.end(graph.tick)

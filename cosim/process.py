@@ -36,7 +36,7 @@ class Process:
         name: str,
         setup: Setup,
         bus: ZenohBus,
-        space: str,
+        key_prefix: str,
         others: list[str],
         speed: float | None = None,
         core: int | None = None,
@@ -48,14 +48,14 @@ class Process:
             name: its name among the participants.
             setup: what is flown.
             bus: the session.
-            space: key space of the run.
+            key_prefix: key prefix of the run.
             others: participants without which the run cannot begin.
             speed: simulated seconds per second, None for as fast as it goes.
             core: the core that all services of a sequential lock step share, None to leave it to the system.
             compares: whether the others may have another set-up, which is to be found out at joining.
         """
         self.compares = compares
-        self.name, self.setup, self.bus, self.space = name, setup, bus, space
+        self.name, self.setup, self.bus, self.key_prefix = name, setup, bus, key_prefix
         self.others, self.speed, self.core = others, speed, core
         self.stopping = False
         self._compiling = False
@@ -69,7 +69,7 @@ class Process:
     def _tell_of_compiling(self, _: str) -> None:
         if not self._compiling:
             self._compiling = True
-            self.bus.publisher(f"{self.space}/{COMPILING_KEY}/{self.name}")(b"", 0)
+            self.bus.publisher(f"{self.key_prefix}/{COMPILING_KEY}/{self.name}")(b"", 0)
 
     def end_with_parent(self) -> None:
         """Stop when the launcher, which holds the other end of standard input, is gone."""
@@ -87,11 +87,11 @@ class Process:
         def changed(_: str, alive: bool) -> None:
             self.stopping = self.stopping or not alive
 
-        self.bus.watch_alive(f"{self.space}/{ALIVE_KEY}/{name}", changed)
+        self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/{name}", changed)
 
     def key(self, topic: Topic) -> str:
         """The Zenoh key of a topic in this run."""
-        return topic.zenoh_key(self.setup.vehicle, self.space)
+        return topic.zenoh_key(self.setup.vehicle, self.key_prefix)
 
     def join(self) -> None:
         """Say that everything is subscribed, wait until everybody else has said so, and compare set-ups.
@@ -101,9 +101,9 @@ class Process:
             LockStepError: somebody did not come.
             ValueError: another participant has resolved something else; names the first difference.
         """
-        self.bus.answer(f"{self.space}/{SETUP_KEY}/{self.name}", to_json(self.setup).encode())
-        self.bus.declare_alive(f"{self.space}/{ALIVE_KEY}/{self.name}")
-        wanted = [f"{self.space}/{ALIVE_KEY}/{other}" for other in self.others if other != self.name]
+        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", to_json(self.setup).encode())
+        self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
+        wanted = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in self.others if other != self.name]
         missing = self.bus.wait_alive(wanted, timeout=JOIN_TIMEOUT, stop=lambda: self.stopping)
         if self.stopping:
             raise Stopped
@@ -119,7 +119,7 @@ class Process:
         for other in self.others:
             if other == self.name:
                 continue
-            given = self.bus.ask(f"{self.space}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
+            given = self.bus.ask(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
             if given is None or given.decode() == own:
                 continue
             found = first_difference(self.setup, from_json(given.decode()))
@@ -140,6 +140,6 @@ class Process:
                 return found
             waited += POLL
             if waited >= PATIENCE:
-                self.bus.publisher(f"{self.space}/{WAITING_KEY}/{self.name}")(waiting_for().encode(), 0)
+                self.bus.publisher(f"{self.key_prefix}/{WAITING_KEY}/{self.name}")(waiting_for().encode(), 0)
                 waited = 0.0
         raise Stopped

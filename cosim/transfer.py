@@ -28,7 +28,7 @@ class Source:
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
         self._bundles = Bundles(process.setup.services[name].ports)
-        self._subscription: Subscription = process.bus.subscribe(f"{process.space}/{STEP_KEY}/{name}")
+        self._subscription: Subscription = process.bus.subscribe(f"{process.key_prefix}/{STEP_KEY}/{name}")
         self._newest = -1  # tick of the newest bundle taken
 
     def take(self, tick: int) -> None:
@@ -72,11 +72,11 @@ class Outlets:
 
     def __init__(self, process: Process, service: Service, graph: Graph, hands_over: bool = True):
         """Declare the publishers; the bundles are somebody else's where it does not hand over."""
-        space, bus = process.space, process.bus
+        key_prefix, bus = process.key_prefix, process.bus
         self._process, self._service, self._graph = process, service, graph
         self._bundles = Bundles(process.setup.services[service.name].ports if hands_over else ())
-        self._put_bundle = bus.publisher(f"{space}/{STEP_KEY}/{service.name}") if hands_over else None
-        self._put_batch = bus.publisher(f"{space}/{BATCH_KEY}/{service.name}")
+        self._put_bundle = bus.publisher(f"{key_prefix}/{STEP_KEY}/{service.name}") if hands_over else None
+        self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
         self._puts = {topic: bus.publisher(key) for topic, key in self._topics.items()}
         self._listened: set[Topic] = set()

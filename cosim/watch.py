@@ -16,9 +16,9 @@ HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY)
 class Watch:
     """What a launcher sees of a run: who is there, how far it is, what it waits for."""
 
-    def __init__(self, bus: ZenohBus, space: str):
+    def __init__(self, bus: ZenohBus, key_prefix: str):
         """Follow the batches of all services; `newest` holds the newest payload of each topic."""
-        self._space = space
+        self._key_prefix = key_prefix
         self.newest: dict[Topic, bytes] = {}
         self.waiting: dict[str, str] = {}
         self.compiling = False  # somebody compiles kernels
@@ -31,8 +31,8 @@ class Watch:
         self.wall = 0.0  # [s] from the first batch to the newest
         self.ended = False  # somebody has handed over the last tick
         self.last_news = time.monotonic()
-        self._news = bus.subscribe(*(f"{space}/{key}/*" for key in HEARD))
-        bus.watch_alive(f"{space}/{ALIVE_KEY}/*", self._alive)
+        self._news = bus.subscribe(*(f"{key_prefix}/{key}/*" for key in HEARD))
+        bus.watch_alive(f"{key_prefix}/{ALIVE_KEY}/*", self._alive)
 
     def _alive(self, key: str, alive: bool) -> None:
         name = key.rsplit("/", 1)[1]
@@ -50,7 +50,7 @@ class Watch:
             if news is None:
                 return
             key, time_ns, payload = news
-            head, _, name = key.removeprefix(f"{self._space}/").partition("/")
+            head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
             if head == COMPILING_KEY:
                 self.compiling = True
                 continue

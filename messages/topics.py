@@ -44,9 +44,9 @@ class Topic:
         """ROS name and name in the log: "/drone1/imu"."""
         return "/" + self.name.format(vehicle=vehicle)
 
-    def zenoh_key(self, vehicle: str, space: str) -> str:
-        """Zenoh key expression in a run's key space: "space/drone1/imu"."""
-        return f"{space}/{self.name.format(vehicle=vehicle)}"
+    def zenoh_key(self, vehicle: str, key_prefix: str) -> str:
+        """Zenoh key expression in a run's key prefix: "prefix/drone1/imu"."""
+        return f"{key_prefix}/{self.name.format(vehicle=vehicle)}"
 
 
 CLOCK = Topic("clock", Clock, rate="rates.pose")

@@ -21,7 +21,7 @@ class Participation(NamedTuple):
     name: str
     setup: Setup
     peers: dict[str, str]  # endpoint of every participant
-    space: str  # key space
+    key_prefix: str  # key prefix
     speed: float | None = None  # simulated seconds per second, None for as fast as it goes
     core: int | None = None  # core that all services of a sequential lock step share
     log: str = ""  # path of the recorder's log
@@ -79,7 +79,7 @@ def take_part(given: Participation) -> None:
         watched = WATCHER in given.peers and not given.with_parent
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
         compares = not given.with_parent or bool(encoded)
-        process = Process(given.name, setup, bus, given.space, others, given.speed, given.core, compares)
+        process = Process(given.name, setup, bus, given.key_prefix, others, given.speed, given.core, compares)
         if given.with_parent:
             process.end_with_parent()
         elif watched:
@@ -102,7 +102,7 @@ def _heard(process: Any) -> Any:
     """The operator commands that have come on the bus."""
     from services.common.operator import OPERATOR_KEY, commands
 
-    get = process.bus.subscribe(f"{process.space}/{OPERATOR_KEY}").get
+    get = process.bus.subscribe(f"{process.key_prefix}/{OPERATOR_KEY}").get
 
     def heard(_: int) -> list[Any]:
         found: list[Any] = []

@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("lapwing ")])
 def test_lapwing_commands_run_as_written(command, folder):
     words = command.split()[1:]
-    more = ["--space", "test-readme"] if words[0] in ("run", "replay") else []
+    more = ["--key-prefix", "test-readme"] if words[0] in ("run", "replay") else []
     subprocess.run([sys.executable, "-m", "lapwing", *words, *more], cwd=folder, check=True, timeout=900)
 
 

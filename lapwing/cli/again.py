@@ -12,9 +12,9 @@ from lapwing.cli.files import check_writable
 from lapwing.cli.links import check_links, mavlink_options
 from lapwing.cli.options import (
     Insecure,
+    KeyPrefix,
     MavlinkKey,
     MavlinkUrls,
-    Space,
     Speed,
     parse_speed,
 )
@@ -46,7 +46,7 @@ def replay(
     start: Annotated[float, typer.Option("--from", metavar="S", help="begin at this simulation time")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", metavar="S", help="end at this simulation time")] = None,
     loop: Annotated[bool, typer.Option("--loop", help="begin again at the end")] = False,
-    space: Space = "lapwing",
+    key_prefix: KeyPrefix = "lapwing",
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="where subscribers connect")] = "tcp/127.0.0.1:7447",
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="also write what is published to a log")] = None,
     mavlink: MavlinkUrls = None,
@@ -55,7 +55,7 @@ def replay(
 ) -> None:
     """Publish a log on Zenoh with its own timing, as the live run did."""
     from cosim.interrupt import Stop
-    from cosim.key_space import key_space
+    from cosim.key_prefix import reserve
     from services.replay.player import play
     from services.replay.schedule import Cut
 
@@ -72,10 +72,10 @@ def replay(
             if mavlink:
                 options = mavlink_options(mavlink, mavlink_key, insecure, log, pace)
                 hub = stack.enter_context(_recorded_hub(log, options))
-            stack.enter_context(key_space(space))
+            stack.enter_context(reserve(key_prefix))
             stop = stack.enter_context(Stop())
             listeners = (hub.replay, hub.wait) if hub else ()
-            count = play(log, space, listen, cut, pace, loop, record, lambda: stop.number is not None, *listeners)
+            count = play(log, key_prefix, listen, cut, pace, loop, record, lambda: stop.number is not None, *listeners)
             for line in hub.report() if hub else ():
                 typer.echo(f"mavlink: {line}")
             stop.check()

@@ -12,7 +12,7 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="override a key of the scene: solver.step=0.001 (repeatable)"),
 ]
-Space = Annotated[str, typer.Option(metavar="NAME", help="key space of the run on the bus")]
+KeyPrefix = Annotated[str, typer.Option(metavar="NAME", help="key prefix of the run on the bus")]
 Speed = Annotated[
     str | None, typer.Option(metavar="1|N|max", help="simulated seconds per second; max: as fast as it goes")
 ]

@@ -17,6 +17,7 @@ def protocol(
     scene: SceneFile,
     set_: Overrides = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as JSON, with the whole set-up")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the services and what they hand on")] = None,
 ) -> None:
     """What each service of a scene takes and gives: ports, periods, columns (docs/protocol.md)."""
     import json as json_module
@@ -26,9 +27,16 @@ def protocol(
 
     with user_errors():
         check_writable(json)
-        found = layout(resolve(decided(scene, set_ or [])))
+        check_writable(plot)
+        setup = resolve(decided(scene, set_ or []))
+        found = layout(setup)
+        if plot:
+            from studies.graph import draw
+
+            draw(setup, plot)
         if json:
             json.write_text(json_module.dumps(found, indent=1) + "\n")
+        if json or plot:
             return
         typer.echo(f"{found['rate']} Hz, {found['interval_ns']} ns a tick, last tick {found['last_tick']}")
         for name in found["order"]:

@@ -12,13 +12,13 @@ from lapwing.cli.files import check_distinct, check_report, check_writable, left
 from lapwing.cli.links import check_links
 from lapwing.cli.options import (
     Insecure,
+    KeyPrefix,
     MavlinkKey,
     MavlinkUrls,
     Overrides,
     Peers,
     PlanFile,
     SceneFile,
-    Space,
     Speed,
     parse_speed,
 )
@@ -41,7 +41,7 @@ def run(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html|pdf|png", help="the report [beside the log, .html]")
     ] = None,
-    space: Space = "lapwing",
+    key_prefix: KeyPrefix = "lapwing",
     peers: Peers = None,
     open_: Annotated[
         str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
@@ -94,7 +94,7 @@ def run(
             name=WATCHER,
             setup=setup,
             peers=table or {},
-            space=space,
+            key_prefix=key_prefix,
             speed=parse_speed(speed),
             log=str(path.absolute()),
             sources={name: content.decode() for name, content in loaded.sources.items()},
@@ -131,7 +131,7 @@ def _fly(given: "Participation", log: Path) -> "Elapsed":
         if given.peers:
             from lapwing.runs.joined import fly_joined
 
-            return fly_joined(setup, given.peers, given.space, display)
+            return fly_joined(setup, given.peers, given.key_prefix, display)
         from lapwing.runs.processes import fly_processes
 
         return fly_processes(given, display, [MAVLINK] if given.mavlink else [])

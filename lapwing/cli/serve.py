@@ -11,12 +11,12 @@ from lapwing.cli.errors import user_errors
 from lapwing.cli.links import check_links
 from lapwing.cli.options import (
     Insecure,
+    KeyPrefix,
     MavlinkKey,
     MavlinkUrls,
     Overrides,
     PlanFile,
     SceneFile,
-    Space,
     Speed,
     parse_speed,
 )
@@ -28,7 +28,7 @@ def service(
     scene: SceneFile,
     peers: Annotated[str, typer.Option(metavar="TABLE", help="name=endpoint,... of all participants")],
     set_: Overrides = None,
-    space: Space = "lapwing",
+    key_prefix: KeyPrefix = "lapwing",
     speed: Speed = None,
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="the recorder's MCAP log")] = None,
     open_: Annotated[
@@ -40,7 +40,7 @@ def service(
     plan: PlanFile = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
-    from cosim.key_space import check_space
+    from cosim.key_prefix import check_key_prefix
     from lapwing.runs.joined import parse_peers
     from services import processes
     from services.common.plan import OPERATED
@@ -50,7 +50,7 @@ def service(
     from services.table import resolve
 
     with user_errors():
-        check_space(space)
+        check_key_prefix(key_prefix)
         table = parse_peers(peers)
         entry = processes.entry(name)
         if name not in table:
@@ -70,7 +70,7 @@ def service(
                 name=name,
                 setup=setup,
                 peers=table,
-                space=space,
+                key_prefix=key_prefix,
                 speed=parse_speed(speed),
                 log=str(log or ""),
                 sources={source: content.decode() for source, content in loaded.sources.items()},

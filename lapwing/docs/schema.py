@@ -18,6 +18,12 @@ from services.trajectory.segments import KINDS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 TEXT: Schema = {"type": "string"}
+OWN: Schema = {
+    "type": "object",
+    "description": "one of the user's own, with parameters of its own",
+    "properties": {"module": {**TEXT, "description": "that declares it"}},
+    "required": ["module"],
+}
 
 
 def scene_schema() -> Schema:
@@ -25,8 +31,8 @@ def scene_schema() -> Schema:
     known = vocabulary().sections
     sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
     tables = {name: _section(section) for name, section in sections.items()}
-    tables["effects"] |= closed({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
-    tables["sensors"] |= closed({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
+    tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
+    tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
     tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
     tables["vehicle"]["properties"]["model"]["enum"] = models.names()
     tables["autopilot"]["properties"]["parameters"] = _parameters()
@@ -69,6 +75,11 @@ def _head(title: str) -> Schema:
 
 def _section(section: type[Section]) -> Schema:
     return {"description": " ".join((section.__doc__ or "").split()), **table_schema(section)}
+
+
+def _or_own(tables: dict[str, Schema]) -> Schema:
+    """These tables, and others that name a module."""
+    return {**closed(tables), "additionalProperties": OWN}
 
 
 def _sensor(module: Any, cls: type) -> Schema:

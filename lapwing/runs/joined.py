@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from cosim.bus import ZenohBus, mesh
 from cosim.interrupt import Stop
-from cosim.key_space import check_space
+from cosim.key_prefix import check_key_prefix
 from cosim.keys import ALIVE_KEY
 from cosim.launcher import RunFailed
 from cosim.setup import Setup
@@ -18,21 +18,21 @@ from services import processes
 JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
 
 
-def fly_joined(setup: Setup, peers: dict[str, str], space: str, observer: Observer) -> Elapsed:
+def fly_joined(setup: Setup, peers: dict[str, str], key_prefix: str, observer: Observer) -> Elapsed:
     """Watch a run whose services are started elsewhere, to its end.
 
     Raises:
         RunFailed: a service does not come, or is gone before the end.
-        ValueError: not a key space.
+        ValueError: not a key prefix.
         Interrupted: ended by a signal.
     """
-    check_space(space)
+    check_key_prefix(key_prefix)
     clock = Clock(observer)
     names = set(processes.needed(setup))
     listen, connect = mesh(WATCHER, peers)
     with Stop() as stop, ZenohBus(listen, connect) as bus:
-        watch = Watch(bus, space)
-        bus.declare_alive(f"{space}/{ALIVE_KEY}/{WATCHER}")
+        watch = Watch(bus, key_prefix)
+        bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
         deadline = time.monotonic() + JOIN_TIMEOUT
         while not (watch.ended and processes.RECORDER in watch.gone):
             watch.poll(0.2)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import IO
 
 from cosim.interrupt import Stop
-from cosim.key_space import key_space
+from cosim.key_prefix import reserve
 from cosim.launcher import launch
 from cosim.setup import Setup
 from cosim.watch import Watch
@@ -27,7 +27,7 @@ def fly_processes(given: Participation, observer: Observer, beside: Iterable[str
 
     Raises:
         RunFailed: a service died or froze.
-        SpaceInUse: another run uses this key space.
+        KeyPrefixInUse: another run uses this key prefix.
         ValueError: a service refused what it was given.
         Interrupted: ended by a signal.
     """
@@ -47,9 +47,9 @@ def fly_processes(given: Participation, observer: Observer, beside: Iterable[str
         )
         hand_over(own, stream)
 
-    with key_space(given.space), Stop() as stop:
+    with reserve(given.key_prefix), Stop() as stop:
         ended = lambda watch: clock.observe(watch) or stop.number is not None  # noqa: E731
-        for name, words in launch(names, give, given.space, ended, beside, external).items():
+        for name, words in launch(names, give, given.key_prefix, ended, beside, external).items():
             for line in words.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()

@@ -1,7 +1,7 @@
 """What comes from outside the lock step: joined into one message of the tick at which it applies.
 
-Whoever operates a vehicle publishes an encoded OperatorInput on the key `_operator` of the run's space, whenever he
-likes; the autopilot stamps and records what has come.
+Whoever operates a vehicle publishes an encoded OperatorInput on the key `_operator` behind the run's key prefix, at any
+time; the autopilot stamps and records what has come.
 """
 
 from collections.abc import Callable, Iterable

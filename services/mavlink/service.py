@@ -34,11 +34,11 @@ def run(process: Process, given: Any) -> None:
     # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
     at_once = AT_ONCE if process.speed else ()
     topics = {process.key(topic): topic for topic in at_once}
-    put = process.bus.publisher(f"{process.space}/{OPERATOR_KEY}")
+    put = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}")
     with Hub(description, options, lambda payload: put(payload, 0)) as hub:
         for command in setup.services["autopilot"].parameters.plan:  # the autopilot begins with it
             hub.adapter.missions.hold(command)
-        arrived = process.bus.subscribe(*topics, f"{process.space}/{BATCH_KEY}/*", notify=hub.wake)
+        arrived = process.bus.subscribe(*topics, f"{process.key_prefix}/{BATCH_KEY}/*", notify=hub.wake)
         process.join()
         flying = True
         while flying and not process.stopping:

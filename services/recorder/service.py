@@ -16,8 +16,8 @@ from cosim.wire import Page
 
 def run(process: Process, given: Any) -> None:
     """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
-    setup, prefix = process.setup, f"{process.space}/{BATCH_KEY}"
-    diverged = f"{process.space}/{DIVERGED_KEY}"
+    setup, prefix = process.setup, f"{process.key_prefix}/{BATCH_KEY}"
+    diverged = f"{process.key_prefix}/{DIVERGED_KEY}"
     news = process.bus.subscribe(f"{prefix}/*", f"{diverged}/*")
     pending = Pending(setup.services)
     about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})

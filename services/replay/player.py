@@ -13,7 +13,7 @@ AUDIENCE = 1.0  # [s] the first subscriber gets to appear
 
 def play(
     log: Path,
-    space: str,
+    key_prefix: str,
     listen: str,
     cut: Cut,
     speed: float | None,
@@ -27,7 +27,7 @@ def play(
 
     Args:
         log: the MCAP log.
-        space: key space to publish in.
+        key_prefix: key prefix to publish in.
         listen: endpoint that subscribers connect to.
         cut: the part to replay.
         speed: simulated seconds per second, None for as fast as it goes.
@@ -43,8 +43,8 @@ def play(
     """
     with LogReader(log) as source, ZenohBus([listen]) as bus:
         types, deterministic = source.topics(), source.deterministic_topics()
-        puts = {topic: bus.publisher(f"{space}{topic}") for topic in types}
-        _await_audience(bus, [f"{space}{topic}" for topic in types], stopping)
+        puts = {topic: bus.publisher(f"{key_prefix}{topic}") for topic in types}
+        _await_audience(bus, [f"{key_prefix}{topic}" for topic in types], stopping)
         writer = LogWriter(record, _own(source.metadata), dict(source.attachments)) if record else None
         count = 0
         try:

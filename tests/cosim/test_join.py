@@ -10,7 +10,19 @@ SCENE = "scenes/gyrostat_blocked.toml"
 
 def participant(name, peers, tmp_path, *more):
     table = ",".join(f"{key}={endpoint}" for key, endpoint in peers.items())
-    command = [sys.executable, "-m", "lapwing", "service", name, SCENE, "--peers", table, "--space", "test-join", *more]
+    command = [
+        sys.executable,
+        "-m",
+        "lapwing",
+        "service",
+        name,
+        SCENE,
+        "--peers",
+        table,
+        "--key-prefix",
+        "test-join",
+        *more,
+    ]
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 

@@ -56,8 +56,8 @@ def test_time_counts_from_the_first_message_of_the_cut(log):
 
 def test_recording_a_replay_gives_the_same_digest(log, tmp_path):
     again = tmp_path / "again.mcap"
-    space, (endpoint,) = "test-record", loopback_endpoints(["a"]).values()
-    command = replay(log, "--speed", "max", "--record", again, "--space", space, "--listen", endpoint)
+    key_prefix, (endpoint,) = "test-record", loopback_endpoints(["a"]).values()
+    command = replay(log, "--speed", "max", "--record", again, "--key-prefix", key_prefix, "--listen", endpoint)
     subprocess.run(command, check=True, timeout=60)
     with LogReader(log) as first, LogReader(again) as second:
         assert first.metadata["digest"] == second.metadata["digest"] == second.digest()
@@ -67,10 +67,10 @@ def test_recording_a_replay_gives_the_same_digest(log, tmp_path):
 
 
 def test_a_subscriber_gets_every_message_in_order(log):
-    space, (endpoint,) = "test-subscriber", loopback_endpoints(["a"]).values()
-    with subprocess.Popen(replay(log, "--speed", "max", "--space", space, "--listen", endpoint)) as player:
+    key_prefix, (endpoint,) = "test-subscriber", loopback_endpoints(["a"]).values()
+    with subprocess.Popen(replay(log, "--speed", "max", "--key-prefix", key_prefix, "--listen", endpoint)) as player:
         with ZenohBus(connect=[endpoint]) as bus:
-            arriving = bus.subscribe(f"{space}/clock")
+            arriving = bus.subscribe(f"{key_prefix}/clock")
             digest = Digest()
             for _ in range(200):
                 time_ns, payload = arriving.get(timeout=30.0)
@@ -81,10 +81,10 @@ def test_a_subscriber_gets_every_message_in_order(log):
 
 
 def test_a_signal_ends_a_loop_at_once(log):
-    space, (endpoint,) = "test-signal", loopback_endpoints(["a"]).values()
-    with subprocess.Popen(replay(log, "--loop", "--space", space, "--listen", endpoint)) as player:
+    key_prefix, (endpoint,) = "test-signal", loopback_endpoints(["a"]).values()
+    with subprocess.Popen(replay(log, "--loop", "--key-prefix", key_prefix, "--listen", endpoint)) as player:
         with ZenohBus(connect=[endpoint]) as bus:
-            assert bus.subscribe(f"{space}/clock").get(timeout=30.0) is not None
+            assert bus.subscribe(f"{key_prefix}/clock").get(timeout=30.0) is not None
         asked = time.monotonic()
         player.terminate()
         assert player.wait(timeout=30) == 143
@@ -109,7 +109,11 @@ def test_what_cannot_be_replayed_is_said_in_one_line(log, arguments, said):
     (endpoint,) = loopback_endpoints(["a"]).values()
     given = [] if "--listen" in arguments else ["--listen", endpoint]
     result = subprocess.run(
-        replay(*arguments, *given, "--space", "test-error"), capture_output=True, text=True, timeout=60, check=False
+        replay(*arguments, *given, "--key-prefix", "test-error"),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert result.returncode == 2
     assert result.stderr.startswith("lapwing: ")

@@ -24,10 +24,10 @@ END = 10.0  # [s] a generous bound on how long an end may take; the target is 2 
 STARTED = 120.0  # [s] a run gets to start, with kernels to compile
 
 
-def arguments(tmp_path, space, *more, overrides=()):
+def arguments(tmp_path, key_prefix, *more, overrides=()):
     sets = [part for override in overrides for part in ("--set", override)]
-    command = [sys.executable, "-m", "lapwing", "run", str(SCENE), *sets, "--space", space]
-    return [*command, "--log", str(tmp_path / f"{space}.mcap"), *more]
+    command = [sys.executable, "-m", "lapwing", "run", str(SCENE), *sets, "--key-prefix", key_prefix]
+    return [*command, "--log", str(tmp_path / f"{key_prefix}.mcap"), *more]
 
 
 def single(tmp_path, *overrides):
@@ -40,21 +40,24 @@ def single(tmp_path, *overrides):
         return read.digest()
 
 
-def processes(tmp_path, space, *overrides):
+def processes(tmp_path, key_prefix, *overrides):
     """Figures of a flight in processes, as `--json` gives them."""
-    result = tmp_path / f"{space}.json"
+    result = tmp_path / f"{key_prefix}.json"
     more = ["--json", str(result)]
-    subprocess.run(arguments(tmp_path, space, *more, overrides=[*SHORT, *overrides]), check=True, timeout=200)
+    subprocess.run(arguments(tmp_path, key_prefix, *more, overrides=[*SHORT, *overrides]), check=True, timeout=200)
     return json.loads(result.read_text())
 
 
 class Running:
     """A run in processes at real-time speed that has begun to fly; `children`: process ids by service."""
 
-    def __init__(self, tmp_path, space):
-        self.log = tmp_path / f"{space}.mcap"
+    def __init__(self, tmp_path, key_prefix):
+        self.log = tmp_path / f"{key_prefix}.mcap"
         self.launcher = subprocess.Popen(
-            arguments(tmp_path, space, "--speed", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            arguments(tmp_path, key_prefix, "--speed", "1"),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
         )
         deadline = time.monotonic() + STARTED
         while not self._recorded() > 100 and self.launcher.poll() is None and time.monotonic() < deadline:
@@ -116,8 +119,8 @@ def started(tmp_path):
         pytest.skip("finds processes in /proc")
     runs = []
 
-    def start(space):
-        runs.append(Running(tmp_path, space))
+    def start(key_prefix):
+        runs.append(Running(tmp_path, key_prefix))
         return runs[-1]
 
     yield start
@@ -127,7 +130,7 @@ def started(tmp_path):
 
 def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
     alone = single(tmp_path)  # first: it compiles what the processes then load
-    first, second = (processes(tmp_path, space) for space in ("test-first", "test-second"))
+    first, second = (processes(tmp_path, key_prefix) for key_prefix in ("test-first", "test-second"))
     assert first["digest"] == second["digest"] == alone
     assert first["sim_time_s"] == pytest.approx(2.0)
     assert (first["scene"], first["seed"], first["mode"]) == ("hover", 1, "processes")
@@ -179,12 +182,12 @@ def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
 
 
 def assert_space_is_taken(run, tmp_path):
-    """A second run on the key space of one that flies is refused, and the first flies on."""
-    space, other = run.log.stem, tmp_path / "other.mcap"
-    command = arguments(tmp_path, space, "--log", str(other))
+    """A second run on the key prefix of one that flies is refused, and the first flies on."""
+    key_prefix, other = run.log.stem, tmp_path / "other.mcap"
+    command = arguments(tmp_path, key_prefix, "--log", str(other))
     second = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
     assert second.returncode == 2
-    assert second.stderr.startswith(f"lapwing: --space {space}: another run uses this key space")
+    assert second.stderr.startswith(f"lapwing: --key-prefix {key_prefix}: another run uses this key prefix")
     assert not other.exists()
     assert run.launcher.poll() is None
 

@@ -11,7 +11,7 @@ def test_folders_of_our_packages_names_in_the_working_directory_do_no_harm(tmp_p
     for name in ("messages", "services", "cosim", "dynamics", "numpy"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise SystemExit('imported from the working directory')\n")
-    command = [LAPWING, "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--space", "test-directory"]
+    command = [LAPWING, "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--key-prefix", "test-directory"]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200, check=False)
     assert result.returncode == 0, result.stderr
     assert "digest" in result.stdout

@@ -38,7 +38,7 @@ def fly(program, tmp_path, log, *more):
     assert lapwing("protocol", SCENE, *SHORT, "--json", str(layout)).returncode == 0
     own = subprocess.Popen([program, layout, endpoint, "test-rust"])
     try:
-        where = ["--external", f"autopilot={endpoint}", "--space", "test-rust", "--log", str(log)]
+        where = ["--external", f"autopilot={endpoint}", "--key-prefix", "test-rust", "--log", str(log)]
         return lapwing("run", SCENE, *SHORT, *where, "--json", str(log.with_suffix(".json")), *more), own.wait(10)
     finally:
         own.kill()

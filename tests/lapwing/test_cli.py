@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.key_space import key_space
+from cosim.key_prefix import reserve
 from dynamics.kernel import kernel
 from lapwing.runs import single
 from lapwing.runs.compiling import NOTICE, told
@@ -80,7 +80,7 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["replay", "none.mcap"], "none.mcap"),
         (["service", "plnt", HOVER, "--peers", PEERS], "unknown service plnt; expected one of"),
         (["service", "sensors", HOVER, "--peers", PEERS], "no endpoint for sensors itself"),
-        (["service", "plant", HOVER, "--peers", PEERS, "--space", "a b"], "--space a b: expected letters"),
+        (["service", "plant", HOVER, "--peers", PEERS, "--key-prefix", "a b"], "--key-prefix a b: expected letters"),
         (["fly"], "No such command 'fly'"),
     ],
 )
@@ -93,17 +93,17 @@ def test_other_commands_do_the_same(lapwing, arguments, expected):
     assert os.listdir() == ["scenes"]
 
 
-@pytest.mark.parametrize("space", ["", "a b", "a/*", "/a", "a/", "$x", "ä"])
-def test_what_cannot_be_part_of_a_zenoh_key_is_no_key_space(space):
-    with pytest.raises(ValueError, match="--space"), key_space(space):
+@pytest.mark.parametrize("key_prefix", ["", "a b", "a/*", "/a", "a/", "$x", "ä"])
+def test_what_cannot_be_part_of_a_zenoh_key_is_no_key_prefix(key_prefix):
+    with pytest.raises(ValueError, match="--key-prefix"), reserve(key_prefix):
         pass
 
 
 def test_a_refused_run_takes_the_folder_of_recordings_away_again(lapwing):
-    with key_space("test-cli"):
-        code, _, err = lapwing("run", HOVER, "--space", "test-cli")
+    with reserve("test-cli"):
+        code, _, err = lapwing("run", HOVER, "--key-prefix", "test-cli")
     assert code == 2
-    assert err.startswith("lapwing: --space test-cli: another run uses this key space")
+    assert err.startswith("lapwing: --key-prefix test-cli: another run uses this key prefix")
     assert os.listdir() == ["scenes"]
 
 

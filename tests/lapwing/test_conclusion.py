@@ -51,7 +51,8 @@ def test_the_scene_says_what_is_a_failure(lapwing, failed, code):
 @pytest.mark.parametrize("mode", ["single", "processes"])
 def test_a_divergence_has_its_verdict_in_both_modes(lapwing, mode):
     code, out, err = lapwing(
-        *("run", "gyrostat_feedback", "--mode", mode, "--space", "test-diverge", "--log", "a.mcap"), *sets(*RUN_AWAY)
+        *("run", "gyrostat_feedback", "--mode", mode, "--key-prefix", "test-diverge", "--log", "a.mcap"),
+        *sets(*RUN_AWAY),
     )
     assert (code, err) == (4, "lapwing: the flight has failed: diverged\n")
     assert "Diverged at 0.00 s: gyrostat: not finite at t = 1 s" in out

@@ -106,3 +106,11 @@ def test_keys_are_explained():
     keys = VALIDATORS["scene"].schema["properties"]["effects"]["properties"]["wind_random"]["properties"]
     assert keys["mean"]["description"] == "[m/s] world"
     assert keys["sigma"]["default"] == 1.0
+
+
+@pytest.mark.parametrize("kind", ["effects", "sensors"])
+def test_what_is_the_users_own_names_a_module_and_has_keys_of_its_own(kind):
+    own = {**MISSION, kind: {**MISSION[kind], "my_own": {"module": "my_module", "strength": 2.0}}}
+    assert faults("scene", own) == []
+    del own[kind]["my_own"]["module"]
+    assert faults("scene", own) != []

@@ -32,7 +32,9 @@ def test_a_wheel_flies_a_shipped_scene_from_any_folder(tmp_path):
         )
 
     assert str(site) in python("-c", "import services.table; print(services.table.__file__)").stdout
-    flown = python("-m", "lapwing", "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--space", "test-wheel")
+    flown = python(
+        "-m", "lapwing", "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--key-prefix", "test-wheel"
+    )
     assert flown.returncode == 0, flown.stderr
     assert len(list((work / "recordings").glob("gyrostat_blocked_*.mcap"))) == 1
     assert len(list((work / "recordings").glob("gyrostat_blocked_*.html"))) == 1

@@ -12,7 +12,7 @@ from messages import PoseStamped
 def test_a_client_hears_the_run(tmp_path):
     (door,) = loopback_endpoints(["door"]).values()
     command = [sys.executable, "-m", "lapwing", "run", "scenes/hover.toml", "--speed", "2", "--open", door]
-    command += ["--set", "run.duration=4", "--space", "test-router", "--log", str(tmp_path / "log.mcap")]
+    command += ["--set", "run.duration=4", "--key-prefix", "test-router", "--log", str(tmp_path / "log.mcap")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
         heard = None
         while heard is None and run.poll() is None:

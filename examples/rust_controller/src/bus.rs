@@ -18,7 +18,7 @@ const GID: [u8; 16] = *b"rust_controller.";
 
 pub struct Bus {
     session: Session,
-    space: String,
+    key_prefix: String,
     name: String,
     pub over: Arc<AtomicBool>, // the run has lost its plant
 }
@@ -36,7 +36,7 @@ pub struct Outlet<'a> {
 }
 
 impl Bus {
-    pub fn open(listen: &str, space: &str, name: &str) -> Bus {
+    pub fn open(listen: &str, key_prefix: &str, name: &str) -> Bus {
         let mut config = zenoh::Config::default();
         for (key, value) in [
             ("mode", "\"peer\"".to_string()),
@@ -52,14 +52,14 @@ impl Bus {
             .unwrap_or_else(|e| panic!("cannot listen on {listen}: {e}"));
         Bus {
             session,
-            space: space.to_string(),
+            key_prefix: key_prefix.to_string(),
             name: name.to_string(),
             over: Arc::new(AtomicBool::new(false)),
         }
     }
 
     pub fn source(&self, service: &str) -> Source {
-        let key = format!("{}/_step/{service}", self.space);
+        let key = format!("{}/_step/{service}", self.key_prefix);
         Source {
             subscriber: self.session.declare_subscriber(key).wait().unwrap(),
             service: service.to_string(),
@@ -67,7 +67,7 @@ impl Bus {
     }
 
     pub fn outlet(&self, channel: &str) -> Outlet<'_> {
-        let key = format!("{}/{channel}/{}", self.space, self.name);
+        let key = format!("{}/{channel}/{}", self.key_prefix, self.name);
         let publisher = self
             .session
             .declare_publisher(key)
@@ -80,7 +80,7 @@ impl Bus {
 
     /// Tell our set-up to whoever compares; say that we are there; wait until all of `others` are.
     pub fn join(&self, setup: String, others: &[String]) -> LivelinessToken {
-        let key = format!("{}/_setup/{}", self.space, self.name);
+        let key = format!("{}/_setup/{}", self.key_prefix, self.name);
         let reply = key.clone();
         let answer = move |query: zenoh::query::Query| {
             query.reply(reply.clone(), setup.clone()).wait().ok();
@@ -91,7 +91,7 @@ impl Bus {
             .background()
             .wait()
             .unwrap();
-        let alive = format!("{}/_alive", self.space);
+        let alive = format!("{}/_alive", self.key_prefix);
         let token = self
             .session
             .liveliness()

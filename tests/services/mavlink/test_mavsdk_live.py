@@ -56,10 +56,10 @@ async def started(url):
     raise AssertionError("MAVSDK's server does not start")
 
 
-def session(tmp_path, space, story, *sets):
+def session(tmp_path, key_prefix, story, *sets):
     """Tell a story to the drone of a live run; its log."""
-    port, log = free_port(), tmp_path / f"{space}.mcap"
-    command = [sys.executable, "-m", "lapwing", "run", SCENE, "--space", space, "--log", str(log)]
+    port, log = free_port(), tmp_path / f"{key_prefix}.mcap"
+    command = [sys.executable, "-m", "lapwing", "run", SCENE, "--key-prefix", key_prefix, "--log", str(log)]
     command += ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", f"{SPEED:g}"]
     command += [part for each in ("run.duration=900", *sets) for part in ("--set", each)]
 

@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 HOVER = "scenes/hover.toml"
 
 
-def run(tmp_path, space, *more, **options):
-    command = [sys.executable, "-m", "lapwing", "run", HOVER, "--space", space, *more]
-    command += ["--log", str(tmp_path / f"{space}.mcap")]
+def run(tmp_path, key_prefix, *more, **options):
+    command = [sys.executable, "-m", "lapwing", "run", HOVER, "--key-prefix", key_prefix, *more]
+    command += ["--log", str(tmp_path / f"{key_prefix}.mcap")]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
 
 
@@ -87,10 +87,10 @@ def test_a_client_flies_the_autopilot_of_a_live_run(tmp_path):
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds processes in /proc")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
-    port, space = free_port(), f"test-mavlink-{how.name.lower()}"
+    port, key_prefix = free_port(), f"test-mavlink-{how.name.lower()}"
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", "4"]
-    with run(tmp_path, space, *more) as process:
+    with run(tmp_path, key_prefix, *more) as process:
         adapter = adapter_of(process)
         heard(station, "ATTITUDE")
         os.kill(adapter, how)
@@ -99,7 +99,7 @@ def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
     assert process.returncode == 0, said
     if how == signal.SIGKILL:
         assert "mavlink: ended before the flight (signal 9)" in said
-    with LogReader(tmp_path / f"{space}.mcap") as log:
+    with LogReader(tmp_path / f"{key_prefix}.mcap") as log:
         assert log.complete
 
 
@@ -127,7 +127,7 @@ def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
                 writer.write(topic.key("drone1"), topic.message, message.encode(), vehicle.time_ns)
     port, (endpoint,) = free_port(), loopback_endpoints(["a"]).values()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    command = [sys.executable, "-m", "lapwing", "replay", str(log), "--space", "test-mavlink-replay"]
+    command = [sys.executable, "-m", "lapwing", "replay", str(log), "--key-prefix", "test-mavlink-replay"]
     command += ["--listen", endpoint, "--mavlink", f"udpout:127.0.0.1:{port}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         heard(station, "HEARTBEAT")

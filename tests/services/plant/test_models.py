@@ -98,7 +98,7 @@ def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
     for mode in ("processes", "single"):
         figures = tmp_path / f"{mode}.json"
         command = [sys.executable, "-m", "lapwing", "run", str(LOAD), "--mode", mode, "--set", "run.duration=0.5"]
-        command += ["--json", str(figures), "--log", str(tmp_path / f"{mode}.mcap"), "--space", "test-formation"]
+        command += ["--json", str(figures), "--log", str(tmp_path / f"{mode}.mcap"), "--key-prefix", "test-formation"]
         subprocess.run(command, check=True, timeout=300, capture_output=True)
         digests.add(json.loads(figures.read_text())["digest"])
     assert len(digests) == 1
