@@ -233,7 +233,7 @@ class Flight:
         try:
             import pandas
         except ImportError:
-            raise ImportError("to_dataframe: pandas is not installed; pip install pandas") from None
+            raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
 

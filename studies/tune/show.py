@@ -64,7 +64,7 @@ def cell(m: Margins) -> str:
 
 def _margins(found: Tuned) -> Rows:
     rows = Rows(
-        "Crossover in rad/s, phase margin in degrees, gain margin up/down in dB", "loop", found.before.name, "new"
+        "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", found.before.name, "new"
     )
     for name in found.after.margins:
         rows.add(name, cell(found.before.margins[name]), cell(found.after.margins[name]))

@@ -64,7 +64,7 @@ class StandIn:
         for command in self.commands:
             self.kinds[command.kind] = command
             if command.kind not in self.deaf:
-                self.answers.append(self.obey(command))
+                self.answers.append(self.handle(command))
         self.commands = []
         self.fly()
         head = header(self.time_ns, "world")
@@ -84,7 +84,7 @@ class StandIn:
     def fresh(self):
         return self.seconds - self.setpoint_at < 1.0
 
-    def obey(self, c):
+    def handle(self, c):
         done = getattr(self, f"do_{c.kind}", self.enter)(c)
         result, value = done if isinstance(done, tuple) else (done or 0, 0.0)
         return CommandAck(c.source, c.id, result, 0.0, "", value)

@@ -63,7 +63,7 @@ def test_what_the_autopilot_refuses_is_refused(number):
 def test_progress_is_passed_on_before_the_end():
     bench = Bench()
     results = iter([CommandAck(result=CommandAck.IN_PROGRESS, progress=0.4)])
-    bench.vehicle.obey = lambda c: next(results)._replace(id=c.id)
+    bench.vehicle.handle = lambda c: next(results)._replace(id=c.id)
     station = bench.station()
     station.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
     bench.step(2)

@@ -39,7 +39,7 @@ def test_frames_in_pieces_over_tcp_and_a_client_that_goes():
         assert until(lambda: not running.hub.adapter.sessions)
 
 
-def test_a_serial_line_is_watched_but_not_obeyed():
+def test_a_serial_line_is_watched_but_its_commands_are_refused():
     master, slave = pty.openpty()
     with flying(f"serial:{os.ttyname(slave)}:57600") as running:
         os.write(master, frame())
