@@ -1,6 +1,7 @@
 """The studies: performance, effects, accuracy, campaign, tune."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +17,9 @@ from studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from cosim.scene import Scene
 
 
 def _study(
@@ -47,6 +51,19 @@ def _study(
         module.write_json(json, found)
     if plot:
         module.plot(plot, found)
+
+
+@contextmanager
+def _compiling(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
+    """Say with a guess of the time when the scene's closed loop has to be compiled first, and only then."""
+    from lapwing.runs.compiling import told
+    from services.table import resolve
+
+    def say(guess: float) -> None:
+        progress.update(task, description=f"compiling, about {guess:.0f} s, then flying")
+
+    with told(resolve(scene), say, alone=False):
+        yield
 
 
 @app.command()
@@ -129,8 +146,11 @@ def campaign(
         def fly() -> study.Campaign:
             loaded = load(scene, set_ or [])
             with Progress(console=screen, transient=True) as progress:
-                task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
-                return study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
+                task = progress.add_task("flying", total=seeds)
+                with _compiling(loaded, progress, task):
+                    return study.campaign(
+                        loaded, range(1, seeds + 1), lambda: progress.update(task, advance=1, description="flying")
+                    )
 
         _study("SCENE", scene, json, plot, screen, fly, show)
 
@@ -176,11 +196,15 @@ def tune(
         wanted, screen = Bandwidths(altitude, yaw, attitude, position), console()
         with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
+            loaded = load(scene, set_ or [])
 
             def say(text: str) -> None:
                 progress.console.print(text, highlight=False, soft_wrap=True)
 
-            found = study.tune(load(scene, set_ or []), wanted, say, log, lambda: progress.advance(task))
+            with _compiling(loaded, progress, task):
+                found = study.tune(
+                    loaded, wanted, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
+                )
         show.show(screen, found)
         if out:
             study.write(out, found.gains)

@@ -27,7 +27,7 @@ def fly_joined(setup: Setup, peers: dict[str, str], space: str, observer: Observ
         Interrupted: ended by a signal.
     """
     check_space(space)
-    clock = Clock(observer)
+    clock = Clock(observer, setup)
     names = set(processes.needed(setup))
     listen, connect = mesh(WATCHER, peers)
     with Stop() as stop, ZenohBus(listen, connect) as bus:
