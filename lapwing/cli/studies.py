@@ -88,6 +88,7 @@ def effects(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
 ) -> None:
     """What each effect of a scene costs and changes, and which of them it could do without."""
+    from lapwing.cli.countdown import Countdown
     from services.table import load
     from studies.effects import show
     from studies.effects.study import Study, study
@@ -99,7 +100,8 @@ def effects(
         screen = console()
 
         def find() -> Study:
-            return study(load(scene, set_ or []), within, screen.print)
+            with Countdown(screen) as countdown:
+                return study(load(scene, set_ or []), within, countdown.say)
 
         _study("SCENE", scene, json, plot, screen, find, show)
 
