@@ -11,7 +11,7 @@ from rich.table import Table
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import Airframe, load_airframe
-from services.common.vehicle import airframe
+from services.common.vehicle import airframe, rotor_constants
 from services.table import load
 
 
@@ -20,10 +20,10 @@ class Row(NamedTuple):
 
     name: str
     unit: str
-    computed: float
+    computed: float | None  # None: the vehicle lacks what it needs
     published: float | None
     source: str
-    reason: str
+    reason: str  # why the two differ, or why nothing is computed
 
 
 # name of the function and of the published figure: (unit shown, SI units in one of it)
@@ -44,51 +44,62 @@ def card(subject: Path) -> list[Row]:
         subject: an airframe's file, or a scene, whose vehicle is taken.
 
     Raises:
-        ValueError: neither of the two, or an airframe without the parts that a figure needs.
+        ValueError: neither of the two, or nothing says what the rotors give.
     """
-    vehicle = _airframe(subject)
+    vehicle, rotor = _vehicle(subject)
     rows = []
     for name, (unit, size) in _SHOWN.items():
-        value = getattr(performance, name)(vehicle)
-        value = value[0] if isinstance(value, tuple) else value
         stated = getattr(vehicle.published, name) if vehicle.published else None
+        computed, reason = None, stated.reason if stated else ""
+        try:
+            value = getattr(performance, name)(vehicle, rotor=rotor)
+            computed = (value[0] if isinstance(value, tuple) else value) / size
+        except ValueError as lacking:
+            reason = str(lacking)
         rows.append(
             Row(
                 name.replace("_", " "),
                 unit,
-                value / size,
+                computed,
                 stated.value / size if stated else None,
                 vehicle.published.source if vehicle.published else "",
-                stated.reason if stated else "",
+                reason,
             )
         )
     return rows
 
 
-def _airframe(subject: Path) -> Airframe:
+def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
     try:
         tables = tomllib.loads(subject.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         tables = {}
     if "rotors" in tables:  # what no scene has
-        return load_airframe(subject)
-    return airframe(load(subject))
+        alone = load_airframe(subject)
+        try:
+            return alone, performance.rotor_of(alone)
+        except ValueError as lacking:
+            raise ValueError(f"{subject}: {lacking}") from None
+    scene = load(subject)
+    frame, rotor = airframe(scene), rotor_constants(scene)
+    return frame, performance.rotor_of(frame) if rotor.with_density else performance.Rotor(*rotor)
 
 
 def show(console: Console, rows: list[Row]) -> None:
     """Print the card."""
     source = rows[0].source
-    table = Table(show_lines=True)
+    table = Table(show_lines=bool(source))
     table.add_column("figure")
     table.add_column("computed", justify="right")
     if source:
         table.add_column(source, justify="right")
-        table.add_column("why they differ")
+    if any(row.reason for row in rows):
+        table.add_column("why they differ" if source else "why not")
     for row in rows:
-        cells = [f"{row.name} [{row.unit}]", f"{row.computed:.1f}"]
+        cells = [f"{row.name} [{row.unit}]", "" if row.computed is None else f"{row.computed:.1f}"]
         if source:
-            cells += ["" if row.published is None else f"{row.published:.1f}", row.reason]
-        table.add_row(*cells)
+            cells.append("" if row.published is None else f"{row.published:.1f}")
+        table.add_row(*cells, *([row.reason] if len(table.columns) > len(cells) else []))
     console.print(table)
 
 

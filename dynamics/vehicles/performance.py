@@ -29,15 +29,53 @@ class Trim(NamedTuple):
     power: float  # [W] of all motors
 
 
-def trim(airframe: Airframe, speed: float = 0.0, density: float = DENSITY, mass: float | None = None) -> Trim:
-    """Steady level flight at a speed [m/s]; `mass` [kg] instead of the airframe's.
+class Rotor(NamedTuple):
+    """What one rotor gives: thrust and torque over the square of its speed, and what inflow along its axis takes."""
+
+    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where it goes with the density
+    torque: float  # [N m s^2/rad^2], the same
+    with_density: bool = True
+    pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
+    parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
+
+    def constants(self, density: float) -> tuple[float, float]:
+        """Thrust and torque over the square of the speed at a density [kg/m^3]."""
+        factor = density if self.with_density else 1.0
+        return factor * self.thrust, factor * self.torque
+
+
+def rotor_of(airframe: Airframe) -> Rotor:
+    """The rotor that the airframe's propeller makes.
+
+    Raises:
+        ValueError: it has none.
+    """
+    propeller, square = airframe.propeller, (2.0 * math.pi) ** 2
+    if propeller is None:
+        raise ValueError("the vehicle has no [propeller]; give a scene with [effects.rotor_quadratic] instead")
+    return Rotor(
+        thrust_coefficient(propeller) * propeller.diameter**4 / square,
+        torque_coefficient(propeller) * propeller.diameter**5 / square,
+        pitch=propeller.pitch,
+        parts=drag_coefficients(propeller),
+    )
+
+
+def trim(
+    airframe: Airframe,
+    speed: float = 0.0,
+    density: float = DENSITY,
+    mass: float | None = None,
+    rotor: Rotor | None = None,
+) -> Trim:
+    """Steady level flight at a speed [m/s]; `mass` [kg] and `rotor` instead of the airframe's.
 
     Raises:
         ValueError: the airframe has no propeller, or no drag areas and a speed above 0.
     """
-    propeller, count = _propeller(airframe), len(airframe.rotors.position)
+    rotor, count = rotor or rotor_of(airframe), len(airframe.rotors.position)
     if speed > 0.0 and airframe.drag is None:
-        raise ValueError("the vehicle has no [drag]: its performance at speed is not defined")
+        raise ValueError("the vehicle has no [drag]")
     weight = (airframe.mass.total if mass is None else mass) * GRAVITY
     ahead, _, below = airframe.drag.area if airframe.drag else (0.0, 0.0, 0.0)
     pressure = 0.5 * density * speed * speed
@@ -49,11 +87,9 @@ def trim(airframe: Airframe, speed: float = 0.0, density: float = DENSITY, mass:
 
     tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
     thrust = math.hypot(*forces(tilt)) / count
-    square = (2.0 * math.pi) ** 2
-    k_thrust = density * thrust_coefficient(propeller) * propeller.diameter**4 / square
-    k_torque = density * torque_coefficient(propeller) * propeller.diameter**5 / square
-    profile, induced = drag_coefficients(propeller)
-    w = 2.0 * math.pi * speed * math.sin(tilt) / propeller.pitch
+    k_thrust, k_torque = rotor.constants(density)
+    profile, induced = rotor.parts
+    w = 2.0 * math.pi * speed * math.sin(tilt) / rotor.pitch
     omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
     torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
     motor = airframe.motor
@@ -62,12 +98,10 @@ def trim(airframe: Airframe, speed: float = 0.0, density: float = DENSITY, mass:
     return Trim(tilt, thrust, omega, voltage, current, count * voltage * current)
 
 
-def maximum_thrust(airframe: Airframe, density: float = DENSITY) -> float:
+def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Of all rotors at rest in the air [N], at the maximum voltage, or at the maximum current if that comes first."""
-    propeller, motor = _propeller(airframe), airframe.motor
-    square = (2.0 * math.pi) ** 2
-    k_thrust = density * thrust_coefficient(propeller) * propeller.diameter**4 / square
-    k_torque = density * torque_coefficient(propeller) * propeller.diameter**5 / square
+    k_thrust, k_torque = (rotor or rotor_of(airframe)).constants(density)
+    motor = airframe.motor
     constant, resistance = motor.rotor_constant, motor.resistance
 
     def excess(omega: float) -> float:
@@ -83,58 +117,58 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY) -> float:
 def battery_energy(airframe: Airframe) -> float:
     """Nominal [J], drawn to the last."""
     if airframe.battery is None:
-        raise ValueError("the vehicle has no [battery]: hover time and range are not defined")
+        raise ValueError("the vehicle has no [battery]")
     return airframe.battery.cells * CELL_VOLTAGE * airframe.battery.capacity
 
 
-def hover_time(airframe: Airframe, density: float = DENSITY) -> float:
+def hover_time(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """[s] at constant power."""
-    return battery_energy(airframe) / trim(airframe, 0.0, density).power
+    return battery_energy(airframe) / trim(airframe, 0.0, density, rotor=rotor).power
 
 
-def maximum_payload(airframe: Airframe, density: float = DENSITY) -> float:
+def maximum_payload(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """[kg] that the maximum thrust lifts beyond the empty vehicle, nothing kept for control."""
-    return maximum_thrust(airframe, density) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
+    return maximum_thrust(airframe, density, rotor) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
 
 
-def maximum_tilt(airframe: Airframe, density: float = DENSITY) -> float:
+def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """[rad] at which the maximum thrust still carries the weight."""
-    return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density), 1.0))
+    return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
 
 
-def ceiling(airframe: Airframe, temperature: float = 15.0) -> float:
-    """Altitude [m] at which the maximum thrust is the weight, by the density law of theory.md, eq. (2.3)."""
+def ceiling(airframe: Airframe, temperature: float = 15.0, rotor: Rotor | None = None) -> float:
+    """Altitude [m] at which the maximum thrust is the weight, by the density law of theory.md, eq. (2.3).
+
+    Raises:
+        ValueError: the thrust does not depend on the density.
+    """
+    if rotor is not None and not rotor.with_density:
+        raise ValueError("[effects.rotor_quadratic] knows no density of the air")
     kelvin, weight = KELVIN + temperature, airframe.mass.total * GRAVITY
 
     def excess(altitude: float) -> float:
         density = SEA_LEVEL_DENSITY * KELVIN / kelvin * (1.0 - LAPSE_RATE * altitude / kelvin) ** EXPONENT
-        return maximum_thrust(airframe, density) - weight
+        return maximum_thrust(airframe, density, rotor) - weight
 
     return brentq(excess, 0.0, 30_000.0) if excess(0.0) > 0.0 else 0.0
 
 
-def maximum_speed(airframe: Airframe, density: float = DENSITY) -> float:
+def maximum_speed(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """[m/s] in level flight, where the voltage is all used."""
     highest = airframe.motor.max_voltage
 
     def excess(speed: float) -> float:
-        return trim(airframe, speed, density).voltage - highest
+        return trim(airframe, speed, density, rotor=rotor).voltage - highest
 
     return brentq(excess, 0.0, 200.0) if excess(0.0) < 0.0 else 0.0
 
 
-def maximum_range(airframe: Airframe, density: float = DENSITY) -> tuple[float, float]:
+def maximum_range(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> tuple[float, float]:
     """(distance [m], at the speed [m/s]) in still air."""
     energy = battery_energy(airframe)
     best = minimize_scalar(
-        lambda speed: -speed / trim(airframe, speed, density).power,
-        bounds=(0.1, maximum_speed(airframe, density)),
+        lambda speed: -speed / trim(airframe, speed, density, rotor=rotor).power,
+        bounds=(0.1, maximum_speed(airframe, density, rotor)),
         method="bounded",
     )
     return -best.fun * energy, best.x
-
-
-def _propeller(airframe: Airframe):
-    if airframe.propeller is None:
-        raise ValueError("the vehicle has no [propeller]: its performance is not defined")
-    return airframe.propeller

@@ -4,16 +4,40 @@ import time
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.progress_bar import ProgressBar
 from rich.text import Text
 
+from lapwing.runs.compiling import notice
 from messages import PoseStamped, Status
 
+NEARLY = 0.97  # of a guess that was too low, where the bar waits
 LINE_PERIOD = 2.0  # [s] of wall time between two lines where the output is no terminal
 
 
 class _Factor(ProgressColumn):
     def render(self, task: Task) -> Text:
+        if task.fields.get("guess"):
+            return Text("")
         return Text(f"{task.completed / task.elapsed:5.1f}x" if task.elapsed else "    -x")
+
+
+class _Done(ProgressColumn):
+    """How far: simulated seconds, or while kernels are compiled the seconds of the guess."""
+
+    def render(self, task: Task) -> Text:
+        if guess := task.fields.get("guess"):
+            return Text(f"{task.elapsed or 0.0:4.0f} of about {guess:.0f} s")
+        return Text(f"{task.completed:6.1f} / {task.total:.0f} s")
+
+
+class _Bar(BarColumn):
+    """The bar of the flight, or of the guess; that one waits before its end."""
+
+    def render(self, task: Task) -> ProgressBar:
+        if guess := task.fields.get("guess"):
+            elapsed = task.elapsed or 0.0
+            return ProgressBar(total=guess, completed=min(elapsed, NEARLY * guess), width=self.bar_width)
+        return super().render(task)
 
 
 class Display:
@@ -28,8 +52,8 @@ class Display:
         self._bar: Progress | None = None
         if console.is_terminal:
             self._bar = Progress(
-                BarColumn(bar_width=24),
-                TextColumn("{task.completed:6.1f} / {task.total:.0f} s"),
+                _Bar(bar_width=24),
+                _Done(),
                 _Factor(),
                 TextColumn("{task.description}", markup=False),
                 console=console,
@@ -51,7 +75,14 @@ class Display:
         self._started = time.monotonic()
         self._next_line = self._started + LINE_PERIOD
         if self._bar:
-            self._bar.reset(self._task, total=self._duration, description="")
+            self._bar.reset(self._task, total=self._duration, description="", guess=None)
+
+    def compiling(self, guess: float) -> None:
+        """Kernels are being compiled, in about `guess` seconds."""
+        if self._bar:
+            self._bar.reset(self._task, total=self._duration, description="compiling kernels, once", guess=guess)
+        else:
+            self.say(notice(guess))
 
     def say(self, line: str) -> None:
         """Print a line."""

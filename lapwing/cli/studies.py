@@ -1,6 +1,7 @@
 """The studies: performance, effects, accuracy, stability, campaign, tune."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +17,9 @@ from studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from cosim.scene import Scene
 
 
 def _study(
@@ -49,6 +53,19 @@ def _study(
         module.plot(plot, found)
 
 
+@contextmanager
+def _compiling(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
+    """Say with a guess of the time when the scene's closed loop has to be compiled first, and only then."""
+    from lapwing.runs.compiling import told
+    from services.table import resolve
+
+    def say(guess: float) -> None:
+        progress.update(task, description=f"compiling, about {guess:.0f} s, then flying")
+
+    with told(resolve(scene), say, alone=False):
+        yield
+
+
 @app.command()
 def performance(
     subject: Annotated[Path, typer.Argument(metavar="SCENE|VEHICLE", help="a scene, or an airframe's TOML file")],
@@ -71,6 +88,7 @@ def effects(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
 ) -> None:
     """What each effect of a scene costs and changes, and which of them it could do without."""
+    from lapwing.cli.countdown import Countdown
     from services.table import load
     from studies.effects import show
     from studies.effects.study import Study, study
@@ -82,7 +100,8 @@ def effects(
         screen = console()
 
         def find() -> Study:
-            return study(load(scene, set_ or []), within, screen.print)
+            with Countdown(screen) as countdown:
+                return study(load(scene, set_ or []), within, countdown.say)
 
         _study("SCENE", scene, json, plot, screen, find, show)
 
@@ -153,8 +172,11 @@ def campaign(
         def fly() -> study.Campaign:
             loaded = load(scene, set_ or [])
             with Progress(console=screen, transient=True) as progress:
-                task = progress.add_task("compiling the closed loop of this scene, then flying", total=seeds)
-                return study.campaign(loaded, range(1, seeds + 1), lambda: progress.advance(task))
+                task = progress.add_task("flying", total=seeds)
+                with _compiling(loaded, progress, task):
+                    return study.campaign(
+                        loaded, range(1, seeds + 1), lambda: progress.update(task, advance=1, description="flying")
+                    )
 
         _study("SCENE", scene, json, plot, screen, fly, show)
 
@@ -200,11 +222,15 @@ def tune(
         wanted, screen = Bandwidths(altitude, yaw, attitude, position), console()
         with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=polish.CANDIDATES)
+            loaded = load(scene, set_ or [])
 
             def say(text: str) -> None:
                 progress.console.print(text, highlight=False, soft_wrap=True)
 
-            found = study.tune(load(scene, set_ or []), wanted, say, log, lambda: progress.advance(task))
+            with _compiling(loaded, progress, task):
+                found = study.tune(
+                    loaded, wanted, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
+                )
         show.show(screen, found)
         if out:
             study.write(out, found.gains)

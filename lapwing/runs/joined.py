@@ -27,7 +27,7 @@ def fly_joined(setup: Setup, peers: dict[str, str], key_prefix: str, observer: O
         Interrupted: ended by a signal.
     """
     check_key_prefix(key_prefix)
-    clock = Clock(observer)
+    clock = Clock(observer, setup)
     names = set(processes.needed(setup))
     listen, connect = mesh(WATCHER, peers)
     with Stop() as stop, ZenohBus(listen, connect) as bus:

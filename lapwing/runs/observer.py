@@ -21,6 +21,10 @@ class Observer(Protocol):
         """The run is at `time_ns`; the newest payloads of the pose and status topics."""
         ...
 
+    def compiling(self, guess: float) -> None:
+        """Kernels are being compiled, which ends with `begin`, in about so many seconds."""
+        ...
+
     def say(self, line: str) -> None:
         """A line for the user."""
         ...
@@ -33,6 +37,9 @@ class Silent:
         """Say nothing."""
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
+        """Say nothing."""
+
+    def compiling(self, guess: float) -> None:
         """Say nothing."""
 
     def say(self, line: str) -> None:

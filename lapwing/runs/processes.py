@@ -10,7 +10,7 @@ from cosim.key_prefix import reserve
 from cosim.launcher import launch
 from cosim.setup import Setup
 from cosim.watch import Watch
-from lapwing.runs.compiling import NOTICE
+from lapwing.runs.compiling import Stopwatch
 from lapwing.runs.observer import Elapsed, Observer
 from messages.topics import POSE, STATUS
 from services import processes
@@ -32,7 +32,7 @@ def fly_processes(given: Participation, observer: Observer, beside: Iterable[str
         Interrupted: ended by a signal.
     """
     setup = given.setup
-    clock = Clock(observer)
+    clock = Clock(observer, setup)
     external = given.external or {}
     names = [*processes.needed(setup, external), *([processes.ROUTER] if given.open else [])]
     core = shared_core(setup)
@@ -59,19 +59,20 @@ def fly_processes(given: Participation, observer: Observer, beside: Iterable[str
 class Clock:
     """Follows a run for the observer, and measures it from its first batch to its last."""
 
-    def __init__(self, observer: Observer):
-        self._observer, self._began, self._told = observer, False, False
+    def __init__(self, observer: Observer, setup: Setup):
+        self._observer, self._began = observer, False
+        self._compiling = Stopwatch("processes", setup.services, observer.compiling)
         self.elapsed = Elapsed(0.0, 0.0)
 
     def observe(self, watch: Watch) -> bool:
         """Show what is new; never asks to stop."""
-        if watch.compiling and not self._told:
-            self._told = True
-            self._observer.say(NOTICE)
         if watch.began is None:
+            if watch.compiling:
+                self._compiling.began()
             return False
         if not self._began:
             self._began = True
+            self._compiling.ended()
             self._observer.begin()
         self.elapsed = Elapsed(watch.time_ns * 1e-9, watch.wall)
         self._observer.show(watch.time_ns, watch.newest.get(POSE), watch.newest.get(STATUS))

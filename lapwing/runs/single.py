@@ -45,7 +45,7 @@ def fly_single(
         Interrupted: ended by a signal.
     """
     watcher = observer or Silent()
-    with told(watcher.say):
+    with told(setup, watcher.compiling):
         graph = Graph(setup, create_all(setup, operator), PAGE)
     with Stop() as stop, LogWriter(log, metadata(setup, "single"), attachments(setup, sources or {})) as writer:
         recording = Recording(writer, setup)

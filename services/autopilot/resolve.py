@@ -6,7 +6,6 @@ from collections.abc import Callable
 from cosim.scene import Scene
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup
-from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.vehicles.multirotor import STANDARD_DENSITY
 from services.autopilot import estimator
 from services.autopilot.config import ESTIMATORS, Autopilot
@@ -21,7 +20,7 @@ from services.common import modules, parameters, ports
 from services.common.exchange import Exchange, Rates, ticks
 from services.common.ports import AutopilotStatus, MotorCommand, Reference
 from services.common.sections import follows_trajectory
-from services.common.vehicle import Effects, airframe, gravity, start_height
+from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height
 
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR)
 
@@ -99,9 +98,9 @@ def _lateness(scene: Scene, imu_every: int) -> int:
 def known_airframe(scene: Scene) -> Airframe:
     """What the autopilot is told of the vehicle: nominal numbers, at standard density."""
     frame = airframe(scene)
-    propeller = RotorThrust.from_scene({}, frame)
-    torque_per_thrust = propeller.torque_constant / propeller.thrust_constant
-    thrust_coefficient = STANDARD_DENSITY * propeller.thrust_constant
+    rotor = rotor_constants(scene)
+    torque_per_thrust = rotor.torque / rotor.thrust
+    thrust_coefficient = (STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
     weight = 0.25 * frame.mass.total * gravity(scene)
     slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
     spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0

@@ -1,12 +1,14 @@
 """What flies and under which physics: the airframe, the effects, and what follows from both."""
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import ConfigDict, Field
 
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics import effects
+from dynamics.effects.rotor_quadratic import RotorQuadratic
+from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.errors import KeyedError
 from dynamics.lie.quaternion import Quaternion
 from dynamics.vector import Vec3
@@ -78,6 +80,31 @@ def active(scene: Scene) -> tuple:
     tables = scene[Effects].tables
     scene[Effects].load(scene)
     return effects.from_scene(tables, airframe(scene)) if tables else ()
+
+
+class RotorConstants(NamedTuple):
+    """Thrust and torque of a rotor at rest in the air, over the square of its speed."""
+
+    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where they go with the density
+    torque: float  # [N m s^2/rad^2]
+    with_density: bool  # whether they are in proportion to the density of the air
+
+
+def rotor_constants(scene: Scene) -> RotorConstants:
+    """Those of the effect that is in force; of the airframe's [propeller] where none of the two that are known is.
+
+    Raises:
+        KeyedError: there is neither.
+    """
+    for effect in active(scene):
+        if isinstance(effect, RotorQuadratic):
+            return RotorConstants(effect.thrust_constant, effect.torque_constant, False)
+    frame = airframe(scene)
+    if frame.propeller is None:
+        expected = "[effects.rotor_quadratic] with both constants, or an airframe with [propeller]"
+        raise KeyedError("effects", "nothing says what the rotors give", expected)
+    known = RotorThrust.from_scene({}, frame)
+    return RotorConstants(known.thrust_constant, known.torque_constant, True)
 
 
 def gravity(scene: Scene) -> float:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
+from dynamics.kernel import statistics
 from studies import terminal
 from studies.accuracy import apart, scenes, table
 from studies.accuracy import plot as picture
@@ -49,7 +50,12 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     check_target(goal)
     scene = scene_of(target, overrides)
     problem = scenes.problem(scene) if scene else find(target)
-    notice = threading.Timer(SLOW, screen.print, ["measuring (the first time each method is compiled) ..."])
+    compiled = statistics().compiled
+
+    def told() -> None:
+        screen.print("compiling, and measuring ..." if statistics().compiled > compiled else "measuring ...")
+
+    notice = threading.Timer(SLOW, told)
     notice.daemon = True
     notice.start()
     try:

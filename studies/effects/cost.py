@@ -8,11 +8,10 @@ import numpy as np
 
 from cosim.scene import Scene
 from dynamics.cell import Cell
-from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.kernel import kernel
 from dynamics.noise import Key, stream_key
 from dynamics.vehicles import multirotor
-from services.common.vehicle import active, airframe, start_height
+from services.common.vehicle import active, airframe, rotor_constants, start_height
 from services.plant.config import method
 from studies.effects.variants import Tables, variant
 
@@ -44,7 +43,8 @@ def costs(scene: Scene, variants: list[Tables]) -> list[tuple[float, float]]:
 def _calls(scene: Scene) -> tuple[Any, Any]:
     frame = airframe(scene)
     p = multirotor.parameters(frame, active(scene))
-    lift = multirotor.STANDARD_DENSITY * RotorThrust.from_scene({}, frame).thrust_constant
+    rotor = rotor_constants(scene)
+    lift = (multirotor.STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
     speed = math.sqrt(frame.mass.total * STANDARD_GRAVITY / (len(frame.rotors.position) * lift))
     voltage = speed / p.layout.speed_per_volt
     return _call(scene, p, HEIGHT, speed, voltage), _call(scene, p, start_height(scene), 0.0, 0.0)

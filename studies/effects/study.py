@@ -44,13 +44,13 @@ class Study(NamedTuple):
         return [r for r in self.rows if not r.active and r.influence and r.influence.trajectory > self.within]
 
 
-def study(scene: Scene, within: float, say: Callable[[str], None]) -> Study:
+def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> Study:
     """Fly the scene without each of its effects, with each of the others, and with fewer and fewer.
 
     Args:
         scene: of a multirotor.
         within: [m] how far the flight with the smallest set may be from the scene's own at any time.
-        say: told what is being flown.
+        say: told what has been flown or is being done, how many flights are done, and of how many.
 
     Raises:
         ValueError: the scene's model knows no effects, or the scene itself comes to no end.
@@ -65,16 +65,18 @@ def study(scene: Scene, within: float, say: Callable[[str], None]) -> Study:
     found: dict[str, Influence] = {}
     with hangar(scene) as crew:
         flights = crew.fly([tables, *flying.values()])
-        say("flying the scene as it is")
+        count = len(flying) + 1
+        say("flying the scene as it is", 0, count)
         flown = next(flights)
         if flown.failure:
             raise ValueError(f"{scene.path}: {flown.failure}")
         for i, (name, flight) in enumerate(zip(flying, flights, strict=True), 1):
-            say(f"{i} of {len(flying)}: {'without' if name in tables else 'with'} {name}")
+            say(f"{'without' if name in tables else 'with'} {name}", i + 1, count)
             found[name] = influence(flown, flight)
         out = sorted((n for n in fewer if n in found), key=lambda n: found[n].trajectory)
-        kept, apart = _smallest(crew, tables, flown, [n for n in out if found[n].trajectory <= within], within, say)
-    say("timing the plant's steps")
+        out = [n for n in out if found[n].trajectory <= within]
+        kept, apart = _smallest(crew, tables, flown, out, within, lambda text: say(text, count, count + 1))
+    say("timing the plant's steps", count + 1, count + 1)
     names = list(flying)
     full, least, *each = costs(scene, [tables, kept, *flying.values()])
     rows = []

@@ -2,9 +2,12 @@
 
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from typing import Any
 
 from cosim.scene import Scene
@@ -49,11 +52,26 @@ class Hangar:
 
 @contextmanager
 def hangar(scene: Scene) -> Iterator[Hangar]:
-    """A hangar whose processes end with the block."""
-    # spawned: a fork of a process with threads may hang
+    """A hangar whose processes end with the block, at once where it ends with an error, and with this process."""
+    # spawned: a fork of a process with threads may hang, and would hold the other end of the pipe
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), context) as pool:
+    theirs, ours = context.Pipe(duplex=False)
+    with ours, ProcessPoolExecutor(os.cpu_count(), context, _end_with, (theirs,)) as pool:
         try:
             yield Hangar(scene, pool)
+        except BaseException:
+            ours.close()  # nobody waits for the flights that are in the air
+            raise
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _end_with(parent: Connection) -> None:
+    """Let this process end as soon as the other end of the pipe is closed, by whom or by what death ever."""
+
+    def watch() -> None:
+        parent.poll(None)
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, who closes the pipe
+    threading.Thread(target=watch, daemon=True).start()

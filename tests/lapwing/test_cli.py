@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from cosim.key_prefix import reserve
-from dynamics.kernel import kernel
 from lapwing.runs import single
-from lapwing.runs.compiling import NOTICE, told
 
 ROOT = Path.cwd()
 HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
@@ -112,22 +110,6 @@ def test_a_signal_while_kernels_compile_ends_the_run_at_once(lapwing, monkeypatc
     code, out, err = lapwing("run", HOVER, "--mode", "single")
     assert (code, out, err) == (143, "", "lapwing: ended by SIGTERM\n")
     assert os.listdir() == ["scenes"]
-
-
-def test_compiling_is_said_once_and_only_where_something_compiles():
-    said = []
-    with told(said.append):
-        pass
-    assert said == []
-
-    @kernel
-    def half(x):
-        return 0.5 * x
-
-    with told(said.append):
-        assert half(1.0) == 0.5
-        assert half(2) == 1.0
-    assert said == [NOTICE]
 
 
 def test_version(lapwing):

@@ -1,13 +1,17 @@
 """The performance card: figures of the models beside the published ones."""
 
 import math
+import re
 from pathlib import Path
 
 import pytest
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import load_airframe
-from studies.performance import card, write_json
+from services.autopilot.resolve import known_airframe
+from services.table import load, resolve
+from studies.performance import card, show, write_json
+from studies.terminal import console
 
 ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "scenes/vehicles/delivery_drone.toml"
@@ -47,3 +51,66 @@ def test_what_is_neither_scene_nor_vehicle_is_refused(tmp_path):
         card(tmp_path / "x.toml")
     with pytest.raises(ValueError, match=r"none\.toml"):
         card(tmp_path / "none.toml")
+
+
+def airframe_without(tmp_path, *tables):
+    """The delivery drone's file without some of its tables."""
+    parts = re.split(r"(?m)^(?=\[)", VEHICLE.read_text())
+    path = tmp_path / "vehicle.toml"
+    path.write_text("".join(part for part in parts if not part.startswith(tuple(f"[{name}" for name in tables))))
+    return path
+
+
+def test_units_are_printed_within_80_columns(capsys):
+    show(console(80), card(VEHICLE))
+    said = capsys.readouterr().out
+    assert "hover time [min]" in said
+    assert "maximum speed [m/s]" in said
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_without_drag_or_battery_the_card_has_what_it_can(tmp_path, capsys):
+    rows = {row.name: row for row in card(airframe_without(tmp_path, "drag", "battery", "published"))}
+    whole = {row.name: row for row in card(VEHICLE)}
+    for name in ("maximum payload", "ceiling", "maximum tilt"):
+        assert rows[name].computed == whole[name].computed
+    assert (rows["maximum speed"].computed, rows["maximum speed"].reason) == (None, "the vehicle has no [drag]")
+    assert (rows["hover time"].computed, rows["hover time"].reason) == (None, "the vehicle has no [battery]")
+    show(console(80), list(rows.values()))
+    assert "the vehicle has no [drag]" in capsys.readouterr().out
+
+
+QUADRATIC = "\n[effects.rotor_quadratic]\nthrust_constant = 4.0e-4\ntorque_constant = 1.0e-5\n"
+
+
+def scene_with_constants(tmp_path, vehicle):
+    """The hover scene under `rotor_quadratic`, which knows no propeller."""
+    text = (ROOT / "scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", QUADRATIC)
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace('"delivery_drone"', f'"{vehicle}"'))
+    return path
+
+
+@pytest.mark.parametrize("tables", [("propeller",), ()], ids=["without a propeller", "with both"])
+def test_card_and_autopilot_go_by_the_rotors_that_are_in_force(tmp_path, tables):
+    scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
+    known = known_airframe(load(scene))
+    assert known.motor.thrust_coefficient == 4.0e-4
+    assert known.torque_per_thrust == pytest.approx(1.0e-5 / 4.0e-4)
+    assert resolve(load(scene)).vehicle == "drone1"
+    rows = {row.name: row for row in card(scene)}
+    weight = load_airframe(VEHICLE).mass.total * performance.GRAVITY
+    speed = math.sqrt(0.25 * weight / 4.0e-4)
+    motor = load_airframe(VEHICLE).motor
+    current = 1.0e-5 * speed**2 / motor.rotor_constant + motor.no_load_current
+    power = 4.0 * current * (motor.rotor_constant * speed + motor.resistance * current)
+    energy = performance.battery_energy(load_airframe(VEHICLE))
+    assert rows["hover time"].computed == pytest.approx(energy / power / 60.0)
+    assert rows["ceiling"].reason == "[effects.rotor_quadratic] knows no density of the air"
+
+
+def test_an_airframe_of_which_nothing_says_what_its_rotors_give_is_refused_by_check(tmp_path):
+    with pytest.raises(ValueError, match=r"no \[propeller\]; give a scene with \[effects.rotor_quadratic\]"):
+        card(airframe_without(tmp_path, "propeller"))
+    with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
+        load("hover", {"vehicle.airframe": str(airframe_without(tmp_path, "propeller"))})

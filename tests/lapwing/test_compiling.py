@@ -1,0 +1,82 @@
+"""Compiling is told with a guess and a bar, and only where something compiles."""
+
+import io
+import json
+import random
+
+import pytest
+from rich.console import Console
+
+from dynamics.kernel import kernel
+from lapwing.cli.progress import Display
+from lapwing.runs import compiling
+from lapwing.runs.compiling import EACH, FILE, told
+from services.table import load, resolve
+
+SERVICES = 3  # of the hover scene
+
+
+@pytest.fixture(scope="module")
+def setup():
+    return resolve(load("hover"))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiling, "cache_folder", lambda: tmp_path)
+    return tmp_path
+
+
+def compile_something():
+    new = random.random()  # the cache has none with this constant
+
+    @kernel
+    def times(x):
+        return new * x
+
+    assert times(1.0) == new
+    assert times(2) == 2.0 * new
+
+
+def test_it_is_said_once_and_only_where_something_compiles(setup, folder):
+    said = []
+    with told(setup, said.append):
+        pass
+    assert said == []
+    assert not (folder / FILE).exists()
+    with told(setup, said.append):
+        compile_something()
+    assert said == [EACH * SERVICES]
+
+
+def test_the_guess_is_the_time_that_it_took_before(setup, folder):
+    with told(setup, lambda _: None):
+        compile_something()
+    (key,) = known = json.loads((folder / FILE).read_text())
+    assert 0.0 <= known[key] < EACH
+    (folder / FILE).write_text(json.dumps({key: 81.5}))
+    said = []
+    with told(setup, said.append):
+        compile_something()
+    assert said == [81.5]
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"a": []}'])
+def test_a_damaged_memory_is_none(setup, folder, content):
+    (folder / FILE).write_text(content)
+    said = []
+    with told(setup, said.append):
+        compile_something()
+    assert said == [EACH * SERVICES]
+
+
+def test_a_terminal_has_a_bar_and_anything_else_a_line():
+    for terminal, expected in ((True, "of about 40 s"), (False, "compiling kernels, about 40 s")):
+        console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
+        with Display(console, 20.0) as display:
+            display.compiling(40.0)
+            if display._bar:
+                display._bar.refresh()
+            said = console.file.getvalue()
+            display.begin()
+        assert expected in said
