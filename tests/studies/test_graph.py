@@ -28,10 +28,9 @@ def test_who_listens(mission):
 def test_every_topic_has_an_arrow_of_its_own_and_the_link_leads_to_a_ground_station(mission):
     found = graph.arrows(mission)
     told = [arrow.text for arrow in found]
-    assert sorted(told) == sorted(
-        [*(text for texts in graph.handed(mission).values() for text in texts)]
-        + ["every recorded topic", "every topic", "telemetry", "commands", "MAVLink 2"]
-    )
+    handed = [text for texts in graph.handed(mission).values() for text in texts]
+    beside = ["every recorded topic", "every topic", "telemetry", "commands", "MAVLink 2"]
+    assert sorted(told) == sorted([*handed, *beside])
     assert len({(arrow.start, arrow.end) for arrow in found}) == len(found)  # none lies on another
     link = found[told.index("MAVLink 2")]
     assert link.both_ways
@@ -53,8 +52,6 @@ def test_the_picture_shows_everybody(mission, tmp_path, ending):
     graph.draw(mission, path)
     content = path.read_bytes()
     if ending == "svg":
-        assert all(
-            f"<!-- {name} -->".encode() in content
-            for name in ("plant", "sensors", "recorder", "mavlink", "ground station", "imu")
-        )
+        shown = ("plant", "sensors", "recorder", "mavlink", "ground station", "imu")
+        assert all(f"<!-- {name} -->".encode() in content for name in shown)
     assert len(content) > 10_000
