@@ -14,7 +14,7 @@ import pytest
 from cosim.launcher import PARTICIPANT
 from cosim.log import LogReader
 from lapwing.runs.single import fly_single
-from messages import BodyStates
+from messages import BodyStates, VehicleState
 from services.table import load, resolve
 
 SCENE = Path("scenes/hover.toml")
@@ -159,6 +159,9 @@ def test_another_seed_gives_other_bits(tmp_path):
     wind = "effects.wind_random={mean=[1.0, 0.0, 0.0], sigma=0.5}"
     assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
+    with LogReader(tmp_path / "single.mcap") as log:
+        told = [VehicleState.decode(payload).wind.x for *_, payload in log.messages(["/drone1/truth"])]
+    assert sum(told) / len(told) == pytest.approx(1.0, abs=0.1)  # the wind at the vehicle, not 0
 
 
 IDLE = [
