@@ -47,6 +47,8 @@ def fault(error: ValidationError, model: type) -> KeyedError:
 def _expected(kind: str, message: str, context: dict[str, Any], hint: Any) -> str:
     if kind in OF_NUMBERS and hint is not None:
         return describe(hint)
+    if kind == "tuple_type":
+        return "a list"
     if kind == "too_short":
         return f"at least {context['min_length']} of them"
     if kind == "string_pattern_mismatch":

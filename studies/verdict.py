@@ -36,8 +36,10 @@ class Verdict(NamedTuple):
 
     def __str__(self) -> str:
         """The verdict as a sentence without its full stop."""
+        if self.kind == "flown":
+            return f"Flown to the end, {self.time:.2f} s: {self.how}"
         x, y, z = self.position
-        where = "" if self.kind in ("flown", "diverged", "broken off") else f"; ends at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        where = "" if self.kind in ("diverged", "broken off") else f"; ends at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         return f"{self.kind.capitalize()} at {self.time:.2f} s{': ' if self.how else ''}{self.how}{where}"
 
 
@@ -61,7 +63,11 @@ def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverge
     if diverged:
         return verdict("diverged", end, failure)
     if status is None:
-        return verdict("broken off", end, failure) if failure else verdict("flown", end, "to the end, nobody steers")
+        return (
+            verdict("broken off", end, failure)
+            if failure
+            else verdict("flown", end, "nobody steers, so nothing has to land")
+        )
     if accident := _accident(truth, cosine, found):
         return verdict("crashed", *accident)
     if failure:
