@@ -210,7 +210,7 @@ def status(given, time_ns, x):
         w.offboard_fresh,
         () if x.armed else tuple(w.prearm),
         bool(w.failsafe),
-        Vector3(*w.home, 0.0),
+        Vector3(*w.home),
         x.battery_warning,
         x.failed_motor,
     )

@@ -21,9 +21,24 @@ from tests.cosim.one_by_one import BUILDERS
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 FIRST, COUNT = 10_000, 40  # ticks
 WORDS = (
-    Words("mission", "", False, False, "", 0, 0, 65535, 1, False, (), (0.0, 0.0), 0),
-    Words("hold", "", False, False, "the position is lost", 2, 7, 1, 3, True, ("not ready", "no GPS"), (1.5, -2.0), 0),
-    Words("land", "", False, False, "", 1, 7, 0, 4, False, ("not ready",), (0.5, 0.25), 0),
+    Words("mission", "", False, False, "", 0, 0, 65535, 1, False, (), (0.0, 0.0, 0.0), False, 0),
+    Words(
+        "hold",
+        "",
+        False,
+        False,
+        "the position is lost",
+        2,
+        7,
+        1,
+        3,
+        True,
+        ("not ready", "no GPS"),
+        (1.5, -2.0, 0.5),
+        False,
+        0,
+    ),
+    Words("land", "", False, False, "", 1, 7, 0, 4, False, ("not ready",), (0.5, 0.25, 0.0), False, 2),
 )
 
 
