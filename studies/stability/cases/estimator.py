@@ -8,6 +8,7 @@ import numpy as np
 from cosim.graph import Graph
 from dynamics.cell import read
 from messages.topics import ESTIMATE, TRUTH
+from services.autopilot.navigation.gps import GpsFusion
 from services.processes import create_all
 from services.table import load, resolve
 from studies.accuracy.coordinates import matrices
@@ -47,11 +48,14 @@ class Outcome(NamedTuple):
         return np.maximum(self.position / self.position_std, self.angle / self.angle_std)
 
 
-def flown(faults: dict[str, str], more: Sequence[str] = ()) -> Outcome:
-    """The mission with these faults, and more overrides."""
+def flown(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bool = False) -> Outcome:
+    """The mission with these faults, and more overrides; `as_if_on_time`: fixes count as measured when they arrive."""
     overrides = [f"run.duration={END}", *more, *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
     setup = resolve(load("delivery_mission", overrides))
     services = create_all(setup)
+    if as_if_on_time:
+        gps = next(part for service in services for part in service.parts if isinstance(part.parameters, GpsFusion))
+        gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
     wanted = {wire.port for service in services for wire in service.wires if wire.topic in topics}
     graph = Graph(setup, services, 64, wanted)
