@@ -6,22 +6,19 @@ from typing import Any
 from cosim.part import Part
 from cosim.schedule import Input, Port
 from dynamics.cell import Cell
-from services.autopilot.injection.barometer import BarometerInjection
 from services.autopilot.injection.battery import BatteryInjection
-from services.autopilot.injection.gps import GpsInjection
 from services.autopilot.injection.imu import ImuInjection
-from services.autopilot.injection.magnetometer import MagnetometerInjection
 from services.autopilot.injection.memory import Memory
 from services.autopilot.injection.motors import MotorInjection
-from services.autopilot.injection.sonar import SonarInjection
+from services.autopilot.injection.sensor import SensorInjection
 from services.common import ports
 
 _SENSORS: dict[str, Callable[[Any], Any]] = {
     ports.IMU: ImuInjection,
-    ports.MAGNETOMETER: MagnetometerInjection,
-    ports.BAROMETER: BarometerInjection,
-    ports.GPS: GpsInjection,
-    ports.SONAR: SonarInjection,
+    ports.MAGNETOMETER: SensorInjection,
+    ports.BAROMETER: SensorInjection,
+    ports.GPS: SensorInjection,
+    ports.SONAR: SensorInjection,
 }
 _UNITS = {
     ports.IMU: ("gyro", "accelerometer"),
