@@ -7,6 +7,11 @@
 # release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder of
 # older engines takes it too: no mounts, no here-documents.
 ARG BASE=python:3.11-slim-bookworm
+# An earlier image, whose kernels are taken where nothing of them has changed; deploy/build.sh names it.
+ARG PREVIOUS
+
+
+FROM ${PREVIOUS:-${BASE}} AS previous
 
 
 FROM ${BASE} AS dependencies
@@ -19,7 +24,7 @@ COPY deploy/requirements.lock deploy/requirements-tests.lock deploy/slim.py depl
 RUN /build/install.sh
 
 
-FROM ${BASE} AS runtime
+FROM ${BASE} AS installed
 # Machine code for a fixed kind of processor, so that the kernels warmed here are found on every machine. Scalar code
 # is as fast as the host's own kind; the numbers are the same bits. On ARM: --build-arg NUMBA_CPU_NAME=generic.
 ARG NUMBA_CPU_NAME=x86-64-v3
@@ -41,8 +46,20 @@ COPY messages messages
 COPY services services
 COPY studies studies
 COPY scenes scenes
-COPY deploy/entrypoint.sh deploy/warm.sh /opt/lapwing/bin/
-RUN warm.sh
+COPY deploy/entrypoint.sh /opt/lapwing/bin/
+RUN pip --python /opt/lapwing/bin/python install --no-deps --no-build-isolation --no-index --no-cache-dir --editable . \
+    && rm -rf build && mkdir -p recordings && chmod 777 recordings
+
+
+FROM installed AS warmed
+# The first file is in every image: one that has no kernels is no error.
+COPY --from=previous /etc/debian_version /var/cache/lapwin[g] /var/cache/lapwing/
+COPY deploy/warm.py /build/
+RUN python /build/warm.py
+
+
+FROM installed AS runtime
+COPY --from=warmed /var/cache/lapwing /var/cache/lapwing
 USER lapwing
 ENTRYPOINT ["entrypoint.sh"]
 CMD ["lapwing", "--help"]

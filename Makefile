@@ -3,24 +3,40 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: mission test check stability bench docker-build docker-test clean
+# Without their byte code on the disk, processes take half a second longer to start, and tests start many.
+unexport PYTHONDONTWRITEBYTECODE
 
-# The lock file pins what was tested; without it the lower bounds of pyproject.toml hold.
+.PHONY: mission test quick check stability bench sbom audit docker-build docker-test clean
+
+# The lock file pins what was tested, by version and hash. pip takes no hashes where it installs a folder, so what is
+# installed with this one has the versions alone.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
 $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint deploy/requirements.lock --editable ".[dev]"
+	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
+	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' deploy/requirements.lock > $(VENV)/versions.txt
+	$(PINNED) ".[dev]"
 	touch $@
 
 mission: $(VENV)/.installed
 	$(BIN)/lapwing run scenes/delivery_mission.toml
 
-# Ground stations that the tests fly with; where they cannot be had, those tests say so and are skipped.
+# Ground stations and ROS 2 nodes that the tests fly with; where they cannot be had, those tests say so and are skipped.
+# zenoh-ros2-sdk has a folder to itself: it brings a package `messages`, which would stand before ours.
 $(VENV)/.clients: $(VENV)/.installed
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint deploy/requirements.lock --editable ".[clients]"
+	-$(PINNED) ".[clients]"
+	-$(INSTALL) --no-deps --target $(VENV)/ros2-sdk "zenoh-ros2-sdk>=0.1.8"
 	touch $@
 
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --durations 20 --durations-min 1
+
 test: $(VENV)/.clients
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(PYTEST)
+
+# What a change most likely breaks: all but the tests that are marked long.
+quick: $(VENV)/.installed
+	$(PYTEST) -m "not long"
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
@@ -33,11 +49,25 @@ stability: $(VENV)/.installed
 	$(BIN)/lapwing stability
 
 $(VENV)/.bench: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint deploy/requirements.lock --editable ".[bench]"
+	$(PINNED) ".[bench]"
 	touch $@
 
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
+
+# What is installed, for those who must know: a bill of materials in CycloneDX's form, and the known faults of it (asks
+# a database on the network).
+$(VENV)/audit/bin/pip-audit:
+	$(PYTHON) -m venv $(VENV)/audit
+	$(VENV)/audit/bin/python -m pip install --quiet --disable-pip-version-check "cyclonedx-bom>=7" "pip-audit>=2.9"
+
+sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
+	mkdir -p build
+	$(VENV)/audit/bin/cyclonedx-py requirements deploy/requirements.lock --pyproject pyproject.toml \
+		--output-reproducible --output-format JSON --output-file build/sbom.json
+
+audit: $(VENV)/audit/bin/pip-audit
+	$(VENV)/audit/bin/pip-audit --strict --require-hashes --disable-pip --requirement deploy/requirements.lock
 
 docker-build:
 	PYTHON=$(PYTHON) deploy/build.sh

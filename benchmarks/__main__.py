@@ -1,8 +1,28 @@
-"""All benchmarks one after the other: `make bench`. Each module of this folder with a `main()` is one."""
+"""All benchmarks one after the other, and at the end every figure that has a bar beside it: `make bench`.
+
+    python -m benchmarks [--quick] [NAME...]
+
+Each module of this folder with a `main()` is one; what it returns are its rows of the table.
+"""
+
+import argparse
 
 import benchmarks
+from benchmarks._bars import show
 from dynamics import discovery
 
-for name, module in discovery.modules(benchmarks).items():
+found = discovery.modules(benchmarks)
+parser = argparse.ArgumentParser(prog="python -m benchmarks")
+parser.add_argument("names", metavar="NAME", nargs="*", help=f"one of {', '.join(found)}; all if none is named")
+parser.add_argument("--quick", action="store_true", help="leave out those that take many minutes")
+given = parser.parse_args()
+if unknown := set(given.names) - found.keys():
+    parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(found)}")
+rows = []
+for name, module in found.items():
+    if (given.names and name not in given.names) or (given.quick and getattr(module, "SLOW", False)):
+        continue
     print(f"== {name}", flush=True)
-    module.main()
+    rows += module.main() or []
+print("== beside their bars")
+show(rows)

@@ -15,10 +15,12 @@ import time
 from itertools import pairwise
 from statistics import median
 
+from benchmarks._bars import Row, show
 from cosim.bus import ZenohBus, mesh
 from cosim.graph import Service
-from cosim.launcher import loopback_endpoints
 from cosim.lockstep import pin, run_lockstep
+from cosim.participants import Participants
+from cosim.private import private_endpoints
 from cosim.process import Process
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup, Setup
@@ -70,9 +72,13 @@ def lockstep_process(name, peers, cycles, core):
     setup = Setup("benchmark", "", 1, cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
     part = Constant(name, cycles)
     wires = plant_wires(setup, NONE) if name == "plant" else []
-    with ZenohBus(*mesh(name, peers)) as bus:
+    participants = Participants("bench")
+    with ZenohBus(*mesh(name, peers), mark=participants.mark(name)) as bus:
         run_lockstep(
-            Process(name, setup, bus, "bench", list(peers), core=core), Service(name, [part], wires), name == "plant"
+            Process(name, setup, bus, participants, list(peers), core=core),
+            Service(name, [part], wires),
+            name == "plant",
+            "recorder",
         )
         if name == "plant":
             print(json.dumps(part.stamps), flush=True)
@@ -111,16 +117,15 @@ KINDS = {"ping": (ping_process, ["a", "b", "c"]), "lockstep": (lockstep_process,
 
 def measure(kind, cycles, core):
     """Seconds of each cycle."""
-    peers = loopback_endpoints(KINDS[kind][1])
-    children = [
-        subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.lockstep", kind, name, json.dumps(peers), str(cycles), json.dumps(core)],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for name in peers
-    ]
-    output = "".join(child.communicate(timeout=120)[0] for child in children)
+    with private_endpoints(KINDS[kind][1]) as peers:
+        more = [json.dumps(peers), str(cycles), json.dumps(core)]
+        children = [
+            subprocess.Popen(
+                [sys.executable, "-m", "benchmarks.lockstep", kind, name, *more], stdout=subprocess.PIPE, text=True
+            )
+            for name in peers
+        ]
+        output = "".join(child.communicate(timeout=120)[0] for child in children)
     stamps = json.loads(output)
     cycles_s = [b - a for a, b in pairwise(stamps)]
     return cycles_s[len(cycles_s) // 10 :]  # without the start
@@ -147,6 +152,7 @@ def compare(cycles, repeats, core):
 
 
 def main(cycles=5000, repeats=5):
+    found = []
     for placing, core in (("one core", 0), ("free", None)):
         figures = compare(cycles, repeats, core)
         for kind in KINDS:
@@ -155,7 +161,9 @@ def main(cycles=5000, repeats=5):
                 f"{kind:8} ({placing:8}): p50 {f['p50_us']:6.1f} us  p99 {f['p99_us']:6.1f} us  "
                 f"{f['cycles_per_s']:6.0f} cycles/s  {HOPS} hops"
             )
-        print(f"lockstep / ping ({placing}): {figures['ratio_of_medians']:.2f}")
+        found.append(Row(f"cycle of the lock step to the bare ping, {placing}", figures["ratio_of_medians"], "", 1.5))
+    show(found)
+    return found
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
+from benchmarks._bars import Row, show, size_mb
+
 SCENE = "scenes/delivery_mission.toml"
 
 
@@ -28,9 +30,16 @@ def main(repeats=3):
     with tempfile.TemporaryDirectory() as folder:
         fly("single", folder)
         runs = {mode: [fly(mode, folder) for _ in range(repeats)] for mode in ("processes", "single")}
-    assert len({run["digest"] for mode in runs.values() for run in mode}) == 1, "the digests differ"
-    for mode, figures in runs.items():
-        print(f"mission, {mode:9}: real-time factor {median(run['real_time_factor'] for run in figures):6.1f}")
+        assert len({run["digest"] for mode in runs.values() for run in mode}) == 1, "the digests differ"
+        size = size_mb(Path(folder, "log.mcap"))
+    factor = {mode: median(run["real_time_factor"] for run in figures) for mode, figures in runs.items()}
+    found = [
+        Row("mission, one process, to real time", factor["single"], "", 150.0, True),
+        Row("mission, a process for each service, to real time", factor["processes"], "", 18.6, True),
+        Row("log of the mission", size, "MB", 5.0),
+    ]
+    show(found)
+    return found
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.newton_euler import angular_acceleration
 
 HERE = Path(__file__).parent
 DRONE = load_airframe(HERE.parent / "scenes/vehicles/delivery_drone.toml")
@@ -38,8 +39,14 @@ MISSION = BARE | {
     "wind_random": {"mean": [3.0, 1.0, 0.0]},
     "ground_contact": {},
 }
-ALL = {name: {} for name in effects.names() if name not in ("gravity", "rotor_quadratic")} | {
+EXCLUDED = (  # another one of their kind is among the rest, or the drone cannot have them
+    "battery_thevenin", "coaxial_wash", "gravity", "induced_velocity", "rotor_quadratic", "rotor_table",
+    "wind_dryden_rates", "wind_von_karman",
+)  # fmt: skip
+ALL = {name: {} for name in effects.names() if name not in EXCLUDED} | {
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
+    "wind_boundary_layer": {"speed": 5.0},
+    "wind_random": {"beside_drag": True},
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 1.0, "duration": 1.0},
     "wind_dryden": {"wind_speed": 5.0, "airspeed": 5.0},
     "payload": {"release_time": 1.0},
@@ -91,7 +98,7 @@ def bare_rate(drive, t, m):
     )
     R, lift, k = rotation_matrix(m.attitude), total(f), p.body.inverse_mass
     acceleration = (k * (R[2] * lift), k * (R[5] * lift), k * (R[8] * lift - gravity.acceleration * p.body.mass))
-    spin = multirotor._angular_acceleration(p.body, m.omega_body, torque)
+    spin = angular_acceleration(p.body, m.omega_body, torque)
     a, r = layout.lag_rate, layout.speed_per_volt
     lag = (a * (r * v[0] - speed[0]), a * (r * v[1] - speed[1]), a * (r * v[2] - speed[2]), a * (r * v[3] - speed[3]))
     return Motion(m.velocity_world, m.omega_body, acceleration, spin, lag)

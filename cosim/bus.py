@@ -9,9 +9,12 @@ import queue
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from types import MappingProxyType
 from typing import Any
 
-from messages.attachment import pack, source_time
+from cosim.errors import BusError
+from messages.attachment import pack, time_and_gid
 
 # One runtime thread instead of six: the largest single gain in latency (see docs/benchmarks.md).
 _RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
@@ -19,14 +22,14 @@ os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
 
-LEASE_MS = 3000  # after this long without a sign of life a peer counts as gone
+LEASE_MS = 10_000  # after this long without a sign of life a peer counts as gone; the launcher finds out sooner
+OPEN_MS = 2_000  # for one attempt to reach a peer; others follow, and closing a session waits for the one under way
+LARGEST = 1 << 26  # [bytes] of a message that is put together from fragments; a set-up or a batch has less
 
 
-class BusError(RuntimeError):
-    """The bus could not be opened."""
-
-
-def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> zenoh.Config:
+def _configuration(
+    listen: Iterable[str], connect: Iterable[str], mode: str, security: Mapping[str, Any]
+) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
         "mode": mode,
@@ -37,43 +40,78 @@ def _configuration(listen: Iterable[str], connect: Iterable[str], mode: str) -> 
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/shared_memory/enabled": False,
+        "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/rx/max_message_size": LARGEST,
+        **security,
     }.items():
         config.insert_json5(key, json.dumps(value))
     return config
 
 
 class ZenohBus:
-    """A session with explicit endpoints, publishers by key, and subscriptions that are queues."""
+    """A session with explicit endpoints, publishers by key, and subscriptions that are queues.
 
-    def __init__(self, listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer"):
+    Attributes:
+        refused: how many messages were not taken: without a sound attachment, or not of their sender.
+    """
+
+    def __init__(
+        self,
+        listen: Iterable[str] = (),
+        connect: Iterable[str] = (),
+        mode: str = "peer",
+        mark: bytes = b"",
+        security: Mapping[str, Any] = MappingProxyType({}),
+    ):
         """Open the session.
+
+        Args:
+            listen: endpoints that others connect to.
+            connect: endpoints of others.
+            mode: of Zenoh: "peer", "client" or "router".
+            mark: 16 bytes that every message carries; made up where there are none.
+            security: further entries of the Zenoh configuration, by key.
 
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
         """
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configuration(listen, connect, mode))
+            self._session = zenoh.open(_configuration(listen, connect, mode, security))
         except zenoh.ZError as error:
-            endpoints = ", ".join(connect if mode == "client" else listen)
+            tried = connect if mode == "client" else listen
+            endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
             action = "connect to" if mode == "client" else "listen on"
             raise BusError(f"cannot {action} {endpoints}: {str(error).partition(' at /')[0]}") from None
-        self._gid = uuid.uuid4().bytes
+        self._mark = mark or uuid.uuid4().bytes
+        self.refused = 0
         self._publishers: dict[str, tuple[zenoh.Publisher, Callable[[bytes, int], None]]] = {}
         self._held: list = []  # subscribers and tokens live as long as the session
 
-    def publisher(self, key: str) -> Callable[[bytes, int], None]:
-        """A function `put(payload, time_ns)` that publishes on `key`; messages of one key keep their order."""
+    @property
+    def session_id(self) -> str:
+        """Zenoh's own identifier of this session, hexadecimal."""
+        return str(self._session.info.zid())
+
+    def publisher(self, key: str, mark: bytes = b"", drops: bool = False) -> Callable[[bytes, int], None]:
+        """A function `put(payload, time_ns)` that publishes on `key`; messages of one key keep their order.
+
+        Args:
+            key: Zenoh key.
+            mark: 16 bytes that its messages carry instead of the bus's.
+            drops: leave out what a slow subscriber has no room for, instead of waiting for it.
+        """
         if key not in self._publishers:
-            declared = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+            control = zenoh.CongestionControl.DROP if drops else zenoh.CongestionControl.BLOCK
+            declared = self._session.declare_publisher(key, congestion_control=control)
             sequence = 0
-            gid = self._gid
+            mark = mark or self._mark
 
             def put(payload: bytes, time_ns: int) -> None:
                 nonlocal sequence
                 sequence += 1
-                declared.put(payload, attachment=pack(sequence, time_ns, gid))
+                declared.put(payload, attachment=pack(sequence, time_ns, mark))
 
             self._publishers[key] = (declared, put)
         return self._publishers[key][1]
@@ -84,24 +122,41 @@ class ZenohBus:
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
     def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> "Subscription":
-        """Receive what is published on any of the keys, in order of arrival.
+        """Receive what whoever publishes on any of the keys, in order of arrival.
 
         `notify` is called from another thread after each arrival, for those who wait for other things besides.
         """
+        return self._receive(key_expressions, None, notify)
+
+    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> "Subscription":
+        """The same of known senders: by key the mark that a message must carry, None for that of the first."""
+        return self._receive(senders, dict(senders), notify)
+
+    def _receive(
+        self, keys: Iterable[str], senders: dict[str, bytes | None] | None, notify: Callable[[], None] | None
+    ) -> "Subscription":
         arrived: queue.SimpleQueue = queue.SimpleQueue()
 
         def take(sample: zenoh.Sample) -> None:
-            arrived.put(sample)
-            notify()  # type: ignore[misc]
+            found = _sound(sample, senders)
+            if found is None:
+                self.refused += 1
+                return
+            arrived.put(found)
+            if notify:
+                notify()
 
-        for key_expression in key_expressions:
-            handler = zenoh.handlers.Callback(take if notify else arrived.put, indirect=False)
-            self._held.append(self._session.declare_subscriber(key_expression, handler))
+        for key in keys:
+            handler = zenoh.handlers.Callback(take, indirect=False)
+            self._held.append(self._session.declare_subscriber(key, handler))
         return Subscription(arrived)
 
-    def declare_alive(self, key: str) -> None:
-        """Say that this participant is there. Call it after `subscribe`: whoever sees it may publish."""
-        self._held.append(self._session.liveliness().declare_token(key))
+    def declare_alive(self, key: str) -> Callable[[], None]:
+        """Say that this participant is there, until what is returned is called. Call it after `subscribe`: whoever sees
+        it may publish."""
+        token = self._session.liveliness().declare_token(key)
+        self._held.append(token)
+        return token.undeclare
 
     def watch_alive(self, key_expression: str, seen: Callable[[str, bool], None]) -> None:
         """Call `seen(key, alive)` from another thread for every participant that is there, comes or goes."""
@@ -112,15 +167,35 @@ class ZenohBus:
         handler = zenoh.handlers.Callback(handle, indirect=False)
         self._held.append(self._session.liveliness().declare_subscriber(key_expression, handler, history=True))
 
-    def answer(self, key: str, payload: bytes) -> None:
-        """Give `payload` to everybody who asks for `key`."""
-        handler: Any = zenoh.handlers.Callback(lambda query: query.reply(key, payload), indirect=False)
+    def answer(self, key: str, answer: Callable[[str], bytes]) -> None:
+        """Give `answer(words)` to everybody who asks for `key` with these words; it is called from another thread.
+
+        Where it raises a ValueError or a KeyError, the words are a stranger's, and are counted as refused.
+        """
+
+        def reply(query: zenoh.Query) -> None:
+            try:
+                found = answer(str(query.parameters))
+            except (KeyError, ValueError):
+                self.refused += 1
+                return
+            query.reply(key, found, attachment=pack(0, 0, self._mark))
+
+        # In a thread of its own: on Zenoh's only one, a reply of several fragments would wait for itself
+        handler: Any = zenoh.handlers.Callback(reply, indirect=True)
         self._held.append(self._session.declare_queryable(key, handler))
 
-    def ask(self, key: str, timeout: float) -> bytes | None:
-        """What somebody answers to `key`, None after `timeout` seconds."""
-        for reply in self._session.get(key, timeout=timeout):
-            if reply.ok is not None:
+    def ask(self, key: str, timeout: float, words: str = "", mark: bytes | None = None) -> bytes | None:
+        """What somebody answers to `key`, None after `timeout` seconds.
+
+        Args:
+            key: Zenoh key.
+            timeout: [s].
+            words: what is asked, without "=", ";" and "#".
+            mark: that the answer must carry, None for any.
+        """
+        for reply in self._session.get(f"{key}?{words}" if words else key, timeout=timeout):
+            if reply.ok is not None and mark in (None, _mark_of(reply.ok)):
                 return reply.ok.payload.to_bytes()
         return None
 
@@ -141,8 +216,9 @@ class ZenohBus:
         return sorted(missing)
 
     def close(self) -> None:
-        """Close the session; what was put before is delivered."""
-        self._session.close()
+        """Close the session; what was put before is delivered, but to those whom nothing reaches any more."""
+        with suppress(zenoh.ZError):  # it has waited for one of these
+            self._session.close()
 
     def __enter__(self) -> "ZenohBus":
         return self
@@ -159,19 +235,41 @@ class Subscription:
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
         """Simulation time [ns] and payload of the next message, None after `timeout` seconds."""
-        try:
-            sample = self._arrived.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        return source_time(sample.attachment.to_bytes()), sample.payload.to_bytes()
+        found = self.get_with_key(timeout)
+        return found and found[1:]
 
     def get_with_key(self, timeout: float) -> tuple[str, int, bytes] | None:
         """The same with the message's key in front."""
         try:
-            sample = self._arrived.get(timeout=timeout)
+            return self._arrived.get(timeout=timeout)
         except queue.Empty:
             return None
-        return str(sample.key_expr), source_time(sample.attachment.to_bytes()), sample.payload.to_bytes()
+
+
+def _sound(sample: zenoh.Sample, senders: dict[str, bytes | None] | None) -> tuple[str, int, bytes] | None:
+    """Key, time [ns] and payload of a message; None where it has no sound attachment, or is not of its sender."""
+    if sample.attachment is None or sample.kind != zenoh.SampleKind.PUT:
+        return None
+    try:
+        time_ns, mark = time_and_gid(sample.attachment.to_bytes())
+    except ValueError:
+        return None
+    key = str(sample.key_expr)
+    if senders is not None:
+        expected = senders.get(key, b"")
+        if expected is None:
+            expected = senders[key] = mark
+        if mark != expected:
+            return None
+    return key, time_ns, sample.payload.to_bytes()
+
+
+def _mark_of(sample: zenoh.Sample) -> bytes:
+    """The mark of a message; none where it has no sound attachment."""
+    try:
+        return time_and_gid(sample.attachment.to_bytes())[1] if sample.attachment is not None else b""
+    except ValueError:
+        return b""
 
 
 def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:

@@ -10,8 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from cosim.errors import DivergedError, LockStepError
 from cosim.part import END, FAILED, GO_ON, LOOK, Code, Part, bind, run, schedule
-from cosim.schedule import KEPT, DivergedError, LockStepError, Port
+from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
 from cosim.wire import Page, Wire, due_ticks, encode
 from dynamics.cell import Cell
@@ -62,7 +63,14 @@ class Graph:
         ended: whether the last tick of the run is over.
     """
 
-    def __init__(self, setup: Setup, services: Sequence[Service], page: int, whole: Collection[str] = ()):
+    def __init__(
+        self,
+        setup: Setup,
+        services: Sequence[Service],
+        page: int,
+        whole: Collection[str] = (),
+        rows: dict[str, np.ndarray] | None = None,
+    ):
         """Bind services, in their order of execution.
 
         Args:
@@ -70,6 +78,7 @@ class Graph:
             services: all of the run, or one.
             page: ticks that the rows keep at least, counted back from the newest.
             whole: ports of which every tick of the run is kept.
+            rows: of a graph that is no longer wanted, which this one writes over where it has the same ports.
         """
         self.setup, self.services = setup, services
         self.tick, self.ended = 0, False
@@ -87,12 +96,15 @@ class Graph:
             for i in getattr(part, "inputs", ()):
                 delays[i.port] = max(delays.get(i.port, 0), i.delay)
         kept = {name: setup.last_tick + 1 if name in whole else page + delays.get(name, 0) for name in used}
-        self._rows = {name: _ring(self.ports[name], kept[name]) for name in sorted(used)}
+        self._rows = {} if rows is None else rows
+        for name in sorted(used):
+            self._rows[name] = _ring(self.ports[name], kept[name], delays.get(name, 0), self._rows.get(name))
         self._parts = parts
         self._codes: list[Code | None] = []
         for part in parts:
             self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Part) else None)
-        self._plan = schedule(self._codes, [getattr(part, "every", 1) for part in parts])
+        every = [getattr(part, "every", 1) for part in parts]
+        self._plan = schedule(self._codes, every, [getattr(part, "vehicle", "") for part in parts])
         self._schedule = Cell(self._plan)  # the same arrays; a cell is handed over faster
         for part in parts:
             if not isinstance(part, Part):
@@ -205,9 +217,14 @@ def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[Page]:
     return found
 
 
-def _ring(port: Port, ticks: int) -> np.ndarray:
+def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
+    """Rows for so many ticks, in the memory of the former ones where these are as many."""
     rows = 1 if port.period == KEPT else -(-ticks // port.period) + SPARE
-    return np.zeros((1 << (rows - 1).bit_length(), max(1, width(port.like))))
+    shape = 1 << (rows - 1).bit_length(), max(1, width(port.like))
+    if former is None or former.shape != shape:
+        return np.zeros(shape)
+    former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # those read before they are written, of ticks before 0
+    return former
 
 
 def _unsound(name: str) -> Any:

@@ -6,4 +6,13 @@ WAITING_KEY = "_waiting"  # what somebody has long waited for
 ALIVE_KEY = "_alive"  # who is there
 SETUP_KEY = "_setup"  # what somebody flies, to those who ask
 DIVERGED_KEY = "_diverged"  # why a state is no longer sound
+ENDED_KEY = "_ended"  # of the owner of time: that the run has come to its end, or why it ended before
+REFUSED_KEY = "_refused"  # how many messages of strangers somebody has refused
+DEADLINES_KEY = "_deadlines"  # of a run that keeps a speed: how late somebody was
 COMPILING_KEY = "_compiling"  # somebody compiles kernels
+RECORDED_KEY = "_recorded"  # how far the log is
+RESTARTED_KEY = "_restarted"  # of whoever watches: that a service was killed and is started again
+HELD_KEY = "_held"  # the newest bundles of a service, to those who have missed some and ask
+HANDED_KEY = "_handed"  # how far the log is, to a service that asks
+
+ENCODER = "_messages"  # ending of the name of a process that makes the messages of a program of somebody else's

@@ -1,92 +1,93 @@
 """Starts the services of a scene as processes, watches them, and ends them all together."""
 
-import socket
+import os
 import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from types import MappingProxyType
-from typing import IO, Any
+from typing import IO
 
 from cosim.bus import ZenohBus, mesh
+from cosim.child import Child, start
+from cosim.errors import RunFailed
+from cosim.participants import Participants
+from cosim.private import private_endpoints
+from cosim.restarts import Restarts
 from cosim.watch import STALL, WATCHER, Watch
 
 GRACE = 1.5  # [s] a process gets to end after SIGTERM
+LAST_NEWS = 0.05  # [s] for what the processes said at their end
 FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick
-PARTICIPANT = "services.participant"  # the module that a child runs
 REFUSED = 2  # exit code of a service whose user can mend what is wrong
-
-
-class RunFailed(RuntimeError):
-    """A run that did not reach its end; the text names the culprit."""
-
-
-def loopback_endpoints(names: Iterable[str]) -> dict[str, str]:
-    """A free TCP endpoint on the loopback interface for each name."""
-    sockets = {name: socket.create_server(("127.0.0.1", 0)) for name in names}
-    endpoints = {name: f"tcp/127.0.0.1:{s.getsockname()[1]}" for name, s in sockets.items()}
-    for s in sockets.values():
-        s.close()
-    return endpoints
 
 
 def launch(
     names: list[str],
     give: Callable[[str, dict[str, str], IO[bytes]], None],
-    key_prefix: str,
+    participants: Participants,
     observe: Callable[[Watch], bool],
     beside: Iterable[str] = (),
     external: Mapping[str, str] = MappingProxyType({}),
+    restarts: Restarts | None = None,
+    started: dict[str, Child] | None = None,
 ) -> dict[str, str]:
     """Run the processes `names` as children of this one until the run has ended; what those beside had to say.
 
     Args:
         names: the processes.
         give: writes what a process of this name is given, with everybody's endpoints, to its standard input.
-        key_prefix: the key prefix.
+        participants: of the run.
         observe: called about five times a second; says whether to stop.
         beside: processes without which the run goes on.
         external: endpoints of those among `names` that somebody else starts; everybody connects to them.
+        restarts: who is started again where it is killed or stopped; None: nobody.
+        started: processes that are there already (`started_early`); those that are needed are taken out.
 
     Raises:
-        RunFailed: a service died or froze.
+        RunFailed: a service died or froze, or the run ended before its time.
         ValueError: a service refused to start; the text says why.
     """
     beside = list(beside)
-    everybody = [name for name in [*names, *beside] if name not in external]
-    endpoints = {**external, **loopback_endpoints([*everybody, WATCHER])}
+    everybody = [name for name in [*beside, *names] if name not in external]  # a ground station waits for its link
     children: dict[str, subprocess.Popen] = {}
-    errors: dict[str, Any] = {name: tempfile.TemporaryFile() for name in everybody}  # noqa: SIM115 (closed below)
-    try:
-        for name in everybody:
-            # -P: nothing is imported from the working directory
-            children[name] = subprocess.Popen(
-                [sys.executable, "-P", "-m", PARTICIPANT, name],
-                stdin=subprocess.PIPE,
-                stdout=errors[name],
-                stderr=errors[name],
-                start_new_session=True,
-            )
-        for name in everybody:
-            stream = children[name].stdin
-            assert stream is not None
-            with suppress(BrokenPipeError):  # it has ended already, and has said why
-                give(name, endpoints, stream)
+    restarts = restarts or Restarts({}, lambda line: None)
+    errors: dict[str, IO[bytes]] = {}
+    with private_endpoints([*everybody, WATCHER]) as own, ExitStack() as stack:
+        stack.callback(_close, children, errors)
+        endpoints = {**external, **own}
+
+        def begin(some: list[str]) -> None:
+            for name in some:
+                if started and name in started:
+                    children[name], errors[name] = started.pop(name)
+                else:
+                    children[name], errors[name] = start(name, restarts.journal(name), errors.get(name))
+            for name in some:
+                stream = children[name].stdin
+                assert stream is not None
+                with suppress(BrokenPipeError):  # it has ended already, and has said why
+                    give(name, endpoints, stream)
+
+        ready = [name for name in everybody if name in (started or ())]
+        begin(ready)
+        begin([name for name in everybody if name not in ready])
         listen, connect = mesh(WATCHER, endpoints)
-        with ZenohBus(listen, connect) as bus:
+        with ZenohBus(listen, connect, mark=participants.mark(WATCHER)) as bus:
             try:
-                _follow(Watch(bus, key_prefix), children, set(names), set(external), observe, errors)
+                watch = Watch(bus, participants, [*names, *beside, *external])
+                _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
             finally:
                 early = {name for name in beside if children[name].poll() is not None}
                 _ask_to_end(children)  # before this session closes, which takes a while
         _end(children)
         return {name: _farewell(children[name].returncode if name in early else 0, errors[name]) for name in beside}
-    finally:
-        _end(children)
-        for file in errors.values():
-            file.close()
+
+
+def _close(children: dict[str, subprocess.Popen], errors: dict[str, IO[bytes]]) -> None:
+    _end(children)
+    for file in errors.values():
+        file.close()
 
 
 def _follow(
@@ -95,39 +96,75 @@ def _follow(
     needed: set[str],
     external: set[str],
     observe: Callable[[Watch], bool],
-    errors: dict,
+    errors: dict[str, IO[bytes]],
+    restarts: Restarts,
+    begin: Callable[[list[str]], None],
 ) -> None:
     ended_at = None
-    children = {name: child for name, child in everybody.items() if name in needed}
-    while any(child.poll() is None for child in children.values()):
-        watch.poll(0.2)
+    stopped: dict[str, float] = {}  # since when
+    while any(everybody[name].poll() is None for name in needed - external):
+        children = {name: child for name, child in everybody.items() if name in needed}
+        watch.poll(LAST_NEWS if watch.ended else 0.2)
         for name, child in everybody.items():
             if child.poll() == REFUSED:
                 raise ValueError(f"{name}{_last_words(errors[name])}")
         for name, child in children.items():
             code = child.poll()
+            if code is not None and restarts.begin(name, code, watch):
+                begin([name])
+                continue
             if code is None or (code != 0 and (watch.diverged or _diverges(watch))):
                 continue
             if code != 0 or (not watch.ended and ended_at is None and not _grace(watch)):
                 raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
         if not watch.ended and (lost := sorted(watch.gone & external)) and not _grace(watch):
             raise RunFailed(f"{', '.join(lost)}: gone {_at(watch)}")
-        if needed <= watch.present and (culprit := watch.frozen(needed)):
+        _note_stopped(children, stopped)
+        culprit = watch.frozen(needed) if needed <= watch.present else None
+        if stopped and (culprit or time.monotonic() - min(stopped.values()) > STALL):
+            if not restarts.may(stopped):
+                raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")
+            for name in stopped:
+                restarts.stop(name, children[name])
+            continue
+        if culprit:
             if not _let_go(everybody, needed):
                 raise RunFailed(culprit)
             watch.last_news = time.monotonic()
         if not watch.present >= needed:
-            watch.last_news = time.monotonic()
+            watch.last_news, ended_at = time.monotonic(), None
         if observe(watch):
             return
         if watch.ended:
             ended_at = ended_at or time.monotonic()
             if time.monotonic() - ended_at > STALL:
                 _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
-            if time.monotonic() - ended_at > FAREWELL:
+            if time.monotonic() - max(ended_at, watch.recorded_at) > FAREWELL:
+                if early := watch.broken_off():  # the first fault is told
+                    raise RunFailed(early)
                 left = ", ".join(name for name, child in children.items() if child.poll() is None)
                 raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
+    watch.poll(LAST_NEWS)
     observe(watch)
+    if early := watch.broken_off():
+        raise RunFailed(early)
+
+
+def _note_stopped(children: dict[str, subprocess.Popen], since: dict[str, float]) -> None:
+    """Note in `since` who is stopped, and when it was first noticed; also where it has not yet joined."""
+    for name, child in children.items():
+        if child.returncode is None and _stopped(child):
+            since.setdefault(name, time.monotonic())
+        else:
+            since.pop(name, None)
+
+
+def _stopped(child: subprocess.Popen) -> bool:
+    """Whether it is stopped; one that has just ended is not."""
+    try:
+        return os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:
+        return False
 
 
 def _let_go(everybody: dict, needed: set[str]) -> bool:
@@ -159,13 +196,13 @@ def _reason(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
-def _last_words(file: "tempfile._TemporaryFileWrapper") -> str:  # type: ignore[name-defined]
+def _last_words(file: IO[bytes]) -> str:
     file.seek(0)
     lines = file.read().decode(errors="replace").strip().splitlines()
     return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
 
 
-def _farewell(code: int, file: Any) -> str:
+def _farewell(code: int, file: IO[bytes]) -> str:
     if code:
         return f"ended before the flight ({_reason(code)}){_last_words(file)}"
     file.seek(0)

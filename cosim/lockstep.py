@@ -3,22 +3,28 @@
 import os
 import time
 
+from cosim import realtime
+from cosim.backlog import Backlog
+from cosim.deadlines import Deadlines
+from cosim.errors import DivergedError
 from cosim.graph import NEVER, Graph, Service
-from cosim.keys import DIVERGED_KEY
+from cosim.keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
 from cosim.process import Process, Stopped
-from cosim.schedule import DivergedError, Port
+from cosim.schedule import Port
 from cosim.transfer import PAGE, EndOfRun, Outlets, Source, sources
 
 
-def run_lockstep(process: Process, service: Service, owns_time: bool) -> None:
+def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: str) -> None:
     """Step `service` from tick 0 to the last tick of the run.
 
     Args:
         process: the participant.
         service: what it steps.
         owns_time: whether it keeps the pace, and says which tick is the last.
+        recorder: the participant whose log whoever owns time does not leave far behind.
 
-    The end travels along the bundles: an empty one says that there will be no other.
+    The end travels along the bundles: an empty one says that there will be no other. Whoever owns time says besides
+    whether that was the end of the run.
 
     Raises:
         Stopped: asked to end.
@@ -28,30 +34,70 @@ def run_lockstep(process: Process, service: Service, owns_time: bool) -> None:
     graph = Graph(setup, [service], 2 * PAGE)
     givers = sources(process, graph)
     outlets = Outlets(process, service, graph)
+    backlog = Backlog(process, recorder) if owns_time else None
+    linger = process.linger_with(recorder) if process.restarts else None
+    if backlog and process.restarts:
+        backlog.resume(0)  # nobody may be left behind by more than what is held for him
+    if process.journal:
+        _catch_up(process, graph, givers, outlets, backlog, recorder)
     process.join()
     outlets.look()
     if process.core is not None:
         pin(process.core)
-    started = time.perf_counter()
+    if process.realtime:
+        realtime.enter()
+    allowed = setup.interval / process.speed if process.speed is not None else None
+    deadlines = Deadlines()
+    started = time.perf_counter() - graph.tick * (allowed or 0.0)
     try:
-        while not process.stopping:
+        while not graph.ended:
+            if process.stopping:
+                raise Stopped
             tick = graph.tick
             for giver in givers:
                 giver.take(tick)
-            if owns_time and process.speed is not None:
-                _pace(started + tick * setup.interval / process.speed)
+            if backlog:
+                backlog.hold(tick)
+            if allowed is not None and owns_time:
+                deadlines.note(_pace(started + tick * allowed))
+            begun = time.perf_counter()
             graph.advance(tick + 1)
             outlets.publish(tick)
-            if graph.ended:
-                return
-    except EndOfRun:
-        return
+            if allowed is not None and not owns_time:
+                deadlines.note(time.perf_counter() - begun - allowed)
+        if owns_time:
+            process.say(ENDED_KEY)
+    except EndOfRun as end:
+        if owns_time:
+            process.say(ENDED_KEY, f"{end} ended before the run did")
     except DivergedError as error:  # said before the end is
-        process.bus.publisher(f"{process.key_prefix}/{DIVERGED_KEY}/{process.name}")(str(error).encode(), 0)
+        process.say(DIVERGED_KEY, str(error))
         raise
     finally:
+        if allowed is not None:
+            process.say(DEADLINES_KEY, deadlines.told())
         outlets.end(graph.tick)
-    raise Stopped
+    if linger:  # somebody may be started again who has missed the last bundles
+        linger()
+
+
+def _catch_up(
+    process: Process, graph: Graph, givers: list[Source], outlets: Outlets, backlog: Backlog | None, recorder: str
+) -> None:
+    """Step once more through what the service had been given before it was killed; errors as of `run_lockstep`."""
+    assert process.journal
+    for tick in process.journal.recall():
+        if tick == 0:
+            process.await_participant(recorder)
+            recorded = outlets.resume(recorder)
+            if backlog:
+                backlog.resume(recorded)
+        if process.stopping:
+            raise Stopped
+        for giver in givers:
+            giver.take(tick)
+        graph.advance(tick + 1)
+        outlets.repeat(tick)
 
 
 class _Rows:
@@ -110,8 +156,12 @@ def pin(core: int) -> None:
             os.sched_setaffinity(int(thread), {core})
 
 
-def _pace(when: float) -> None:
-    """Sleep until `when` on the performance counter; a run that is late hurries until it is on time again."""
+def _pace(when: float) -> float:
+    """Sleep until `when` on the performance counter; says by how much [s] that has passed, negative where it has not.
+
+    A run that is late hurries until it is on time again.
+    """
     left = when - time.perf_counter()
     if left > 0:
         time.sleep(left)
+    return -left

@@ -12,6 +12,7 @@ that same machine code by its address: whatever the executor, the bits are the s
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numba
@@ -28,8 +29,6 @@ from dynamics.rows import load, store
 
 GO_ON, LOOK, END, FAILED = range(4)
 """Signals of a step: nothing; Python parts are to act at this tick; the tick is the last; the state is unsound."""
-
-_ADDRESS = -1  # the tick at which `advance` gives the address of its memory
 
 
 class Received(NamedTuple):
@@ -76,6 +75,7 @@ class Part:
         outputs: the ports that it gives, in the order of its outputs.
         every: ticks between two steps.
         failure: the error of a step at a tick that says that the state is unsound.
+        vehicle: of a fleet, whose part it is.
     """
 
     name: str
@@ -85,6 +85,7 @@ class Part:
     outputs: tuple[Port, ...] = ()
     every: int = 1
     failure: Callable[[int], Exception] | None = None
+    vehicle: str = ""
 
 
 class Code(NamedTuple):
@@ -100,11 +101,16 @@ def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Cod
     inputs = tuple(InputRows(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
     outputs = tuple(OutputRows(rows[port.name], port.period) for port in part.outputs)
     cell = Cell(Core(part.parameters, part.state, inputs, outputs))
-    memory = advance(cell, _ADDRESS)
-    compiled: Any = advance.overloads[  # type: ignore[attr-defined]
-        (numba.typeof(cell), types.int64)
-    ]
-    return Code(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name), memory, cell)
+    return Code(_address(numba.typeof(cell)), cell.memory.pointer, cell)
+
+
+@cache
+def _address(cell: types.Type) -> int:
+    """The machine code that advances a part whose `Core` is in a cell of this type."""
+    signature = (cell, types.int64)
+    advance.compile(signature)  # type: ignore[attr-defined]
+    compiled: Any = advance.overloads[signature]  # type: ignore[attr-defined]
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
 def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
@@ -158,19 +164,9 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
     return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
-@intrinsic
-def _address(typing_context: Any, cell: types.Type) -> tuple[Any, Callable]:
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        return builder.ptrtoint(builder.extract_value(arguments[0], 0), ir.IntType(64))
-
-    return types.int64(cell), generate
-
-
 @kernel
 def advance(memory: Any, tick: int) -> int:
-    """One step of the part whose `Core` is in the cell `memory`; its signal. At tick -1: the cell's address."""
-    if tick < 0:
-        return _address(memory)
+    """One step of the part whose `Core` is in the cell `memory`; its signal."""
     core = memory.value
     s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
@@ -197,16 +193,22 @@ class Schedule(NamedTuple):
     memory: np.ndarray  # (n,) int64 address
     every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled part
     next: np.ndarray  # (n,) int64 tick of the next step, or of a Python part's next say
-    ended: np.ndarray  # (1,) int64: 1 once a part has said that the tick is the last
+    vehicle: np.ndarray  # (n,) int64 number of the vehicle whose part it is
+    done: np.ndarray  # (vehicles,) int64: 1 once a part of the vehicle has said that the tick is its last
+    ended: np.ndarray  # (1,) int64: 1 once all vehicles have
 
 
-def schedule(codes: Sequence[Code | None], every: Sequence[int]) -> Schedule:
-    """The schedule of these parts; None stands for a part in Python, which looks first at tick 0."""
+def schedule(codes: Sequence[Code | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
+    """The schedule of these parts, with the vehicle of each; None stands for a part in Python, which looks first at
+    tick 0."""
+    names = list(dict.fromkeys(vehicles)) or [""]
     return Schedule(
         np.array([code.function if code else 0 for code in codes], np.int64),
         np.array([code.memory if code else 0 for code in codes], np.int64),
         np.array(every, np.int64),
         np.zeros(len(codes), np.int64),
+        np.array([names.index(name) for name in vehicles], np.int64),
+        np.zeros(len(names), np.int64),
         np.zeros(1, np.int64),
     )
 
@@ -232,10 +234,11 @@ def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]
                 if signal == FAILED:
                     return tick, k, FAILED
                 if signal == END:
-                    plan.ended[0] = 1
+                    plan.done[plan.vehicle[k]] = 1
+                    plan.ended[0] = plan.done.min()
                 elif signal == LOOK:
                     for j in range(k + 1, len(plan.function)):
-                        if plan.function[j] == 0:
+                        if plan.function[j] == 0 and plan.vehicle[j] == plan.vehicle[k]:
                             plan.next[j] = tick
         first = 0
         tick += 1

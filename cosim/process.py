@@ -4,12 +4,15 @@ import os
 import signal
 import threading
 import time
+import zlib
 from collections.abc import Callable
 from typing import TypeVar
 
 from cosim.bus import ZenohBus
-from cosim.keys import ALIVE_KEY, COMPILING_KEY, SETUP_KEY, WAITING_KEY
-from cosim.schedule import LockStepError
+from cosim.errors import LockStepError
+from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
+from cosim.participants import Participants
+from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
 from cosim.setup import Setup
 from dynamics.kernel import on_compile
@@ -19,6 +22,9 @@ POLL = 0.1  # [s] between two looks at whether to stop
 PATIENCE = 1.0  # [s] of waiting after which a service says what it waits for
 JOIN_TIMEOUT = 600.0  # [s] the others get to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] a participant gets to tell its set-up
+ASK_TIMEOUT = 1.0  # [s] one gets to tell what another has missed
+FAREWELL = 10.0  # [s] whoever watches gets to hear of the end
+BRIEF = 0.02  # [s]
 FOUND_OUT = 3.0  # [s] for everybody to find a difference
 
 T = TypeVar("T")
@@ -36,11 +42,14 @@ class Process:
         name: str,
         setup: Setup,
         bus: ZenohBus,
-        key_prefix: str,
+        participants: Participants,
         others: list[str],
         speed: float | None = None,
         core: int | None = None,
         compares: bool = False,
+        realtime: bool = False,
+        restarts: bool = False,
+        journal: Journal | None = None,
     ):
         """A participant that is about to join.
 
@@ -48,17 +57,25 @@ class Process:
             name: its name among the participants.
             setup: what is flown.
             bus: the session.
-            key_prefix: key prefix of the run.
+            participants: of the run.
             others: participants without which the run cannot begin.
             speed: simulated seconds per second, None for as fast as it goes.
             core: the core that all services of a sequential lock step share, None to leave it to the system.
             compares: whether the others may have another set-up, which is to be found out at joining.
+            realtime: whether it is to run in the scheduler's real-time class.
+            restarts: whether some service of the run is started again where it is killed.
+            journal: of this service, where it is one of them.
         """
-        self.compares = compares
-        self.name, self.setup, self.bus, self.key_prefix = name, setup, bus, key_prefix
+        self.restarts, self.journal = restarts, journal
+        self.compares, self.realtime = compares, realtime
+        self.name, self.setup, self.bus = name, setup, bus
+        self.participants, self.key_prefix = participants, participants.key_prefix
         self.others, self.speed, self.core = others, speed, core
         self.stopping = False
+        self.orphaned = False  # the launcher is gone
+        self.abandoned = ""  # who watched the run, and is gone
         self._compiling = False
+        self._refused = 0
         on_compile(self._tell_of_compiling)
         signal.signal(signal.SIGTERM, self._stop)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
@@ -69,7 +86,17 @@ class Process:
     def _tell_of_compiling(self, _: str) -> None:
         if not self._compiling:
             self._compiling = True
-            self.bus.publisher(f"{self.key_prefix}/{COMPILING_KEY}/{self.name}")(b"", 0)
+            self.say(COMPILING_KEY)
+
+    def say(self, key: str, text: str = "") -> None:
+        """Tell those who watch the run, on a key of the lock step."""
+        self.bus.publisher(f"{self.key_prefix}/{key}/{self.name}")(text.encode(), 0)
+
+    def tell_of_refused(self) -> None:
+        """Say how many messages of strangers were refused, when there are more than before."""
+        if self.bus.refused > self._refused:
+            self._refused = self.bus.refused
+            self.say(REFUSED_KEY, str(self._refused))
 
     def end_with_parent(self) -> None:
         """Stop when the launcher, which holds the other end of standard input, is gone."""
@@ -77,7 +104,7 @@ class Process:
         def watch() -> None:
             while os.read(0, 1):
                 pass
-            self.stopping = True
+            self.orphaned = self.stopping = True
 
         threading.Thread(target=watch, daemon=True).start()
 
@@ -85,33 +112,73 @@ class Process:
         """Stop when another participant, who watches the run, is gone."""
 
         def changed(_: str, alive: bool) -> None:
-            self.stopping = self.stopping or not alive
+            if not (alive or self.stopping):
+                self.abandoned, self.stopping = name, True
 
         self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/{name}", changed)
+
+    def linger(self) -> None:
+        """Stay until whoever watches the run has left: what is said at the end is lost with the session of its sender
+        where the network is cut just then."""
+        deadline = time.monotonic() + FAREWELL
+        while not self.stopping and time.monotonic() < deadline:
+            time.sleep(BRIEF)
+
+    def ask(self, key: str, name: str, words: str) -> bytes | None:
+        """What the participant `name` answers to these words on a key of the lock step, None where it does not."""
+        return self.bus.ask(f"{self.key_prefix}/{key}/{name}", ASK_TIMEOUT, words, self.participants.mark(name))
+
+    def await_participant(self, name: str) -> None:
+        """Wait until another participant is there. Stopped, LockStepError: as of `join`."""
+        self._await([name], lambda: None)
+
+    def linger_with(self, name: str) -> Callable[[], None]:
+        """What waits until the participant `name` has left; to be called before it can have."""
+        left = threading.Event()
+        there = f"{self.key_prefix}/{ALIVE_KEY}/{name}"
+        self.bus.watch_alive(there, lambda _, alive: None if alive else left.set())
+
+        def wait() -> None:
+            while not (self.stopping or left.wait(BRIEF)):
+                pass
+
+        return wait
 
     def key(self, topic: Topic) -> str:
         """The Zenoh key of a topic in this run."""
         return topic.zenoh_key(self.setup.vehicle, self.key_prefix)
 
-    def join(self) -> None:
+    def join(self, meanwhile: Callable[[], None] = lambda: None) -> None:
         """Say that everything is subscribed, wait until everybody else has said so, and compare set-ups.
+
+        Args:
+            meanwhile: called again and again while it waits.
 
         Raises:
             Stopped: asked to end meanwhile.
             LockStepError: somebody did not come.
             ValueError: another participant has resolved something else; names the first difference.
         """
-        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", to_json(self.setup).encode())
+        packed = _packed(self.setup)
+        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", lambda _: packed)
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
-        wanted = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in self.others if other != self.name]
-        missing = self.bus.wait_alive(wanted, timeout=JOIN_TIMEOUT, stop=lambda: self.stopping)
+        self._await([other for other in self.others if other != self.name], meanwhile)
+        if self.compares:
+            self._compare()
+
+    def _await(self, names: list[str], meanwhile: Callable[[], None]) -> None:
+        wanted = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in names]
+
+        def stop() -> bool:
+            meanwhile()
+            return self.stopping
+
+        missing = self.bus.wait_alive(wanted, timeout=JOIN_TIMEOUT, stop=stop)
         if self.stopping:
             raise Stopped
         if missing:
-            names = ", ".join(key.rsplit("/", 1)[1] for key in missing)
-            raise LockStepError(f"{self.name}: nobody answers as {names}")
-        if self.compares:
-            self._compare()
+            absent = ", ".join(key.rsplit("/", 1)[1] for key in missing)
+            raise LockStepError(f"{self.name}: nobody answers as {absent}")
 
     def _compare(self) -> None:
         """Refuse to fly with those who have resolved another scene."""
@@ -120,9 +187,9 @@ class Process:
             if other == self.name:
                 continue
             given = self.bus.ask(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
-            if given is None or given.decode() == own:
+            if given is None or (text := _unpacked(given)) == own:
                 continue
-            found = first_difference(self.setup, from_json(given.decode()))
+            found = first_difference(self.setup, from_json(text, self.setup.modules))
             key, here, there = found or ("set-up", "?", "?")
             time.sleep(FOUND_OUT)  # this participant must still answer those who compare later
             raise ValueError(f"{self.name}: {key} is {here!r} here, {there!r} for {other}: resolve the same scene")
@@ -140,6 +207,17 @@ class Process:
                 return found
             waited += POLL
             if waited >= PATIENCE:
-                self.bus.publisher(f"{self.key_prefix}/{WAITING_KEY}/{self.name}")(waiting_for().encode(), 0)
+                self.say(WAITING_KEY, waiting_for())
+                self.tell_of_refused()
                 waited = 0.0
         raise Stopped
+
+
+def _packed(setup: Setup) -> bytes:
+    """A set-up in a message that needs no fragments."""
+    return zlib.compress(to_json(setup).encode())
+
+
+def _unpacked(message: bytes) -> str:
+    """The text of a set-up; a program of somebody else's may send it as it is."""
+    return (message if message.startswith(b"{") else zlib.decompress(message)).decode()

@@ -12,6 +12,9 @@ from cosim.setup import Setup
 SETUP_FILE = "setup.json"
 FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended before its time: why, and whether it diverged
 
+WAITED = "waited_for_disk"  # key of a run that the disk has held up: for how long
+RESTARTS = "restarts"  # key of a run some of whose services were started again (cosim.launcher)
+
 
 def metadata(setup: Setup, mode: str) -> dict[str, str]:
     """The entries of the log's "lapwing" metadata record, all text."""
@@ -20,7 +23,7 @@ def metadata(setup: Setup, mode: str) -> dict[str, str]:
         "scene": setup.scene,
         "seed": str(setup.seed),
         "mode": mode,
-        "vehicle": setup.vehicle,
+        "vehicle": ", ".join(setup.vehicles),
         "setup": digest(setup),
         "version": package_version(),
         "commit": _commit(),

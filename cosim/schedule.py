@@ -8,6 +8,7 @@ barrier, and the result does not depend on the order of arrival.
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from cosim.errors import LockStepError
 from dynamics.kernel import leaf
 
 KEPT = 0  # period of a port whose value is due at every tick, and stays until another is given
@@ -26,14 +27,6 @@ class Input(NamedTuple):
 
     port: str
     delay: int = 0
-
-
-class LockStepError(RuntimeError):
-    """The lock step cannot go on; the text says who waits for what."""
-
-
-class DivergedError(LockStepError):
-    """A state is not sound: no longer finite, or where its coordinates end."""
 
 
 @leaf

@@ -15,6 +15,8 @@ import hashlib
 import importlib
 import json
 import math
+import sys
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -37,13 +39,20 @@ def to_json(tree: Any) -> str:
     return json.dumps(_encoded(tree, ""), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def from_json(text: str) -> Any:
+def from_json(text: str, modules: Collection[str] = ()) -> Any:
     """The tree of a text that `to_json` gave.
 
+    Args:
+        text: may be a stranger's: nothing is imported for it but this project's own packages, and what is declared.
+        modules: further modules whose classes it may have.
+
     Raises:
-        ValueError: not JSON, an unknown tag, or a class that is not there or has other fields now.
+        ValueError: not JSON, an unknown tag, or a class that is not there, has other fields now, or is not declared.
     """
-    return _decoded(json.loads(text))
+    try:
+        return _decoded(json.loads(text), modules)
+    except RecursionError:
+        raise ValueError("not a tree of values: nested too deeply") from None
 
 
 def digest(tree: Any) -> str:
@@ -59,6 +68,7 @@ class Absent:
 
 
 ABSENT = Absent()
+OWN = ("cosim", "dynamics", "messages", "services")  # packages whose modules a text may have imported
 
 
 def first_difference(a: Any, b: Any) -> tuple[str, Any, Any] | None:
@@ -121,32 +131,32 @@ def _encoded(value: Any, path: str) -> Any:
     raise ValueError(f"{path.lstrip('.') or 'tree'}: a {kind.__module__}.{kind.__qualname__} cannot be serialised")
 
 
-def _decoded(value: Any) -> Any:
+def _decoded(value: Any, modules: Collection[str]) -> Any:
     if isinstance(value, list):
-        return [_decoded(item) for item in value]
+        return [_decoded(item, modules) for item in value]
     if not isinstance(value, dict):
         return value
     if TAG not in value:
-        return {key: _decoded(item) for key, item in value.items()}
+        return {key: _decoded(item, modules) for key, item in value.items()}
     tag = value[TAG]
     try:
         if tag == "float":
             return float(value["of"])
         if tag == "tuple":
-            return tuple(_decoded(item) for item in value["of"])
+            return tuple(_decoded(item, modules) for item in value["of"])
         if tag == "dict":
-            return {key: _decoded(item) for key, item in value["of"].items()}
+            return {key: _decoded(item, modules) for key, item in value["of"].items()}
         if tag == "scalar":
-            return np.dtype(value["dtype"]).type(_decoded(value["of"]))
+            return np.dtype(value["dtype"]).type(_decoded(value["of"], modules))
         if tag == "array":
-            return np.array(_decoded(value["of"]), dtype=value["dtype"]).reshape(value["shape"])
-    except (KeyError, TypeError) as error:
+            return np.array(_decoded(value["of"], modules), dtype=value["dtype"]).reshape(value["shape"])
+    except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"damaged {tag!r}: {error!r}") from None
-    return _record(str(tag), {key: _decoded(item) for key, item in value.items() if key != TAG})
+    members = {key: _decoded(item, modules) for key, item in value.items() if key != TAG}
+    return _record(_class_of(str(tag), modules), str(tag), members)
 
 
-def _record(name: str, members: dict[str, Any]) -> Any:
-    cls = _class_of(name)
+def _record(cls: type, name: str, members: dict[str, Any]) -> Any:
     if set(members) != set(_fields(cls)):
         raise ValueError(f"{name}: has the fields {', '.join(_fields(cls))}, got {', '.join(members)}")
     return cls(**members)
@@ -165,18 +175,20 @@ def _fields(cls: type) -> tuple[str, ...]:
 
 def _name_of(cls: type) -> str:
     name = f"{cls.__module__}:{cls.__qualname__}"
-    if _class_of(name) is not cls:
+    if _class_of(name, [cls.__module__]) is not cls:
         raise ValueError(f"{name}: is another class of the same name; it cannot be serialised")
     return name
 
 
-def _class_of(name: str) -> type:
+def _class_of(name: str, modules: Collection[str]) -> type:
     module, _, path = name.partition(":")
+    if module.partition(".")[0] not in OWN and module not in sys.modules and module not in modules:
+        raise ValueError(f"{name}: no such class; expected one of {', '.join(OWN)} or of a declared module")
     try:
         found: Any = importlib.import_module(module)
         for part in path.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError, ValueError) as error:
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"{name}: no such class can be imported ({error})") from None
     if not (isinstance(found, type) and _is_record(found)):
         raise ValueError(f"{name}: expected a NamedTuple or a frozen dataclass")

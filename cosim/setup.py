@@ -5,7 +5,8 @@ The set-up is made by whoever starts a run, handed to every process as it is, re
 
 from typing import Any, NamedTuple
 
-from cosim.schedule import Input, LockStepError, Port, execution_order
+from cosim.errors import LockStepError
+from cosim.schedule import Input, Port, execution_order
 
 
 class ServiceSetup(NamedTuple):
@@ -16,8 +17,19 @@ class ServiceSetup(NamedTuple):
     ports: tuple[Port, ...]  # that it gives
 
 
+class Each(NamedTuple):
+    """What the vehicles of a fleet are each given: their parameters of a service, or of a process beside."""
+
+    vehicles: tuple[str, ...]  # names; those that have it
+    given: tuple[Any, ...]
+
+
 class Setup(NamedTuple):
-    """One run, resolved."""
+    """One run, resolved.
+
+    In that of a fleet (`cosim.fleet.joined`) the parameters of a service are `Each` vehicle's `ServiceSetup`, and a
+    port has the vehicle's name in front: "left/truth".
+    """
 
     scene: str  # name
     title: str
@@ -26,7 +38,7 @@ class Setup(NamedTuple):
     rate: int  # [Hz] ticks
     interval_ns: int  # length of a tick
     coupling: str  # "sequential" or "parallel"
-    vehicle: str  # name, first part of its topics' names
+    vehicle: str  # name, first part of its topics' names; "" of a fleet, whose topics have it already
     services: dict[str, ServiceSetup]  # those of the lock step, by name
     beside: dict[str, Any]  # what processes outside of the lock step are given, by name
     resolved: dict[str, Any]  # the scene's tables with all that its files say
@@ -40,6 +52,13 @@ class Setup(NamedTuple):
     def duration(self) -> float:
         """Where the run ends at the latest [s]."""
         return self.last_tick / self.rate
+
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """The names of all vehicles."""
+        if self.vehicle:
+            return (self.vehicle,)
+        return tuple(entry["vehicle"]["name"] for entry in self.resolved["vehicle"])
 
     @property
     def modules(self) -> dict[str, str]:

@@ -49,5 +49,6 @@ def run_single(
                     return
         observe(graph)
     finally:
-        if recording and recorded < graph.tick:
+        if recording:
             recording.write(graph.pages(recorded, graph.tick), graph.tick - 1)
+            recording.finish()

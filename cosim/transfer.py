@@ -2,23 +2,27 @@
 
 import time
 
-from cosim.bundle import Bundles, pack_batch
+from cosim.backlog import AHEAD
+from cosim.bundle import BundleError, Bundles, pack_batch
 from cosim.bus import Subscription
+from cosim.errors import LockStepError
 from cosim.graph import Graph, Service
-from cosim.keys import BATCH_KEY, STEP_KEY
+from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY, STEP_KEY
 from cosim.process import POLL, Process
-from cosim.schedule import LockStepError, due
+from cosim.restart import Held, Progress, Refilled
+from cosim.schedule import due
 from dynamics.kernel import uncompiled
 from messages.topics import Topic
 
 BATCH = 0.1  # [s] of wall time between two batches
+HELD = 2 * AHEAD  # bundles: the plant is ahead of the log by AHEAD ticks, the trajectory of the plant by its lead
 PAGE = 1024  # ticks after which a batch is handed over in any case
 
 _due = uncompiled(due)
 
 
 class EndOfRun(Exception):
-    """A producer says that there will be no further message."""
+    """A producer says that there will be no further message; its name."""
 
 
 class Source:
@@ -28,7 +32,8 @@ class Source:
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
         self._bundles = Bundles(process.setup.services[name].ports)
-        self._subscription: Subscription = process.bus.subscribe(f"{process.key_prefix}/{STEP_KEY}/{name}")
+        self._subscription: Subscription = process.bus.receive(process.participants.senders(STEP_KEY, [name]))
+        self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
         self._newest = -1  # tick of the newest bundle taken
 
     def take(self, tick: int) -> None:
@@ -43,14 +48,31 @@ class Source:
             stamp = self._newest + 1
             while not self._bundles.due(stamp):
                 stamp += 1
-            get = self._subscription.get
-            time_ns, payload = get(POLL) or self._process.patient(get, lambda: self._describe(needed))
+            due_ns = stamp * self._process.setup.interval_ns
+            time_ns, payload = self._next(due_ns, needed)
             if not payload:
-                raise EndOfRun
-            if time_ns != stamp * self._process.setup.interval_ns:
+                raise EndOfRun(self._name)
+            if time_ns != due_ns:
                 raise LockStepError(f"{self._name}: expected the bundle of tick {stamp}, got {time_ns} ns")
-            self._bundles.unpack(payload, self._graph, stamp)
+            try:
+                self._bundles.unpack(payload, self._graph, stamp)
+            except BundleError as error:
+                raise LockStepError(f"{self._name}: {error}") from None
             self._newest = stamp
+
+    def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
+        """Time and payload of the next bundle, or of what comes in its place."""
+        process, get = self._process, self._subscription.get
+        if not process.restarts:
+            return get(POLL) or process.patient(get, lambda: self._describe(needed))
+
+        def refilled(timeout: float) -> tuple[int, bytes] | None:
+            return self._refilled.get(timeout, due_ns)
+
+        def wait() -> tuple[int, bytes]:
+            return refilled(POLL) or process.patient(refilled, lambda: self._describe(needed))
+
+        return process.journal.take(wait) if process.journal else wait()
 
     def _describe(self, tick: int) -> str:
         ports = [port for port, period, delay in self._taken if tick % period == 0]
@@ -83,6 +105,32 @@ class Outlets:
         self._handed = 0  # tick before which all is handed over
         self._due = 0.0
         self._interval_ns = process.setup.interval_ns
+        self._journal, self._held = process.journal, Held(HELD) if process.restarts else None
+        if self._held:
+            bus.answer(f"{key_prefix}/{HELD_KEY}/{service.name}", self._held.since)
+
+    def resume(self, recorder: str) -> int:
+        """Hand over to the recorder what it has not got; the tick before which all that it has is complete."""
+        there = Progress.unpack(self._process.ask(HANDED_KEY, recorder, self._service.name) or Progress(0, 0).pack())
+        self._handed = there.handed
+        return there.recorded
+
+    def repeat(self, tick: int) -> None:
+        """Go once more through a tick whose bundle was published; only those who have missed it will hear of it."""
+        self._note(tick)
+        if tick < self._handed:
+            self._service.messages.clear()
+        elif tick + 1 - self._handed >= PAGE:
+            self._hand_over(tick + 1)
+
+    def _note(self, tick: int) -> bytes:
+        """The bundle of a tick, empty if there is none; it is in the journal and held before it is published."""
+        bundle = self._bundles.pack(self._graph, tick) if self._bundles.due(tick) else b""
+        if self._journal:
+            self._journal.write(tick, bundle)
+        if self._held and bundle:
+            self._held.add(bundle, tick * self._interval_ns)
+        return bundle
 
     def look(self) -> None:
         """See which topics somebody listens to."""
@@ -90,14 +138,16 @@ class Outlets:
 
     def publish(self, tick: int) -> None:
         """Hand over what the graph gives at `tick`."""
-        if self._put_bundle and self._bundles.due(tick):
-            self._put_bundle(self._bundles.pack(self._graph, tick), tick * self._interval_ns)
+        bundle = self._note(tick)
+        if bundle and self._put_bundle:
+            self._put_bundle(bundle, tick * self._interval_ns)
         if self._listened:
             for page in self._graph.pages(tick, tick + 1, self._listened, keep=True):
                 for at, payload in zip(page.ticks, page.payloads, strict=True):
                     self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
         if tick + 1 - self._handed >= PAGE or time.monotonic() > self._due:
             self._hand_over(tick + 1)
+            self._process.tell_of_refused()
             self.look()
 
     def _hand_over(self, stop: int) -> None:
@@ -110,7 +160,10 @@ class Outlets:
     def end(self, stop: int) -> None:
         """Hand over what is left of the ticks before `stop`, and say that there will be no more."""
         self._hand_over(stop)
+        self._process.tell_of_refused()
         time_ns = stop * self._interval_ns
+        if self._held:
+            self._held.add(b"", time_ns)
         for put in (self._put_bundle, self._put_batch, *self._puts.values()):
             if put:
                 put(b"", time_ns)

@@ -1,38 +1,63 @@
 """What somebody who watches a run sees of it on the bus."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
+from cosim.backlog import waits_for_disk
 from cosim.bundle import unpack_batch
 from cosim.bus import ZenohBus
-from cosim.keys import ALIVE_KEY, BATCH_KEY, COMPILING_KEY, DIVERGED_KEY, WAITING_KEY
+from cosim.keys import (
+    ALIVE_KEY,
+    BATCH_KEY,
+    COMPILING_KEY,
+    DIVERGED_KEY,
+    ENDED_KEY,
+    RECORDED_KEY,
+    REFUSED_KEY,
+    WAITING_KEY,
+)
+from cosim.participants import Participants
+from cosim.wire import Page, later
 from messages.topics import Topic
 
 STALL = 2.5  # [s] without any message after which somebody is held to be frozen
 WATCHER = "mission"  # whoever watches, among the participants
-HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY)
+HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
 
 
 class Watch:
     """What a launcher sees of a run: who is there, how far it is, what it waits for."""
 
-    def __init__(self, bus: ZenohBus, key_prefix: str):
-        """Follow the batches of all services; `newest` holds the newest payload of each topic."""
-        self._key_prefix = key_prefix
+    def __init__(self, bus: ZenohBus, participants: Participants, names: Iterable[str], patience: float = STALL):
+        """Follow the participants `names`; after `patience` [s] without news one counts as frozen.
+
+        `newest` holds the newest payload of each topic.
+        """
+        self._patience = patience
+        self._bus, self._key_prefix, names = bus, participants.key_prefix, list(names)
         self.newest: dict[Topic, bytes] = {}
+        self.listen: Callable[[list[Page]], None] | None = None  # is given all messages
         self.waiting: dict[str, str] = {}
         self.compiling = False  # somebody compiles kernels
         self.diverged = False  # a state is no longer sound: the run ends, and its log says why
+        self.slow_disk = False  # the recorder has waited for the disk
         self.present: set[str] = set()
         self.gone: set[str] = set()
         self.time_ns = 0  # up to which everybody who has spoken has come
         self._times: dict[str, int] = {}
+        self._stops: dict[str, int] = {}  # tick before which each has handed over all
         self.began: float | None = None  # [s] of the monotonic clock, at the first batch
         self.wall = 0.0  # [s] from the first batch to the newest
         self.ended = False  # somebody has handed over the last tick
+        self.outcome: str | None = None  # "" when the run has come to its end, else why it ended before; None: unknown
+        self._refused: dict[str, int] = {}  # messages of strangers, by who refused them
         self.last_news = time.monotonic()
-        self._news = bus.subscribe(*(f"{key_prefix}/{key}/*" for key in HEARD))
-        bus.watch_alive(f"{key_prefix}/{ALIVE_KEY}/*", self._alive)
+        self.recorded_at = 0.0  # [s] of the monotonic clock, when the recorder last told how far it is
+        senders: dict[str, bytes | None] = {}
+        for key in HEARD:
+            senders |= participants.senders(key, names)
+        self._news = bus.receive(senders)
+        bus.watch_alive(f"{self._key_prefix}/{ALIVE_KEY}/*", self._alive)
 
     def _alive(self, key: str, alive: bool) -> None:
         name = key.rsplit("/", 1)[1]
@@ -51,33 +76,73 @@ class Watch:
                 return
             key, time_ns, payload = news
             head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
-            if head == COMPILING_KEY:
+            if head == BATCH_KEY:
+                self._take_batch(name, time_ns, payload)
+            elif head == COMPILING_KEY:
                 self.compiling = True
-                continue
-            if head == DIVERGED_KEY:
+            elif head == DIVERGED_KEY:
                 self.diverged = True
-                continue
-            if head == WAITING_KEY:
-                self.waiting[name] = payload.decode()
-                continue
-            self.last_news = time.monotonic()
-            self.waiting.clear()
-            if not payload:
-                self.ended = True
-                continue
-            self.began = self.began or self.last_news
-            self.wall = self.last_news - self.began
-            self._times[name] = time_ns
-            self.time_ns = min(self._times.values())
-            for page in unpack_batch(payload)[1]:
-                self.newest[page.topic] = page.payloads[-1].tobytes()
+            elif head == WAITING_KEY:
+                self.waiting[name] = payload.decode(errors="replace")
+            elif head == RECORDED_KEY:
+                self.last_news = self.recorded_at = time.monotonic()
+                self.slow_disk = self.slow_disk or waits_for_disk(payload)
+            elif head == ENDED_KEY:
+                self.outcome = payload.decode(errors="replace")
+            elif head == REFUSED_KEY and payload.isdigit():
+                self._refused[name] = int(payload)
+
+    def _take_batch(self, name: str, time_ns: int, payload: bytes) -> None:
+        self.last_news = time.monotonic()
+        self.waiting.clear()
+        if not payload:
+            self.ended = True
+            return
+        self.began = self.began or self.last_news
+        self.wall = self.last_news - self.began
+        self._times[name] = max(time_ns, self._times.get(name, 0))
+        self.time_ns = min(self._times.values())
+        stop, pages = unpack_batch(payload)
+        pages = later(pages, self._stops.get(name, 0))  # who was started again may give some a second time
+        self._stops[name] = max(stop, self._stops.get(name, 0))
+        for page in pages:
+            self.newest[page.topic] = page.payloads[-1].tobytes()
+        if self.listen:
+            self.listen(pages)
+
+    def forget(self, name: str) -> None:
+        """A participant is being started again: it is not there until it says so."""
+        self.present.discard(name)
+        self.gone.discard(name)
+        self.waiting.pop(name, None)
+
+    def publish(self, key: str, time_ns: int, payload: bytes) -> None:
+        """Say something to the run's viewers, on a key behind the run's prefix."""
+        self._bus.publisher(f"{self._key_prefix}/{key}")(payload, time_ns)
+
+    @property
+    def spoken(self) -> set[str]:
+        """The services that have handed over messages."""
+        return set(self._times)
+
+    @property
+    def refused(self) -> int:
+        """How many messages of strangers all participants have refused, as far as they have told."""
+        return sum(self._refused.values()) + self._bus.refused
+
+    def broken_off(self) -> str | None:
+        """A sentence about a run that ended before its time, None where it came to its end or diverged."""
+        if self.outcome == "" or self.diverged:
+            return None
+        why = f": {self.outcome}" if self.outcome else ""
+        return f"the run ended before its time, at t = {self.time_ns * 1e-9:.3f} s{why}"
 
     def frozen(self, names: Iterable[str]) -> str | None:
         """A sentence that names who holds up the run, None while it goes on."""
-        if self.ended or time.monotonic() - self.last_news < STALL:
+        if self.ended or time.monotonic() - self.last_news < self._patience:
             return None
         silent = sorted(set(names) - set(self.waiting))
         where = f"at t = {self.time_ns * 1e-9:.3f} s"
         if silent:
-            return f"{', '.join(silent)}: no answer since {STALL:g} s, {where}"
+            return f"{', '.join(silent)}: no answer for {self._patience:g} s, {where}"
         return f"the run stands still {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())

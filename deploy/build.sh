@@ -22,6 +22,11 @@ if [ -z "${BASE:-}" ]; then
 fi
 export BASE
 
+# What has not changed since the last build is not compiled again.
+PREVIOUS=
+if docker image inspect "${IMAGE:-lapwing}" > /dev/null 2>&1; then PREVIOUS=${IMAGE:-lapwing}; fi
+export PREVIOUS
+
 # With the host's pip the wheels are fetched by its settings; without, pip in the build asks the index itself.
 if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then deploy/wheels.sh; fi
 

@@ -84,6 +84,36 @@ here=$(field local.json digest)
 [ "$there" = "$here" ] || fail "digest $there in containers, $here locally"
 passed "digest equal to the local run's: $here"
 
+# One that is killed in flight ends them all, by name; what runs cannot write to its image, and is healthy while it flies.
+before=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")
+# shellcheck disable=SC2086
+docker rm --force $before > /dev/null
+container() { docker ps --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" \
+    --filter "label=com.docker.compose.service=$1"; }
+# shellcheck disable=SC2086
+SPEED=1 LOG=recordings/killed.mcap JSON=recordings/killed.json $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null &
+up=$!
+waited=0
+until grep -q "t = " compose.log; do
+    sleep 1
+    waited=$((waited + 1))
+    [ $waited -lt $TIMEOUT ] || fail "the mission to be killed has not begun"
+done
+victim=$(container sensors)
+if docker exec "$victim" touch /app/here 2> /dev/null; then fail "a container writes to its image"; fi
+until [ "$(docker inspect --format '{{.State.Health.Status}}' "$victim")" = healthy ]; do
+    sleep 1
+    waited=$((waited + 1))
+    [ $waited -lt $((2 * TIMEOUT)) ] || fail "sensors does not count as healthy"
+done
+begun=$(date +%s)
+docker kill "$victim" > /dev/null
+wait $up || true
+seconds=$(($(date +%s) - begun))
+grep -q "lapwing: sensors: gone at t = " compose.log || fail "nobody says that sensors is gone"
+[ $seconds -le 60 ] || fail "ended $seconds s after sensors was killed"
+passed "read-only, healthy; sensors killed: ended by name after $seconds s"
+
 # The log on the bus again, from the container to nobody: it must play to its end and say so.
 LOG=recordings/mission.mcap
 export LOG

@@ -4,7 +4,8 @@
 #   deploy/lock.sh [PACKAGE]     all anew, or only PACKAGE to its newest version
 #
 # Writes requirements.lock (what the runtime image holds, and the build backend) and requirements-tests.lock (what the
-# tests need on top of it). A local environment gets the same versions by `pip install --constraint`.
+# tests need on top of it), each with the hashes of all files of that version, for every platform. pip refuses what has
+# another hash. A local environment gets the same versions by `pip install --constraint`.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -14,7 +15,7 @@ python3 -m venv "$work/venv"
 "$work/venv/bin/python" -m pip install --quiet uv
 
 pin() {
-    "$work/venv/bin/uv" pip compile --quiet --no-header --no-annotate --python-version 3.11 "$@"
+    "$work/venv/bin/uv" pip compile --quiet --no-header --no-annotate --generate-hashes --python-version 3.11 "$@"
 }
 upgrade=--upgrade
 [ $# -eq 0 ] || upgrade="--upgrade-package=$1"
@@ -28,7 +29,10 @@ pin "$upgrade" --output-file "$work/runtime" pyproject.toml "$work/backend.in" >
 pin "$upgrade" --output-file "$work/all" --extra test --constraint "$work/runtime" \
     pyproject.toml "$work/backend.in" > /dev/null
 
-# One sorting order for comm, whatever the locale.
-LC_ALL=C sort "$work/runtime" > deploy/requirements.lock
-LC_ALL=C sort "$work/all" | LC_ALL=C comm -13 deploy/requirements.lock - > deploy/requirements-tests.lock
-wc -l deploy/requirements.lock deploy/requirements-tests.lock
+# A package a line, in one sorting order whatever the locale, and a hash a line again.
+lines() { sed -e :again -e '/\\$/{N; s/ *\\\n */ /; b again' -e '}' "$1" | LC_ALL=C sort; }
+hashes() { sed 's/ --hash/ \\\n    --hash/g'; }
+lines "$work/runtime" > "$work/runtime.lines"
+hashes < "$work/runtime.lines" > deploy/requirements.lock
+lines "$work/all" | LC_ALL=C comm -13 "$work/runtime.lines" - | hashes > deploy/requirements-tests.lock
+grep -c == deploy/requirements.lock deploy/requirements-tests.lock

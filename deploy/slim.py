@@ -12,7 +12,8 @@ UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compile
 # pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read.
 NOT_IMPORTED = ("lxml", "narwhals")
 PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
-DIALECTS = {"__init__", "minimal", "standard", "common", "ardupilotmega", "all"}
+# What the link speaks and pymavlink takes by default.
+DIALECTS = {"__init__", "all"}
 ELF64_LITTLE = b"\x7fELF\x02\x01"
 PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr
 

@@ -84,6 +84,16 @@ def _each(function, common, a, b):
     return define("each(function, common, a, b)", {}, f"return ({calls})")
 
 
+def any_of(found: tuple) -> bool:
+    """Whether any entry of a tuple is true."""
+    return any(found)
+
+
+@implements(any_of, inline=True)
+def _any_of(found):
+    return define("any_of(found)", {}, f"return {' or '.join(f'found[{i}]' for i in range(len(found))) or 'False'}")
+
+
 def each_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
     """(function(*arguments, 0), function(*arguments, 1), ...), one for each entry of the tuple `count`."""
     return tuple(function(*arguments, i) for i in range(len(count)))

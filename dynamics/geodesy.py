@@ -1,6 +1,6 @@
-"""Where home is on the Earth: ENU about a home point to and from WGS 84, and air pressure with altitude.
+"""Where home is on the Earth: ENU about a home point to and from WGS 84.
 
-WGS 84: NIMA TR8350.2. Conversions: theory.md, eqs. (3.4) to (3.7); the pressure law is the drone paper's, eq. (3.8).
+WGS 84: NIMA TR8350.2. Conversions: theory.md, eqs. (3.4) to (3.7).
 """
 
 import math
@@ -16,21 +16,13 @@ _E2 = FLATTENING * (2.0 - FLATTENING)  # first eccentricity squared
 _SEMI_MINOR = SEMI_MAJOR * (1.0 - FLATTENING)
 _EP2 = _E2 / (1.0 - _E2)  # second eccentricity squared
 
-SEA_LEVEL_PRESSURE = 101325.0  # [Pa]
-_LAPSE_RATE = 0.0065  # [K/m]
-_PRESSURE_EXPONENT = 5.2561
-
 
 class Home(NamedTuple):
     """Origin of the world frame on the WGS 84 ellipsoid."""
 
-    latitude_deg: Annotated[float, Ge(-90.0), Le(90.0)] = 40.7686  # Fisciano, the home of the drone paper
-    longitude_deg: Annotated[float, Ge(-180.0), Le(180.0)] = 14.7907
+    latitude_deg: Annotated[float, Ge(-90.0), Le(90.0)] = 40.7686  # [deg] north; Fisciano, the home of the drone paper
+    longitude_deg: Annotated[float, Ge(-180.0), Le(180.0)] = 14.7907  # [deg] east
     height: Annotated[float, Gt(-500.0), Le(9000.0)] = 280.0  # [m], over the ellipsoid; also taken as the altitude
-
-
-# Earth's field at the default home, east, north, up [T]: 46 uT, 57 deg down, 3.7 deg east of north (about 2025).
-MAGNETIC_FIELD_WORLD = (1.6e-6, 25.0e-6, -38.7e-6)
 
 
 @leaf
@@ -90,14 +82,7 @@ def geodetic_to_enu(home, latitude_deg, longitude_deg, height):
     return -sl * dx + cl * dy, cp * dz - sp * outward, sp * dz + cp * outward
 
 
-@leaf
-def air_pressure(altitude, temperature_celsius):
-    """Pressure [Pa] at an altitude [m] for a temperature [deg C] (theory.md, eq. (3.8))."""
-    return SEA_LEVEL_PRESSURE * (1.0 - _LAPSE_RATE * altitude / (273.0 + temperature_celsius)) ** _PRESSURE_EXPONENT
-
-
-@leaf
-def pressure_altitude(pressure, temperature_celsius):
-    """Altitude [m] at which air_pressure gives this pressure [Pa]."""
-    ratio = (pressure / SEA_LEVEL_PRESSURE) ** (1.0 / _PRESSURE_EXPONENT)
-    return (273.0 + temperature_celsius) * (1.0 - ratio) / _LAPSE_RATE
+def normal_gravity(latitude_deg: float) -> float:
+    """Gravity [m/s^2] on the ellipsoid (theory.md, eq. (2.29)); NIMA TR8350.2, eq. (4-1)."""
+    square = math.sin(math.radians(latitude_deg)) ** 2
+    return 9.7803253359 * (1.0 + 0.00193185265241 * square) / math.sqrt(1.0 - _E2 * square)

@@ -84,6 +84,46 @@ def _kind(tree: types.Type) -> str:
     raise TypingError(f"a row holds numbers, tuples and NamedTuples only, not {tree}")
 
 
+def construction(tree: types.Type, number: Callable[[int], str]) -> tuple[str, dict[str, Any]]:
+    """Source text that makes a tree of this type from its numbers, and the classes that it names.
+
+    Args:
+        tree: of tuples, NamedTuples and numbers.
+        number: the source text of the number of a column.
+
+    Raises:
+        TypingError: something else is in it.
+    """
+    names: dict[str, Any] = {}
+    column = 0
+
+    def expression(part: types.Type) -> str:
+        nonlocal column
+        if not isinstance(part, types.BaseTuple):
+            column += 1
+            return _kind(part).format(number(column - 1))
+        items = [expression(item) for item in part.types]
+        if isinstance(part, types.BaseNamedTuple):
+            name = f"Node{len(names)}"
+            names[name] = part.instance_class
+            return f"{name}({', '.join(items)})"
+        return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
+
+    return expression(tree), names
+
+
+def leaves(tree: types.Type, path: str) -> list[str]:
+    """Source text of each number of a tree of this type, which is at `path`, in the order of its columns.
+
+    Raises:
+        TypingError: something else than tuples, NamedTuples and numbers is in it.
+    """
+    if isinstance(tree, types.BaseTuple):
+        return [leaf for k, item in enumerate(tree.types) for leaf in leaves(item, f"{path}[{k}]")]
+    _kind(tree)
+    return [path]
+
+
 def load(like: Any, rows: np.ndarray, i: int) -> Any:
     """The tree of the type of `like` in row i."""
     raise NotImplementedError("compiled code only")
@@ -91,22 +131,7 @@ def load(like: Any, rows: np.ndarray, i: int) -> Any:
 
 @implements(load, inline=True)
 def _load(like: types.Type, rows: types.Type, i: types.Type) -> Callable:
-    names: dict[str, Any] = {}
-    column = 0
-
-    def expression(tree: types.Type) -> str:
-        nonlocal column
-        if not isinstance(tree, types.BaseTuple):
-            column += 1
-            return _kind(tree).format(f"rows[i, {column - 1}]")
-        parts = [expression(part) for part in tree.types]
-        if isinstance(tree, types.BaseNamedTuple):
-            name = f"Node{len(names)}"
-            names[name] = tree.instance_class
-            return f"{name}({', '.join(parts)})"
-        return f"({', '.join(parts)}{',' if len(parts) == 1 else ''})"
-
-    result = expression(like)
+    result, names = construction(like, lambda column: f"rows[i, {column}]")
     return define("load(like, rows, i)", names, f"return {result}")
 
 
@@ -117,15 +142,5 @@ def store(tree: Any, rows: np.ndarray, i: int) -> None:
 
 @implements(store, inline=True)
 def _store(tree: types.Type, rows: types.Type, i: types.Type) -> Callable:
-    lines: list[str] = []
-
-    def walk(part: types.Type, path: str) -> None:
-        if isinstance(part, types.BaseTuple):
-            for k, item in enumerate(part.types):
-                walk(item, f"{path}[{k}]")
-        else:
-            _kind(part)
-            lines.append(f"rows[i, {len(lines)}] = {path}")
-
-    walk(tree, "tree")
+    lines = [f"rows[i, {k}] = {path}" for k, path in enumerate(leaves(tree, "tree"))]
     return define("store(tree, rows, i)", {}, *lines, "return None")

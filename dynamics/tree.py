@@ -135,6 +135,11 @@ def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
     return f"max(0.0, {', '.join(found)})"
 
 
+def _apart(tree: types.Type, names: dict[str, Any]) -> str:
+    numbers = _number_paths(tree, "x")
+    return f"max(0.0, 0.0, {', '.join(f'abs({n} - y{n[1:]}) / (1.0 + abs({n}))' for n in numbers)})"
+
+
 def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:
     index = itertools.count()
     return unroll(tree, (), lambda leaf, _, __: None if leaf else f"numbers[{next(index)}]", names)
@@ -170,6 +175,10 @@ largest = _operation("largest(v)", "v", _largest, "The largest absolute number o
 error_ratio = _operation(
     "error_ratio(x, e)", "x", _error_ratio,
     "Largest component of a tangent e at x, floats relative to 1 + |x|, manifold leaves absolute (rad, rad/s).",
+)  # fmt: skip
+apart = _operation(
+    "apart(x, y)", "x", _apart,
+    "The largest difference between stored numbers of two states, relative to 1 + |x|; not of those that are NaN.",
 )  # fmt: skip
 finite = _operation("finite(x)", "x", _finite, "True if no number of a state or tangent is NaN or infinite.")
 unflatten = _operation(

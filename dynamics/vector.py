@@ -103,3 +103,9 @@ def matmul(m, n):
 def transpose(m):
     """Transpose of a 3x3 matrix in row order."""
     return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
+
+
+@leaf
+def pair(_, a, b):
+    """(a, b), for `each` of two tuples."""
+    return a, b

@@ -15,20 +15,23 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cosim.errors import LockStepError
     from cosim.scene import Scene, SceneError
-    from cosim.schedule import LockStepError
     from lapwing.api import campaign, fly, load, read
-    from lapwing.distributions import choice, normal, uniform
+    from lapwing.batch import Batch, BatchState
     from lapwing.flight import Flight
     from lapwing.simulator import Observation, Simulator
     from services.common.ports import Reference
+    from studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
     from studies.events import Event
     from studies.verdict import Verdict
 
 _WHERE = {
+    "Batch": "lapwing.batch",
+    "BatchState": "lapwing.batch",
     "Event": "studies.events",
     "Flight": "lapwing.flight",
-    "LockStepError": "cosim.schedule",
+    "LockStepError": "cosim.errors",
     "Observation": "lapwing.simulator",
     "Reference": "services.common.ports",
     "Scene": "cosim.scene",
@@ -36,15 +39,19 @@ _WHERE = {
     "Simulator": "lapwing.simulator",
     "Verdict": "studies.verdict",
     "campaign": "lapwing.api",
-    "choice": "lapwing.distributions",
+    "choice": "studies.campaign.distributions",
     "fly": "lapwing.api",
+    "linspace": "studies.campaign.distributions",
     "load": "lapwing.api",
-    "normal": "lapwing.distributions",
+    "loguniform": "studies.campaign.distributions",
+    "normal": "studies.campaign.distributions",
     "read": "lapwing.api",
-    "uniform": "lapwing.distributions",
+    "uniform": "studies.campaign.distributions",
 }
 
 __all__ = [
+    "Batch",
+    "BatchState",
     "Event",
     "Flight",
     "LockStepError",
@@ -57,7 +64,9 @@ __all__ = [
     "campaign",
     "choice",
     "fly",
+    "linspace",
     "load",
+    "loguniform",
     "normal",
     "read",
     "uniform",

@@ -7,16 +7,15 @@ from os import cpu_count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cosim.scene import Overrides, Scene, SceneError
 from cosim.setup import Setup
-from lapwing.distributions import Distribution
 from lapwing.flight import Flight
 from services import table
 from services.common.user_code import lent
 from services.table import reseed, resolve
 from studies import fly as studied
+from studies.campaign.distributions import Distribution
+from studies.campaign.plan import plan
 
 
 def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
@@ -72,7 +71,7 @@ def fly(
                 own[f"autopilot.{key}"] = stack.enter_context(lent(thing, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        return _flown(resolve(load(load(scene, overrides), own)))
+        return _flown(resolve(load(table.load_one(scene, overrides), own)))
 
 
 def read(log: str | Path) -> Flight:
@@ -89,38 +88,46 @@ def campaign(
     seeds: Iterable[int] = range(1, 101),
     vary: Mapping[str, Distribution] | None = None,
     overrides: Overrides = (),
+    *,
+    seed: int = 1,
+    design: str = "random",
 ) -> list[Flight]:
-    """Fly a scene many times, on all processors.
+    """Fly a scene many times, on all processors; the flights stay in memory. For many, see `lapwing campaign`.
 
     Args:
         scene: what to fly: a path, a name, or a loaded one.
-        seeds: of the randomness of each flight, and of what is varied in it.
-        vary: how keys of the scene vary from flight to flight: {"vehicle.mass": lapwing.normal(10.4, 0.2)}.
+        seeds: of each run's own randomness; as many runs as there are.
+        vary: how keys of the scene vary from run to run: {"vehicle.mass": lapwing.normal(10.4, 0.2)}.
         overrides: as of `load`.
+        seed: of the campaign. What a run draws depends on this, on its number and on the key alone.
+        design: how the runs fill the space of what varies: "random", "lhs", "sobol" or "grid".
 
     Returns:
-        A flight for each seed, in their order. The same seed gives the same flight, whatever the others are.
+        A flight for each run, in their order; with the seeds 1 to n and this `seed` = 1, those of
+        `lapwing campaign --runs n`.
 
     Raises:
         SceneError: the scene is not sound, or what was drawn does not fit it.
+        ValueError: an argument is out of its range.
     """
-    base, varied = load(scene, overrides), dict(vary or {})
-    for key, distribution in varied.items():
-        if not callable(distribution):
+    base = table.load_one(scene, overrides)
+    for key, distribution in (vary or {}).items():
+        if not isinstance(distribution, Distribution):
             raise SceneError(key, f"got {distribution!r}", "a distribution, for example lapwing.normal(10.4, 0.2)")
-    fixed = None if varied else resolve(base)
+    seeds = list(seeds)
+    if not seeds:
+        raise SceneError("seeds", "there are none", "at least one")
+    drawn = plan(base.name, (), len(seeds), seed, vary, design=design)
+    fixed = None if drawn.keys else resolve(base)
 
-    def setup(seed: int) -> Setup:
+    def one(run: int) -> Flight:
         if fixed is not None:
-            return reseed(fixed, seed)
-        generator = np.random.default_rng(seed)
-        drawn = {key: distribution(generator) for key, distribution in varied.items()}
-        return resolve(load(base, {**drawn, "run.seed": seed}))
+            return _flown(reseed(fixed, seeds[run]))
+        return _flown(resolve(load(base, {**drawn.values(run), "run.seed": seeds[run]})))
 
-    chosen = list(seeds)
-    first = [_flown(setup(seed)) for seed in chosen[:1]]  # alone: it compiles
+    first = one(0)  # alone: it compiles
     with ThreadPoolExecutor(cpu_count()) as pool:
-        return first + list(pool.map(lambda seed: _flown(setup(seed)), chosen[1:]))
+        return [first, *pool.map(one, range(1, len(seeds)))]
 
 
 def _flown(setup: Setup) -> Flight:

@@ -10,6 +10,8 @@ from cosim.graph import pages_of
 from cosim.log import LogWriter
 from cosim.provenance import attachments, failure, metadata
 from cosim.recording import Recording
+from lapwing.runs.events import event_messages
+from messages.topics import EVENTS
 from studies import flight as studied
 from studies.flight import topic_of
 from studies.report import write
@@ -53,7 +55,11 @@ class Flight(studied.Flight):
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
         about = metadata(setup, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
         with LogWriter(target, about, attachments(setup, {})) as writer:
-            Recording(writer, setup).write(pages, last)
+            recording = Recording(writer, setup)
+            recording.write(pages, last)
+            recording.finish()
+            for time_ns, payload in [] if self.has("events") else event_messages(self.events):
+                writer.write(EVENTS.key(self.vehicle), EVENTS.message, payload, time_ns, deterministic=False)
         return target
 
     def report(self, path: str | Path | None = None, beside: studied.Flight | None = None) -> Path:

@@ -16,7 +16,7 @@ from services.autopilot.core import NO_TRAJECTORY, ORDER, Order
 from services.common import ports
 from services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
 from services.processes import create
-from services.table import load, resolve
+from services.table import load, load_one, resolve
 
 KEEP = 64  # ticks that can be looked at
 
@@ -83,7 +83,7 @@ class Simulator:
         Raises:
             SceneError: the scene is not sound, or nobody steers in it.
         """
-        self._scene = load(scene, overrides)
+        self._scene = load_one(scene, overrides)
         self._graph: Graph | None = None
         self._kind = ""
         self._set_up(seed)

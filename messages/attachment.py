@@ -10,6 +10,7 @@ from typing import NamedTuple
 _LAYOUT = struct.Struct("<qqB16s")
 SIZE = _LAYOUT.size
 _GID_SIZE = 16
+_GID_PLACE = SIZE - _GID_SIZE
 
 
 class Attachment(NamedTuple):
@@ -48,6 +49,12 @@ def unpack(data: bytes) -> Attachment:
 _TIME = struct.Struct("<q")
 
 
-def source_time(data: bytes) -> int:
-    """Only the source time [ns] of an attachment, for the hot path."""
-    return _TIME.unpack_from(data, 8)[0]
+def time_and_gid(data: bytes) -> tuple[int, bytes]:
+    """Source time [ns] and identifier of an attachment, for the hot path.
+
+    Raises:
+        ValueError: no attachment.
+    """
+    if len(data) != SIZE or data[_GID_PLACE - 1] != _GID_SIZE:
+        raise ValueError(f"no attachment: {len(data)} bytes")
+    return _TIME.unpack_from(data, 8)[0], data[_GID_PLACE:]

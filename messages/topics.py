@@ -1,6 +1,6 @@
 """The topic table: every topic, its type, its rate, and whether it is recorded and reproducible. Declared only here."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -14,10 +14,12 @@ from messages.types import (
     FluidPressure,
     Imu,
     LiftCommand,
+    Log,
     MagneticField,
     NavSatFix,
     Odometry,
     OperatorInput,
+    OpticalFlow,
     PoseStamped,
     Range,
     Reading,
@@ -39,6 +41,7 @@ class Topic:
     rate: str | None = None  # scene key of its rate; None: every exchange tick
     recorded: bool = True
     deterministic: bool = True  # same scene and seed, same bytes; only such topics enter the digest
+    vehicle: str = ""  # of a fleet, whose own topic it is: its name then has no place `{vehicle}`
 
     def key(self, vehicle: str = "") -> str:
         """ROS name and name in the log: "/drone1/imu"."""
@@ -63,6 +66,9 @@ GPS = Topic("{vehicle}/gps/fix", NavSatFix, rate="sensors.gps.rate")
 GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate="sensors.gps.rate")
 BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
 SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
+AIRSPEED = Topic("{vehicle}/airspeed", FluidPressure, rate="sensors.airspeed.rate")
+RANGEFINDER = Topic("{vehicle}/rangefinder", Range, rate="sensors.rangefinder.rate")
+OPTICAL_FLOW = Topic("{vehicle}/optical_flow", OpticalFlow, rate="sensors.optical_flow.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
 TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # what of it is flown is in SETPOINT
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
@@ -72,11 +78,13 @@ ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
 OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.operator")
 COMMAND_ACKS = Topic("{vehicle}/answers", CommandAcks, rate="rates.operator")
+EVENTS = Topic("{vehicle}/events", Log, deterministic=False)  # found in the other topics after the flight
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 _PLACES = {topic: place for place, topic in enumerate(TOPICS)}
 _NAMED = {topic.name: topic for topic in TOPICS}
-_OWN_SENSOR = "{vehicle}/own_sensor/"
+_VEHICLE = "{vehicle}"
+_OWN_SENSOR = f"{_VEHICLE}/own_sensor/"
 
 
 @cache
@@ -85,17 +93,35 @@ def own_sensor(name: str) -> Topic:
     return Topic(f"{_OWN_SENSOR}{name}", Reading)
 
 
+@cache
+def of_vehicle(topic: Topic, vehicle: str) -> Topic:
+    """The topic "left/imu" of the vehicle `left` of a fleet; one that has no vehicle's name in it as it is."""
+    if _VEHICLE not in topic.name:
+        return topic
+    found = replace(topic, name=topic.name.replace(_VEHICLE, vehicle), vehicle=vehicle)
+    _PLACES[found] = place(topic)
+    return found
+
+
+def of_all(topic: Topic) -> Topic:
+    """The topic "{vehicle}/imu" of which this one, "left/imu", is that of one vehicle of a fleet."""
+    return topic_named(f"{_VEHICLE}/{topic.name.removeprefix(f'{topic.vehicle}/')}") if topic.vehicle else topic
+
+
 def topic_named(name: str) -> Topic:
-    """The topic of this name, "{vehicle}/imu" or "clock".
+    """The topic of this name, "{vehicle}/imu", "left/imu" or "clock".
 
     Raises:
         ValueError: there is none.
     """
     if name.startswith(_OWN_SENSOR):
         return own_sensor(name.removeprefix(_OWN_SENSOR))
-    if name not in _NAMED:
+    if name in _NAMED:
+        return _NAMED[name]
+    vehicle, _, rest = name.partition("/")
+    if not rest or vehicle == _VEHICLE:
         raise ValueError(f"no topic {name}")
-    return _NAMED[name]
+    return of_vehicle(topic_named(f"{_VEHICLE}/{rest}"), vehicle)
 
 
 def place(topic: Topic) -> int:

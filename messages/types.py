@@ -9,9 +9,13 @@ from messages.parse import read_folder
 TYPES: dict[str, Any] = {}
 """Message class by full name ("sensor_msgs/msg/Imu")."""
 
-_definitions = read_folder(Path(__file__).parent / "msg")
-for _name, _definition in _definitions.items():
-    TYPES[_name] = make_class(_definition, _definitions, TYPES)
+FOLDER = Path(__file__).parent / "msg"
+
+DEFINITIONS = read_folder(FOLDER)
+"""What their files say, by full name, each after the types that it contains."""
+
+for _name, _definition in DEFINITIONS.items():
+    TYPES[_name] = make_class(_definition, DEFINITIONS, TYPES)
 _by_name = {cls.__name__: cls for cls in TYPES.values()}
 if len(_by_name) != len(TYPES):
     raise ValueError("messages/msg: two packages hold a message of the same name")

@@ -1,10 +1,12 @@
 """One process of a run: what it is given, and how it takes part. `python -m services.participant NAME` reads that from
 standard input, as the launcher writes it."""
 
+import importlib
 import json
 import os
 import struct
 import sys
+from functools import partial
 from typing import IO, Any, NamedTuple
 
 from cosim import user_module
@@ -22,6 +24,7 @@ class Participation(NamedTuple):
     setup: Setup
     peers: dict[str, str]  # endpoint of every participant
     key_prefix: str  # key prefix
+    secret: str = ""  # of a run on one machine (cosim.participants)
     speed: float | None = None  # simulated seconds per second, None for as fast as it goes
     core: int | None = None  # core that all services of a sequential lock step share
     log: str = ""  # path of the recorder's log
@@ -30,8 +33,15 @@ class Participation(NamedTuple):
     open: tuple[str, ...] = ()  # endpoints for clients
     mavlink: tuple[str, ...] = ()  # URLs of links
     mavlink_key: str = ""  # path of a passphrase
+    foxglove: str = ""  # address for viewers
+    ros2: int | None = None  # ROS_DOMAIN_ID of a graph
+    ros2_router: str = ""  # HOST:PORT of its router
     insecure: bool = False  # unsigned commands from other machines are taken
     external: dict[str, str] | None = None  # endpoints of services that are programs of somebody else's, by name
+    keys: str = ""  # path of a folder of certificates
+    realtime: bool = False  # services of the lock step run in the scheduler's real-time class
+    restarts: bool = False  # some service of the run is started again where it is killed
+    journal: int = -1  # open file of this service's journal, if it is one of them
     with_parent: bool = False  # ends when standard input closes
 
 
@@ -45,8 +55,9 @@ def hand_over(given: Participation, stream: IO[bytes]) -> None:
 def take_over() -> Participation:
     """Read what this process is given, from standard input."""
     text = _read(_LENGTH.unpack(_read(_LENGTH.size))[0]).decode()
-    user_module.install(json.loads(text)["setup"]["resolved"].get("modules", {}))  # the set-up may name their classes
-    found: Any = from_json(text)
+    modules = json.loads(text)["setup"]["resolved"].get("modules", {})  # the set-up may name their classes
+    user_module.install(modules)
+    found: Any = from_json(text, modules)
     return found
 
 
@@ -67,19 +78,31 @@ def take_part(given: Participation) -> None:
         ValueError: what the user can mend.
         LockStepError: the lock step cannot go on.
     """
+    from cosim import private
     from cosim.bus import ZenohBus, mesh
+    from cosim.errors import LockStepError
     from cosim.lockstep import run_encoder, run_lockstep
+    from cosim.participants import Participants
     from cosim.process import Process, Stopped
+    from cosim.restart import Journal
     from services import processes
+    from services.security import door_settings, settings
 
     setup, encoded = given.setup, processes.encoded(given.name)
     entry = processes.entry(encoded or given.name)
+    participants = Participants(given.key_prefix, given.secret, tuple(given.external or ()))
     listen, connect = mesh(given.name, given.peers)
-    with ZenohBus([*listen, *given.open], connect, entry.mode) as bus:
+    if given.with_parent:
+        security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
+    else:
+        security = settings(setup, given.name, given.key_prefix, given.keys)
+    with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security) as bus:
         watched = WATCHER in given.peers and not given.with_parent
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
         compares = not given.with_parent or bool(encoded)
-        process = Process(given.name, setup, bus, given.key_prefix, others, given.speed, given.core, compares)
+        pace = (given.speed, given.core, compares, given.realtime)
+        journal = Journal(given.name, given.journal) if given.journal >= 0 else None
+        process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
         if given.with_parent:
             process.end_with_parent()
         elif watched:
@@ -88,36 +111,55 @@ def take_part(given: Participation) -> None:
             if encoded:
                 run_encoder(process, processes.create(setup, encoded))
             elif entry.lock_step:
-                more = {"operator": _heard(process)} if given.name == "autopilot" else {}
-                service = processes.create(setup, given.name, **more)
-                run_lockstep(process, service, given.name == processes.TIME_OWNER)
+                operators = _heard(process) if given.name == "autopilot" else {}
+                service = processes.create(setup, given.name, operators)
+                run_lockstep(process, service, given.name == processes.TIME_OWNER, processes.RECORDER)
             else:
                 module = __import__(f"{entry.package}.service", fromlist=["run"])
                 module.run(process, given)
+            if watched and (encoded or entry.lock_step):
+                process.linger()
         except Stopped:
-            pass
+            if process.abandoned:
+                raise LockStepError(f"{given.name}: {process.abandoned} is gone before the run has ended") from None
+    if process.orphaned:
+        private.remove(given.peers[given.name])
 
 
-def _heard(process: Any) -> Any:
-    """The operator commands that have come on the bus."""
-    from services.common.operator import OPERATOR_KEY, commands
+def _import_ahead(name: str) -> None:
+    """Import what a process of this name will need, which may be before the scene is read."""
+    from services import processes
 
-    get = process.bus.subscribe(f"{process.key_prefix}/{OPERATOR_KEY}").get
+    importlib.import_module("cosim.lockstep")
+    importlib.import_module(f"{processes.entry(processes.encoded(name) or name).package}.service")
 
-    def heard(_: int) -> list[Any]:
-        found: list[Any] = []
-        while arrived := get(0.0):
-            found += commands(arrived[1])
-        return found
 
-    return heard
+def _heard(process: Any) -> dict[str, Any]:
+    """The operator commands that have come on the bus for each vehicle, from the processes that give any."""
+    from cosim.restart import NOTHING
+    from services.common.operator import OPERATOR_KEY, Mailbox
+    from services.processes import MAVLINK, ROS2
+
+    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
+
+    def come() -> tuple[int, bytes]:
+        return get(0.0) or NOTHING
+
+    def arrived() -> tuple[int, bytes] | None:
+        found = process.journal.take(come) if process.journal else come()
+        return None if found == NOTHING else found
+
+    mailbox = Mailbox(process.setup.vehicles, arrived)
+    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
 
 
 def main() -> None:
     """Take part as the launcher says."""
-    from cosim.bus import BusError
-    from cosim.schedule import LockStepError
+    from cosim.errors import BusError, LockStepError
+    from cosim.exit import leave_garbage
 
+    leave_garbage()
+    _import_ahead(sys.argv[1])
     try:
         take_part(take_over())
     except (ValueError, BusError) as error:

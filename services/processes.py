@@ -6,10 +6,13 @@ and a `resolve(scene)` too where it has to know of the scene.
 """
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from cosim.fleet import joined_service, members
 from cosim.graph import Service
+from cosim.keys import ENCODER
 from cosim.setup import Setup
 
 
@@ -34,9 +37,10 @@ PROCESSES = (
     ProcessEntry("recorder", "services.recorder", False, needs=("log",)),
     ProcessEntry("router", "services.router", False, needs=("open",), optional=True, mode="router"),
     ProcessEntry("mavlink", "services.mavlink", False, resolves=True, needs=("mavlink",), optional=True),
+    ProcessEntry("foxglove", "services.foxglove", False, needs=("foxglove",), optional=True),
+    ProcessEntry("ros2", "services.ros2", False, needs=("ros2",), optional=True),
 )
-RECORDER, ROUTER, MAVLINK = "recorder", "router", "mavlink"
-ENCODER = "_messages"  # ending of the name of a process that makes the messages of a program of somebody else's
+RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"
 TIME_OWNER = "plant"  # keeps the pace, and says which tick is the last
 
 
@@ -63,17 +67,31 @@ def encoded(name: str) -> str:
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""
 
 
-def create(setup: Setup, name: str, **more: Any) -> Service:
-    """A service of the lock step of a run."""
-    return importlib.import_module(f"{entry(name).package}.service").create(setup, **more)
+Operator = Callable[[int], Iterable[Any]]  # gives the commands that have come until a tick, besides those of the plan
 
 
-def create_all(setup: Setup, operator: Callable | None = None) -> list[Service]:
+def create(setup: Setup, name: str, operators: Mapping[str, Operator] = MappingProxyType({})) -> Service:
+    """A service of the lock step of a run; `operators` give the commands of each vehicle, by its name."""
+    module = importlib.import_module(f"{entry(name).package}.service")
+
+    def of(member: Setup) -> Service:
+        own = {"operator": operators[member.vehicle]} if name == "autopilot" and member.vehicle in operators else {}
+        return module.create(member, **own)
+
+    if setup.vehicle:
+        return of(setup)
+    having = [member for member in members(setup) if name in member.services]
+    return joined_service(name, [(member, of(member)) for member in having])
+
+
+def create_all(setup: Setup, operator: Operator | Mapping[str, Operator] | None = None) -> list[Service]:
     """All services of the lock step of a run, in their order of execution.
 
     Args:
         setup: the run.
-        operator: gives the commands that have come until a tick, besides those of the plan.
+        operator: gives commands to the vehicle, or one for each by the vehicle's name.
     """
-    more: dict[str, Any] = {"autopilot": {"operator": operator}} if operator else {}
-    return [create(setup, name, **more.get(name, {})) for name in setup.order]
+    if operator is None:
+        operator = {}
+    operators = operator if isinstance(operator, Mapping) else {setup.vehicle: operator}
+    return [create(setup, name, operators) for name in setup.order]

@@ -11,10 +11,11 @@ from types import ModuleType
 from typing import Any
 
 import services
+from cosim import fleet
 from cosim import scene as scenes
 from cosim.scene import Overrides, Scene, SceneError, Vocabulary
 from cosim.setup import Setup
-from services.common import exchange, modules, sections, vehicle
+from services.common import environment, exchange, mesh, modules, sections, success, vehicle
 from services.common.exchange import Exchange
 from services.common.sections import Run
 from services.common.vehicle import Vehicle
@@ -32,7 +33,8 @@ def _configurations() -> list[ModuleType]:
 @cache
 def vocabulary() -> Vocabulary:
     """Every table that a scene may have: of several services, of one, and of the plant's models."""
-    tables = [sections, exchange, vehicle, modules, *_configurations(), *map(models.get, models.names())]
+    shared = [sections, success, exchange, environment, vehicle, modules, mesh]
+    tables = [*shared, *_configurations(), *map(models.get, models.names())]
     return Vocabulary.of(tables, models.check)
 
 
@@ -50,6 +52,13 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     if isinstance(scene, Scene):
         return scenes.again(scene, overrides, vocabulary()) if overrides else scene
     return scenes.load(scene, overrides, vocabulary(), sections.SHIPPED)
+
+
+def load_one(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
+    """`load` of a scene for what works on one vehicle; SceneError where it lists several."""
+    loaded = load(scene, overrides)
+    loaded[Vehicle]  # refused there
+    return loaded
 
 
 def parse(path: Path, text: str, overrides: Overrides = ()) -> Scene:
@@ -71,6 +80,9 @@ def reseed(setup: Setup, seed: int) -> Setup:
     if not hasattr(seed, "__index__") or not 0 <= (number := index(seed)) < 2**63:
         raise SceneError("run.seed", f"got {seed!r}", "a whole number from 0 to 2^63 - 1")
     seed = number
+    if not setup.vehicle:
+        resolved = {**setup.resolved, Run.TABLE: {**setup.resolved[Run.TABLE], "seed": seed}}
+        return fleet.joined([reseed(member, seed) for member in fleet.members(setup)], resolved)
     services_of = dict(setup.services)
     for name, given in services_of.items():
         module = importlib.import_module(f"{entry(name).package}.resolve")
@@ -90,6 +102,10 @@ def resolve(scene: Scene, plan: tuple[Any, ...] = ()) -> Setup:
     Raises:
         SceneError: what is wrong with which key, and what would be right.
     """
+    if scene.vehicles:
+        if plan:
+            raise SceneError("vehicle", "a plan is flown by one vehicle, and the scene has several")
+        return fleet.joined([resolve(vehicle) for vehicle in scene.vehicles], scene.resolved)
     with scene.located():
         return _resolve(scene, plan)
 
@@ -103,6 +119,8 @@ def _resolve(scene: Scene, plan: tuple[Any, ...]) -> Setup:
             given = importlib.import_module(f"{process.package}.resolve").resolve(scene)
             if given is not None:
                 (found if process.lock_step else beside)[process.name] = given
+    if unknown := [name for name in run.restart if name not in found]:
+        raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(found)}")
     if plan:
         autopilot = found["autopilot"]
         found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))

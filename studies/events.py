@@ -1,24 +1,40 @@
-"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, saturation, contact."""
+"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, slack links, saturation, contact; and
+which services were started again."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from studies.faults import planned
 from studies.saturation import saturation, stretches
+from studies.tension import pushes, told
 from studies.topic_view import TopicView
 from studies.touches import touches
+from studies.warnings import warnings
 
 BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
-ORDER = ("fault", "failsafe", "mode", "phase", "arming", "contact", "motors", "battery")  # at the same time
+ORDER = (
+    "restart",
+    "fault",
+    "warning",
+    "failsafe",
+    "mode",
+    "phase",
+    "arming",
+    "contact",
+    "slack",
+    "motors",
+    "battery",
+)  # at the same time
 
 
 class Event(NamedTuple):
     """Something that happened."""
 
     time: float  # [s]
-    kind: str  # arming, mode, phase, failsafe, fault, battery, motors, contact
+    kind: str  # arming, mode, phase, failsafe, fault, warning, slack, battery, motors, contact, restart
     text: str
 
 
@@ -39,6 +55,7 @@ def events(
     if status is not None and len(status):
         found += _said(status)
         found += _contacts(truth)
+        found += [Event(doubt.start, "warning", doubt.text) for doubt in warnings(truth, scene)]
         highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
         if highest is not None and len(armed):
             found += _saturations(truth, armed, highest)
@@ -46,7 +63,34 @@ def events(
         phases = changes(setpoint.times, setpoint.phase)
         found += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
     found = [event._replace(time=round(event.time, 9)) for event in found]  # nanoseconds, as the log counts
+    return ordered(found)
+
+
+def ordered(found: Iterable[Event]) -> list[Event]:
+    """Events in their order."""
     return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
+
+
+def restarts(told: str) -> list[Event]:
+    """Where services were started again, from what the log's metadata tells of it (`cosim.restarts`)."""
+    return [Event(round(time, 9), "restart", text) for time, text in json.loads(told)]
+
+
+def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:
+    """Where a link pushes: a rigid one can, a cable would be slack, and the flight is not one on cables.
+
+    Args:
+        bodies: the load and the quadrotors.
+        lift: their thrusts.
+        load: the scene's table [cooperative_load].
+    """
+    every = told(bodies, lift, load)
+    found = []
+    for k in range(every.shape[1]):
+        for push in pushes(bodies.times[: len(every)], every[:, k]):
+            text = f"link {k + 1} pushes until {push.stop:.3f} s with up to {push.most:.3g} N: a cable would be slack"
+            found.append(Event(round(push.start, 9), "slack", text))
+    return sorted(found)
 
 
 def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
@@ -93,7 +137,7 @@ def _contacts(truth: TopicView) -> Iterator[Event]:
 
 def _saturations(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
     found, t = saturation(truth, armed, highest), truth.times
-    for first, stop in stretches(found, t):
+    for first, stop in stretches(found.any, t):
         some = slice(first, stop)
         low, high = (np.flatnonzero(at[some].any(axis=0)) + 1 for at in (found.low, found.high))
         where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))

@@ -9,13 +9,13 @@ import numpy as np
 
 from cosim.graph import Graph
 from cosim.log import LogReader
-from cosim.provenance import DIVERGED, FAILURE
+from cosim.provenance import DIVERGED, FAILURE, RESTARTS
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
 from messages.topics import Topic, topic_named
 from studies import tracking
-from studies.events import Event, events
+from studies.events import Event, events, ordered, restarts, slack
 from studies.origin import Origin
 from studies.port_columns import columns_of
 from studies.topic_view import TopicView
@@ -32,6 +32,7 @@ class Flight:
     Attributes:
         origin: where it comes from, with the log's metadata.
         vehicle: name.
+        fleet: what is true of every vehicle that flew, "truth" by name; this one among them.
         failure: why it ended before its time; "" where it did not, or where a log does not say.
         diverged: whether that is a state that was no longer finite.
     """
@@ -40,6 +41,7 @@ class Flight:
         """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
         self.origin, self.vehicle, self.failure, self.diverged = origin, origin.vehicle, failure, diverged
         self._topics = dict(topics)
+        self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
 
     @classmethod
     def read(cls, path: str | Path, vehicle: str | None = None) -> Self:
@@ -54,18 +56,42 @@ class Flight:
         """
         with LogReader(path) as log:
             known = [name for name, kind in log.topics().items() if kind in TYPES]
-            named = vehicle or next((name.split("/")[1] for name in known if name.endswith("/truth")), None)
-            if named is None or f"/{named}/truth" not in known:
+            fleet = _vehicles(known, log.metadata)
+            named = vehicle or next(iter(fleet), None)
+            if named is None or named not in fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
-            prefix = f"/{named}/"
-            own = [name for name in known if name.startswith(prefix) or "/" not in name[1:]]
-            views = {
-                name.removeprefix(prefix).removeprefix("/"): TopicView(*columns)
-                for name, columns in log.histories(own).items()
-            }
-            failure = log.metadata.get(FAILURE, "")
-            diverged = log.metadata.get(DIVERGED) == "yes"
-            return cls(views, Origin.of_log(str(path), named, log.metadata, log.attachments), failure, diverged)
+            others = {f"/{name}/truth" for name in fleet}
+            own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
+            return cls._of_log(log, str(path), log.histories(own), named, fleet)
+
+    @classmethod
+    def read_all(cls, path: str | Path) -> list[Self]:
+        """The recorded flights of all vehicles of a log, which is read once.
+
+        Raises:
+            ValueError: as of `read`.
+        """
+        with LogReader(path) as log:
+            known = [name for name, kind in log.topics().items() if kind in TYPES]
+            fleet = _vehicles(known, log.metadata)
+            if not fleet:
+                raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
+            histories = log.histories(known)
+            return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
+
+    @classmethod
+    def _of_log(cls, log: LogReader, source: str, histories: Mapping[str, Any], vehicle: str, fleet: list[str]) -> Self:
+        prefix = f"/{vehicle}/"
+        views = {
+            name.removeprefix(prefix).removeprefix("/"): TopicView(*columns)
+            for name, columns in histories.items()
+            if name.startswith(prefix) or "/" not in name[1:]
+        }
+        failure, diverged = log.metadata.get(FAILURE, ""), log.metadata.get(DIVERGED) == "yes"
+        found = cls(views, Origin.of_log(source, vehicle, log.metadata, log.attachments), failure, diverged)
+        truths = {name: TopicView(*histories[f"/{name}/truth"]) for name in fleet if name != vehicle}
+        found.fleet = {name: truths.get(name, found.truth) for name in fleet}
+        return found
 
     @classmethod
     def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False) -> Self:
@@ -215,9 +241,18 @@ class Flight:
 
     @cached_property
     def events(self) -> list[Event]:
-        """What happened, in order: arming, modes, phases, failsafes, faults, saturation, contact."""
+        """What happened, in order; an `Event` says what kinds there are."""
+        if self.has("events"):
+            said = self.topic("events")
+            return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
-        return events(self.truth, status, setpoint, self.armed, self.origin.scene)
+        found = events(self.truth, status, setpoint, self.armed, self.origin.scene)
+        load = self.origin.scene.get("cooperative_load")
+        if load and self.has("bodies") and self.has("lift"):  # nobody steers: no other kind of event is told
+            found += slack(self.topic("bodies"), self.topic("lift"), load)
+        if RESTARTS in self.metadata:
+            found = ordered([*found, *restarts(self.metadata[RESTARTS])])
+        return found
 
     @property
     def landed(self) -> bool:
@@ -236,6 +271,13 @@ class Flight:
             raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
+    """The vehicles whose truth is among the topics of a log, in the order of its scene."""
+    found = [name.split("/")[1] for name in topics if name.endswith("/truth")]
+    said = metadata.get("vehicle", "").split(", ")
+    return sorted(found, key=lambda name: said.index(name) if name in said else len(said))
 
 
 def topic_of(name: str) -> Topic:

@@ -3,9 +3,11 @@
 from collections.abc import Collection
 from typing import TypeVar
 
+import numpy as np
+
+from cosim.errors import DivergedError, LockStepError
 from cosim.graph import Graph
 from cosim.scene import Scene
-from cosim.schedule import DivergedError, LockStepError
 from cosim.setup import Setup
 from messages.topics import Topic
 from services.common.operator import Operator, nobody
@@ -23,6 +25,7 @@ def fly(
     only: Collection[Topic] | None = None,
     operator: Operator = nobody,
     kind: type[F] = Flight,  # type: ignore[assignment]
+    rows: dict[str, np.ndarray] | None = None,
 ) -> F:
     """Fly to the end, or until a state is not sound: the verdict then says so.
 
@@ -31,12 +34,13 @@ def fly(
         only: the topics wanted, None for all that are recorded; the fewer, the less memory and time.
         operator: gives the commands that have come until a tick.
         kind: the class of the flight, where more is to be had of it.
+        rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
     """
     setup = run if isinstance(run, Setup) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
     wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else wire.topic in only)}
-    graph, failure, diverged = Graph(setup, services, PAGE, wanted), "", False
+    graph, failure, diverged = Graph(setup, services, PAGE, wanted, rows), "", False
     try:
         graph.advance(setup.last_tick + 1)
     except LockStepError as error:

@@ -15,10 +15,11 @@ from studies.report.style import DPI, FLOWN
 GREY, PALE = "#666666", "#F4F6F8"
 WIDE, HIGH = 6.6, 3.9  # from service to service
 HALF = (1.05, 0.8)  # width and height of half a service
-LOW = 0.35  # height of half a process that listens
+LOW, NARROW = 0.35, 0.95  # height and width of half a process that listens
+OUTER = 0.9  # that the row of these is wider at each end than the services' middles
 APART = 0.32  # between the arrows of two services
 PLACES = {"plant": (0, 1), "sensors": (1, 1), "trajectory": (0, 0), "autopilot": (1, 0), "formation": (1, 0)}
-TAKEN = {"recorder": "every recorded topic", "router": "every topic", MAVLINK: "telemetry"}  # by those who listen
+TAKEN = {"recorder": "every recorded topic", MAVLINK: "telemetry"}  # by those who do not listen to every topic
 STATION, LINK = "ground station", "MAVLink 2"
 TOP, BOTTOM, LAST, ASIDE = -1.15, -3.0, -5.0, 0.7  # rows below the services; arrows beside the middle
 NOTE = "* taken one or more ticks after it was given\nsolid: lock step; dashed outline: only where it is asked for"
@@ -67,7 +68,8 @@ def arrows(setup: Setup) -> list[Arrow]:
             found.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
     for entry, (x, y) in _listening(setup).items():
         steers = entry.name == MAVLINK
-        found.append(Arrow((x - ASIDE * steers, TOP), (x - ASIDE * steers, y + LOW), TAKEN[entry.name], GREY))
+        left, taken = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
+        found.append(Arrow((left, TOP), (left, y + LOW), taken, GREY))
         if steers:
             found.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
             found.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))
@@ -78,7 +80,7 @@ def draw(setup: Setup, path: Path) -> None:
     """Write the picture of a run in the format of the file's ending."""
     figure = Figure(figsize=(9.4, 9.0))
     axes = figure.add_subplot(aspect="equal")
-    axes.set(xlim=(-1.9, WIDE + 1.9), ylim=(LAST - 0.6, HIGH + 1.4))
+    axes.set(xlim=(-1.9, WIDE + 1.9), ylim=(LAST - 1.3, HIGH + 1.4))
     axes.axis("off")
     axes.set_title(f"{setup.scene}: {setup.rate} Hz, {setup.coupling}")
     area = FancyBboxPatch((-1.4, TOP + 0.1), WIDE + 2.8, HIGH + 2.2, "round,pad=0.1", fc=PALE, ec="none")
@@ -86,18 +88,19 @@ def draw(setup: Setup, path: Path) -> None:
     for name, place in places(setup).items():
         _box(axes, place, name, FLOWN, HALF)
     for entry, place in _listening(setup).items():
-        _box(axes, place, entry.name, GREY, (HALF[0], LOW), "--" if entry.optional else "-")
+        _box(axes, place, entry.name, GREY, (NARROW, LOW), "--" if entry.optional else "-")
         if entry.name == MAVLINK:
             _box(axes, (place[0], LAST), STATION, GREY, (1.4, LOW), ":")
     for arrow in arrows(setup):
         _arrow(axes, arrow)
-    axes.text(-1.4, LAST, NOTE, ha="left", va="center", fontsize=8, color=GREY)
+    axes.text(-1.4, LAST - 0.9, NOTE, ha="left", va="center", fontsize=8, color=GREY)
     figure.savefig(path, dpi=DPI, bbox_inches="tight")
 
 
 def _listening(setup: Setup) -> dict[ProcessEntry, Point]:
     beside = listeners(setup)
-    return {entry: (WIDE * k / max(len(beside) - 1, 1), BOTTOM) for k, entry in enumerate(beside)}
+    step = (WIDE + 2.0 * OUTER) / max(len(beside) - 1, 1)
+    return {entry: (step * k - OUTER, BOTTOM) for k, entry in enumerate(beside)}
 
 
 def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:

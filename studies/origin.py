@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from cosim import provenance
+from cosim.fleet import member
 from cosim.serialise import from_json
 from cosim.setup import Setup
 
@@ -52,7 +53,7 @@ class Origin:
         if provenance.SETUP_FILE not in self._attachments:
             raise ValueError(f"{self.source}: has no attachment {provenance.SETUP_FILE}")
         try:
-            return from_json(self._attachments[provenance.SETUP_FILE].decode())
+            return member(from_json(self._attachments[provenance.SETUP_FILE].decode()), self.vehicle)
         except ValueError as fault:
             raise self._unreadable(fault) from None
 
@@ -67,9 +68,15 @@ class Origin:
             return self._setup.resolved
         try:  # the tables alone: they can be read even when classes of the set-up have changed
             tree = json.loads(self._attachments.get(provenance.SETUP_FILE, b"{}")).get("resolved", {})
-            return from_json(json.dumps(tree))
+            found = from_json(json.dumps(tree))
         except ValueError as fault:
             raise self._unreadable(fault) from None
+        if not isinstance(found.get("vehicle"), list):
+            return found
+        own: dict[str, Any] = next(
+            (entry for entry in found["vehicle"] if entry["vehicle"]["name"] == self.vehicle), {}
+        )
+        return {**found, **own}
 
     @cached_property
     def metadata(self) -> dict[str, str]:

@@ -28,6 +28,7 @@ class Row(NamedTuple):
 
 # name of the function and of the published figure: (unit shown, SI units in one of it)
 _SHOWN = {
+    "thrust_over_weight": ("-", 1.0),
     "hover_time": ("min", 60.0),
     "maximum_payload": ("kg", 1.0),
     "maximum_range": ("km", 1000.0),
@@ -49,7 +50,7 @@ def card(subject: Path) -> list[Row]:
     vehicle, rotor = _vehicle(subject)
     rows = []
     for name, (unit, size) in _SHOWN.items():
-        stated = getattr(vehicle.published, name) if vehicle.published else None
+        stated = getattr(vehicle.published, name, None)
         computed, reason = None, stated.reason if stated else ""
         try:
             value = getattr(performance, name)(vehicle, rotor=rotor)
@@ -75,7 +76,7 @@ def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
     except (OSError, ValueError):
         tables = {}
     if "rotors" in tables:  # what no scene has
-        alone = load_airframe(subject)
+        alone = load_airframe(subject).loaded
         try:
             return alone, performance.rotor_of(alone)
         except ValueError as lacking:
@@ -96,9 +97,9 @@ def show(console: Console, rows: list[Row]) -> None:
     if any(row.reason for row in rows):
         table.add_column("why they differ" if source else "why not")
     for row in rows:
-        cells = [f"{row.name} [{row.unit}]", "" if row.computed is None else f"{row.computed:.1f}"]
+        cells = [f"{row.name} [{row.unit}]", "" if row.computed is None else f"{row.computed:.3g}"]
         if source:
-            cells.append("" if row.published is None else f"{row.published:.1f}")
+            cells.append("" if row.published is None else f"{row.published:.3g}")
         table.add_row(*cells, *([row.reason] if len(table.columns) > len(cells) else []))
     console.print(table)
 

@@ -1,7 +1,7 @@
 """The messages of a topic as columns, straight from the rows of its port, as far as these have them."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,8 @@ class PortColumns(Mapping[str, Any]):
         self._fields = wire.fields(tree, self.ticks * graph.setup.interval_ns)
         # one message with each of the texts that occur: names, types and shapes of all columns
         keys = [()] if wire.texts is None else _distinct(wire.texts(tree))
-        self._samples = history(wire.topic.message, [wire.sample(*key).encode() for key in keys])
+        self._samples = _samples(wire.topic.message, *(wire.sample(*key).encode() for key in keys))
+        self._columns: dict[str, np.ndarray] = {}
 
     @cached_property
     def messages(self) -> History:
@@ -68,10 +69,12 @@ class PortColumns(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._fields:
             return self.messages[name]
-        like = self._samples[name]
-        assert isinstance(like, np.ndarray)  # a number
-        column = np.asarray(self._fields[name]).astype(like.dtype, copy=False)
-        return np.broadcast_to(column, (len(self.ticks), *like.shape[1:]))
+        if name not in self._columns:
+            like = self._samples[name]
+            assert isinstance(like, np.ndarray)  # a number
+            column = np.asarray(self._fields[name]).astype(like.dtype, copy=False)
+            self._columns[name] = np.broadcast_to(column, (len(self.ticks), *like.shape[1:]))
+        return self._columns[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._samples)
@@ -84,6 +87,12 @@ class PortColumns(Mapping[str, Any]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.messages.__reduce__()
+
+
+@lru_cache(maxsize=64)
+def _samples(message: Any, *payloads: bytes) -> History:
+    """The history of some messages; the flights of a campaign share theirs."""
+    return history(message, payloads)
 
 
 def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:

@@ -49,9 +49,9 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
     return Saturation(low & flying[:, None], high & flying[:, None], step, flying)
 
 
-def stretches(found: Saturation, t: np.ndarray) -> list[tuple[int, int]]:
-    """Rows (first, one after the last) of stretches with a motor at a limit, those close to each other as one."""
-    edges = np.diff(found.any.astype(np.int8), prepend=0, append=0)
+def stretches(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
+    """Rows (first, one after the last) of stretches where something holds, those close to each other as one."""
+    edges = np.diff(where.astype(np.int8), prepend=0, append=0)
     merged: list[tuple[int, int]] = []
     for start, stop in zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True):
         if merged and t[start] - t[merged[-1][1] - 1] < APART:

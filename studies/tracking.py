@@ -1,7 +1,10 @@
 """How far a flight is from what was asked: errors of the six axes while the motors are armed."""
 
+from typing import Any
+
 import numpy as np
-from scipy.spatial.transform import Rotation
+
+from dynamics.kernel import kernel
 
 TURN = 2.0 * np.pi
 AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
@@ -16,9 +19,13 @@ def shown(axis: str) -> tuple[str, float]:
 
 def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw [rad] of unit quaternions of shape (n, 4), shape (n, 3); yaw without jumps."""
-    yaw_pitch_roll = Rotation.from_quat(xyzw).as_euler("ZYX")
-    yaw_pitch_roll[:, 0] = np.unwrap(yaw_pitch_roll[:, 0])
-    return yaw_pitch_roll[:, ::-1]
+    x, y, z, w = np.asarray(xyzw, dtype=float).T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    if not (np.abs(np.diff(yaw)) < np.pi).all():
+        yaw = np.unwrap(yaw)
+    return np.column_stack([roll, pitch, yaw])
 
 
 def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
@@ -30,9 +37,26 @@ def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, ar
         attitude: roll, pitch, yaw [rad], shape (n, 3).
         armed: shape (n,) of bool.
     """
-    turn = reference[:, 3:] - attitude
-    turn -= TURN * np.round(turn / TURN)
-    return np.column_stack([reference[:, :3] - position, turn])[armed]
+    found = np.empty((np.count_nonzero(armed), len(AXES)))
+    _errors(found, plain(reference), plain(position), plain(attitude), plain(armed, bool))
+    return found
+
+
+def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
+    """The same array laid out so that one compiled version serves all; a copy where it is not."""
+    return np.require(values, kind, ("C", "W"))
+
+
+@kernel
+def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any) -> None:
+    k = 0
+    for row in range(len(armed)):
+        if armed[row]:
+            for i in range(3):
+                found[k, i] = reference[row, i] - position[row, i]
+                turn = reference[row, 3 + i] - attitude[row, i]
+                found[k, 3 + i] = turn - TURN * np.rint(turn / TURN)
+            k += 1
 
 
 def rmse(errors: np.ndarray) -> dict[str, float]:

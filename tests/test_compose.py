@@ -44,6 +44,16 @@ def test_every_service_has_a_known_command_and_needs_only_what_is_there():
             assert command[1] in ("run", "service", "replay")
 
 
+def test_with_certificates_every_service_is_given_its_own_and_no_other():
+    keyed = yaml.safe_load((ROOT / "docker-compose.keys.yml").read_text())["services"]
+    base = compose()
+    assert set(keyed) == {name for name, service in base.items() if "--peers" in service.get("command", ())}
+    for name, service in keyed.items():
+        command = base[name]["command"]
+        participant = command[2] if command[1] == "service" else name
+        assert service["volumes"] == [f"./keys/{participant}:/app/keys/{participant}:ro"]
+
+
 def endpoints():
     """The names in the table of participants, and who is started by `docker compose up mission`."""
     mission = compose()["mission"]

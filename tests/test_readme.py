@@ -1,11 +1,17 @@
 """What the README tells its reader to type works as written."""
 
+import os
 import re
+import shlex
 import subprocess
 import sys
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -14,6 +20,7 @@ COMMANDS = [
     for block in re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
     for line in block.splitlines()
 ]
+FLOWN = [c for c in COMMANDS if c.startswith("lapwing ")]
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +32,43 @@ def folder(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("lapwing ")])
-def test_lapwing_commands_run_as_written(command, folder):
-    words = command.split()[1:]
-    more = ["--key-prefix", "test-readme"] if words[0] in ("run", "replay") else []
-    subprocess.run([sys.executable, "-m", "lapwing", *words, *more], cwd=folder, check=True, timeout=900)
+@pytest.fixture(scope="module")
+def begun(folder, request):
+    """The commands that are asked for, as many at a time as there are cores, each with what it will end with."""
+    names = {item.callspec.params["command"] for item in request.session.items if _is_flown(item)}
+    found: dict[str, Future] = {}
+    pool = ThreadPoolExecutor(os.cpu_count())
+    for number, command in enumerate(c for c in FLOWN if c in names):
+        before = [found[c] for c in found if _written(c) & set(shlex.split(command))]
+        found[command] = pool.submit(_run, command, f"test-readme-{number}", folder, before)
+    yield found
+    pool.shutdown(cancel_futures=True)
+
+
+def _is_flown(item):
+    return item.module.__name__ == __name__ and "begun" in item.fixturenames
+
+
+def _written(command):
+    """The logs that a command writes."""
+    words = shlex.split(command)
+    return {log for option, log in pairwise(words) if option == "--log"}
+
+
+def _run(command, key_prefix, folder, before):
+    """Run a command once those before it, which began earlier, have written what it reads."""
+    for one in before:
+        one.result()
+    words = shlex.split(command)[1:]
+    more = ["--key-prefix", key_prefix] if words[0] in ("run", "replay") else []
+    program = [sys.executable, "-m", "lapwing", *words, *more]
+    return subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=1800)
+
+
+@pytest.mark.parametrize("command", FLOWN)
+def test_lapwing_commands_run_as_written(command, begun):
+    done = begun[command].result()
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("make ")])

@@ -88,8 +88,9 @@ def add_to_digest(digest: Digest, parts: list[Rows]) -> None:
     for topic, of_topic in _by_topic(parts).items():
         if not topic.deterministic:
             continue
-        if len(of_topic) == 1:
-            records = of_topic[0].records[np.argsort(of_topic[0].order, kind="stable")]
+        if len({part.records.itemsize for part in of_topic}) == 1:
+            order = np.concatenate([part.order for part in of_topic])
+            records = np.concatenate([part.records for part in of_topic])[np.argsort(order, kind="stable")]
             digest.update_page(topic.name, records["log_time"].astype(np.int64), records["payload"])
             continue
         entries: list[tuple[int, int, bytes]] = []

@@ -3,7 +3,9 @@
 import mimetypes
 import zlib
 from collections.abc import Sequence
-from typing import BinaryIO
+from contextlib import suppress
+from io import FileIO
+from typing import NamedTuple, Self
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -24,21 +26,52 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
+from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
 from cosim.log.chunk import Messages
 
-METADATA = "lapwing"  # name of the metadata record
+METADATA = "lapwing"  # name of the metadata record at the start
+METADATA_END = "lapwing_end"  # and of that at the end, with what was not known before: no key is in both
 DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
 COMPRESSION_LEVEL = 2  # zstd: level 3, its default, makes such logs larger; level 9 saves 3 % for five times the work
+SMALL = 1024  # [bytes] of messages that are not worth compressing
 _CRC = 4  # [bytes] of the footer's checksum, which it does not cover itself
+
+
+class _State(NamedTuple):
+    """What a file had before its tail."""
+
+    offset: int  # [bytes]
+    schemas: int
+    channels: int
+    chunks: int
+    counts: dict[int, int]
 
 
 class Container:
     """Writes a file's records in order and remembers where they are. All methods may raise OSError."""
 
-    def __init__(self, file: BinaryIO) -> None:
-        """Begin a file that is open for writing and empty."""
+    def __init__(self, file: FileIO) -> None:
+        """Begin a file that is open for writing, without a buffer, and empty."""
+        self._begin(file)
+        self._write(MCAP0_MAGIC)
+        self._write(encoded(Header(profile="ros2", library="lapwing")))
+
+    @classmethod
+    def resume(cls, file: FileIO, summary: Summary, offset: int) -> Self:
+        """Go on with a file that has its end: from `offset` on [bytes], where the record DATA_END stands."""
+        self = cls.__new__(cls)
+        self._begin(file)
+        self._offset = offset
+        self._schemas, self._channels = list(summary.schemas.values()), list(summary.channels.values())
+        self._chunks, self._attachments = summary.chunk_indexes, summary.attachment_indexes
+        self._metadata = summary.metadata_indexes
+        self._counts = dict(summary.statistics.channel_message_counts) if summary.statistics else {}
+        file.seek(offset)
+        return self
+
+    def _begin(self, file: FileIO) -> None:
         self._file = file
         self._offset = 0
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
@@ -48,8 +81,8 @@ class Container:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
-        self._write(MCAP0_MAGIC)
-        self._write(encoded(Header(profile="ros2", library="lapwing")))
+        self._before_tail: _State | None = None
+        self._length = 0  # [bytes] of the file, with a tail that is no longer valid
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment; its media type follows from the file name."""
@@ -70,9 +103,17 @@ class Container:
 
     def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
         """Write a metadata record."""
+        self._drop_tail()
         record = encoded(Metadata(metadata=metadata, name=name))
         self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
         self._write(record)
+
+    def add_tail(self, declarations: list[Schema | Channel], messages: Messages) -> None:
+        """Write a chunk that the next record takes the place of: what a reader finds if that never comes."""
+        self._drop_tail()
+        before = _State(self._offset, len(self._schemas), len(self._channels), len(self._chunks), self._counts.copy())
+        self.add_chunk(declarations, messages)
+        self._before_tail = before
 
     def add_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
         """Write a compressed chunk with the index of its messages, and bring it to the disk.
@@ -81,36 +122,36 @@ class Container:
             declarations: the schemas and channels that this chunk is the first to use; they go into it.
             messages: at least one.
         """
-        for record in declarations:
-            if isinstance(record, Schema):
-                self._schemas.append(record)
-            else:
-                self._channels.append(record)
+        self._drop_tail()
         head = b"".join(map(encoded, declarations))
         data = head + messages.data
-        compressed = self._compressor.compress(data)
+        small = len(messages.data) < SMALL
+        stored = data if small else self._compressor.compress(data)
         chunk = Chunk(
-            compression="zstd",
-            data=compressed,
+            compression="" if small else "zstd",
+            data=stored,
             message_start_time=messages.start_ns,
             message_end_time=messages.end_ns,
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        offset = self._offset
-        self._write(encoded(chunk))
-        length = self._offset - offset
+        record = encoded(chunk)
+        offset, length = self._offset, len(record)
         places: dict[int, int] = {}
         for index in messages.indexes:
-            places[index.channel_id] = self._offset
-            self._write(index.record(len(head)))
+            places[index.channel_id] = offset + len(record)
+            record += index.record(len(head))
+        self._write(record)
+        self._schemas += [each for each in declarations if isinstance(each, Schema)]
+        self._channels += [each for each in declarations if isinstance(each, Channel)]
+        for index in messages.indexes:
             self._counts[index.channel_id] = self._counts.get(index.channel_id, 0) + len(index.times_ns)
         self._chunks.append(
             ChunkIndex(
                 chunk_start_offset=offset,
                 chunk_length=length,
                 compression=chunk.compression,
-                compressed_size=len(compressed),
+                compressed_size=len(stored),
                 uncompressed_size=len(data),
                 message_start_time=messages.start_ns,
                 message_end_time=messages.end_ns,
@@ -118,10 +159,11 @@ class Container:
                 message_index_length=self._offset - offset - length,
             )
         )
-        self._file.flush()
+        self._cut()
 
     def finish(self) -> None:
         """Write the summary and the end."""
+        self._drop_tail()
         self._write(encoded(DataEnd(data_section_crc=0)))
         start = self._offset
         groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
@@ -144,7 +186,7 @@ class Container:
         summary += offsets
         footer.summary_crc = zlib.crc32(summary + encoded(footer)[:-_CRC])
         self._write(summary + encoded(footer) + MCAP0_MAGIC)
-        self._file.flush()
+        self._cut()
 
     def _statistics(self) -> Statistics:
         return Statistics(
@@ -159,8 +201,33 @@ class Container:
             schema_count=len(self._schemas),
         )
 
+    def _drop_tail(self) -> None:
+        """Go back to where the tail begins; it is written over, so that a reader finds it for as long as possible."""
+        state, self._before_tail = self._before_tail, None
+        if state is None:
+            return
+        self._length = max(self._length, self._offset)
+        self._file.seek(state.offset)
+        self._offset, self._counts = state.offset, state.counts
+        del self._schemas[state.schemas :], self._channels[state.channels :], self._chunks[state.chunks :]
+
+    def _cut(self) -> None:
+        """Take away what is left of a tail behind the newest record."""
+        if self._length > self._offset:
+            self._file.truncate()
+        self._length = 0
+
     def _write(self, data: bytes) -> None:
-        self._file.write(data)
+        """All of it, or nothing: a file whose disk is full ends where it could be read so far."""
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            with suppress(OSError):
+                self._file.seek(self._offset)
+                self._file.truncate()
+            raise
         self._offset += len(data)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
+import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -14,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
-from cosim.log.container import METADATA
+from cosim.log.container import METADATA, METADATA_END
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of what follows
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
@@ -26,6 +27,9 @@ _DECLARATIONS: dict[int, Any] = {
     Opcode.METADATA: records.Metadata,
     Opcode.ATTACHMENT: records.Attachment,
 }
+
+ROS2 = "ros2msg"  # encoding of schemas
+LARGEST = 1 << 28  # [bytes] of a chunk; those of the usual writers have some millions
 
 
 class ChunkPlace(NamedTuple):
@@ -45,29 +49,35 @@ class Contents:
     """What is in a file.
 
     Attributes:
-        metadata: of the record `lapwing`.
+        metadata: of the records `lapwing` and `lapwing_end`.
         attachments: file name to contents.
         schemas: type name by schema id.
+        definitions: text of the type by schema id, where ROS 2's encoding has one.
         channels: by channel id.
         chunks: in order of the file.
         complete: whether the file has its end.
+        damaged: a line for each chunk that was left out, where that is asked for.
 
     Raises:
         ValueError: no MCAP file, or a damaged one.
     """
 
-    def __init__(self, path: Path, file: BinaryIO) -> None:
+    def __init__(self, path: Path, file: BinaryIO, skip_damaged: bool = False) -> None:
         self.metadata: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         self.schemas: dict[int, str] = {}
+        self.definitions: dict[int, str] = {}
         self.channels: dict[int, records.Channel] = {}
         self.chunks: list[ChunkPlace] = []
         self.complete = False
+        self.damaged: tuple[str, ...] = ()
         self._path, self._file = path, file
         try:
             self._scan()
         except struct.error as fault:
             raise ValueError(f"{path}: damaged record: {fault}") from None
+        if skip_damaged or not (self.complete and self.channels):
+            self._read_declarations(skip_damaged)
 
     def read_chunk(self, offset: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
         """Time, channel and payload of a chunk's messages of some channels, in order of writing.
@@ -78,10 +88,14 @@ class Contents:
         self._file.seek(offset + _RECORD.size)
         try:
             chunk = records.Chunk.read(ReadDataStream(self._file))
+            _check_size(chunk)
             stream, size = get_chunk_data_stream(chunk, validate_crc=True)
             data = stream.read(size)
-        except Exception as fault:  # whatever the decompressor raises
+            return self._messages(data, size, channels)
+        except Exception as fault:  # whatever the decompressor raises, or records that are none
             raise ValueError(f"{self._path}: damaged chunk at byte {offset}: {fault}") from None
+
+    def _messages(self, data: bytes, size: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
         found = []
         place = 0
         while place < size:
@@ -123,21 +137,44 @@ class Contents:
             file.seek(offset)
         if not self.complete and self.chunks:
             self.chunks[-1].channels.clear()  # its index may lack channels
-        if not (self.complete and self.channels):
-            for chunk in self.chunks:
+
+    def _read_declarations(self, skip_damaged: bool) -> None:
+        """Those that stand in chunks; chunks that cannot be read are left out, or are an error."""
+        for chunk in list(self.chunks):
+            try:
                 self.read_chunk(chunk.offset, ())
+            except ValueError as fault:
+                if not skip_damaged:
+                    raise
+                self.damaged += (str(fault).removeprefix(f"{self._path}: "),)
+                self.chunks.remove(chunk)
 
     def _declare(self, opcode: int, data: bytes) -> None:
         try:
             record = _DECLARATIONS[opcode].read(ReadDataStream(io.BytesIO(data)))
-        except (McapError, struct.error, UnicodeDecodeError) as fault:
+        except (McapError, struct.error, UnicodeDecodeError, OverflowError, MemoryError) as fault:
             raise ValueError(f"{self._path}: damaged {Opcode(opcode).name.lower()} record: {fault}") from None
         if isinstance(record, records.Schema):
             self.schemas[record.id] = record.name
+            if record.encoding == ROS2:
+                self.definitions[record.id] = record.data.decode(errors="replace")
         elif isinstance(record, records.Channel):
             self.schemas.setdefault(record.schema_id, "")
             self.channels[record.id] = record
         elif isinstance(record, records.Attachment):
             self.attachments[record.name] = record.data
-        elif record.name == METADATA:
-            self.metadata = record.metadata
+        elif record.name in (METADATA, METADATA_END):
+            self.metadata |= record.metadata
+
+
+def _check_size(chunk: records.Chunk) -> None:
+    """Refuse a chunk that would fill the memory, whichever of its two sizes says so.
+
+    Raises:
+        ValueError: with the size.
+    """
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        size = max(size, zstandard.frame_content_size(chunk.data))  # -1: not told
+    if size > LARGEST:
+        raise ValueError(f"{size} bytes, expected at most {LARGEST}")

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,7 +10,7 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from cosim.log.chunk import Rows, WrittenTopic, add_to_digest, arrange, rows, rows_of
-from cosim.log.container import DETERMINISTIC, METADATA, Container
+from cosim.log.container import DETERMINISTIC, METADATA, METADATA_END, Container
 from messages import message_class
 from messages.digest import Digest
 
@@ -31,17 +31,28 @@ class LogWriter:
 
     Args:
         path: the file; overwritten.
-        metadata: goes into the record `lapwing`, at the start, and again at the end with the key `digest`; the
-            attribute `metadata` may be added to in between.
+        metadata: goes into the record `lapwing` at the start; what the attribute `metadata` is given later, and the key
+            `digest`, into the record `lapwing_end`.
         attachments: file name to contents.
+        waiting: called twice a second while a chunk has to wait for the one before to be written.
 
     Raises:
         ValueError: the file cannot be written (also from `write`, `write_page`, `flush` and `close`).
     """
 
-    def __init__(self, path: str | Path, metadata: dict[str, str], attachments: dict[str, bytes]) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        metadata: dict[str, str],
+        attachments: dict[str, bytes],
+        waiting: Callable[[], None] = lambda: None,
+    ) -> None:
         self.path = Path(path)
         self.metadata = dict(metadata)
+        self._about = dict(metadata)
+        self._waiting = waiting
+        self._failed = False  # a chunk could not be written
+        self.waited = 0.0  # [s] for chunks that were not yet written when the next one came
         self._digest = Digest()
         self._topics: dict[str, WrittenTopic] = {}
         self._schemas: dict[str, int] = {}
@@ -50,7 +61,7 @@ class LogWriter:
         self._size = 0
         self._pending: Future | None = None
         try:
-            self._file = open(self.path, "wb")  # noqa: SIM115 (closed in close)
+            self._file = open(self.path, "wb", buffering=0)  # noqa: SIM115 (closed in close)
             self._container = Container(self._file)
             self._container.add_metadata(METADATA, self.metadata)
             for name, data in attachments.items():
@@ -95,8 +106,16 @@ class LogWriter:
         if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
             self._submit(lambda declarations: self._write_chunk(declarations, page))
 
+    def write_tail(self, parts: Iterable[Part]) -> None:
+        """Bring the beginning of the next page into the file, for the case that nothing follows; see `write_page`."""
+        self._cut()
+        if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
+            self._submit(lambda declarations: self._write_tail(declarations, page), keep=True)
+
     def flush(self) -> None:
         """Bring everything written so far into the file. `write` does it every 0.5 s; call this when none comes."""
+        if self._failed:
+            return
         self._cut()
         self._wait()
 
@@ -107,25 +126,35 @@ class LogWriter:
         return self._digest.hexdigest()
 
     def close(self) -> None:
-        """Write what is left, the metadata with the digest, and the summary; close the file."""
+        """Write what is left, the metadata with the digest, and the summary; close the file.
+
+        After a chunk could not be written, the file is ended where it could be read so far.
+        """
         if self._file.closed:
             return
         try:
+            self.flush()
+        finally:
             try:
-                self.metadata["digest"] = self.digest
-                self._container.add_metadata(METADATA, self.metadata)
-                self._container.finish()
+                self._end()
+            except OSError as fault:
+                if not self._failed:
+                    raise self._error(fault) from None
             finally:
                 self._worker.shutdown()
                 self._file.close()
-        except OSError as fault:
-            raise self._error(fault) from None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _end(self) -> None:
+        self.metadata["digest"] = self._digest.hexdigest()
+        added = {key: value for key, value in self.metadata.items() if key not in self._about}
+        self._container.add_metadata(METADATA_END, added)
+        self._container.finish()
 
     def _declare(self, topic: str, message: Any, deterministic: bool) -> WrittenTopic:
         """Give a topic its channel; the next chunk declares it."""
@@ -171,23 +200,43 @@ class LogWriter:
         if entries:
             self._submit(lambda declarations: self._write_chunk(declarations, rows_of(entries)))
 
-    def _submit(self, job: Callable[[list[Schema | Channel]], None]) -> None:
-        """Give a chunk to the worker, once it has finished the one before."""
-        declarations, self._declarations = self._declarations, []
+    def _submit(self, job: Callable[[list[Schema | Channel]], None], keep: bool = False) -> None:
+        """Give a chunk to the worker, once it has finished the one before; a later one declares again what is kept."""
+        if self._failed:
+            raise ValueError(f"{self.path}: {self.metadata['failure']}")
+        declarations = self._declarations
+        if not keep:
+            self._declarations = []
         self._wait()
-        self._pending = self._worker.submit(job, declarations)
+        self._pending = self._worker.submit(job, list(declarations))
 
     def _wait(self) -> None:
         pending, self._pending = self._pending, None
         if pending is not None:
+            started = time.perf_counter()
             try:
+                while not wait([pending], FLUSH_PERIOD).done:
+                    self._waiting()
                 pending.result()
             except OSError as fault:
+                self._failed = True
+                self.metadata["failure"] = _failure(fault)
                 raise self._error(fault) from None
+            self.waited += time.perf_counter() - started
+
+    def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
+        counts = {part.topic: part.topic.count for part in parts}
+        self._container.add_tail(declarations, arrange(parts))
+        for topic, count in counts.items():  # its messages come again
+            topic.count = count
 
     def _write_chunk(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
-        add_to_digest(self._digest, parts)
         self._container.add_chunk(declarations, arrange(parts))
+        add_to_digest(self._digest, parts)
 
     def _error(self, fault: OSError) -> ValueError:
-        return ValueError(f"{self.path}: cannot write the log: {fault.strerror or fault}")
+        return ValueError(f"{self.path}: {_failure(fault)}")
+
+
+def _failure(fault: OSError) -> str:
+    return f"cannot write the log: {fault.strerror or fault}"

@@ -1,6 +1,9 @@
 """The files that a scene names: found by path or by name, read once, remembered for the log."""
 
+import copy
 import tomllib
+from functools import lru_cache
+from os.path import isfile  # false, and no error, of a name that no file can have
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +34,14 @@ class Files:
             KeyedError: there is none; lists the choices.
         """
         if name.endswith(".toml"):
-            if not (self.folder / name).is_file():
+            if not isfile(self.folder / name):
                 raise KeyedError(
                     key, f"no file {self.folder / name}", "the path of a .toml file beside the scene, or a name"
                 )
             return self.folder / name
         places = (self.folder / beside, shipped)
         for place in places:
-            if (place / f"{name}.toml").is_file():
+            if isfile(place / f"{name}.toml"):
                 return place / f"{name}.toml"
         choices = {path.stem for place in places for path in place.glob("*.toml")}
         error = KeyedError.unknown(key, what, name, choices)
@@ -74,9 +77,17 @@ class Files:
 def parse_toml(text: str, path: Path) -> dict[str, Any]:
     """The tables of a TOML text; SceneError with the file where it is none."""
     try:
-        return tomllib.loads(text)
+        return copy.deepcopy(_tables(text))
     except tomllib.TOMLDecodeError as error:
         raise SceneError("", f"not valid TOML: {error}", source=Source(path)) from None
+    except RecursionError:
+        raise SceneError("", "not valid TOML: nested too deeply", source=Source(path)) from None
+
+
+@lru_cache(maxsize=64)
+def _tables(text: str) -> dict[str, Any]:
+    """Parsed once: the runs of a campaign are made of the same texts."""
+    return tomllib.loads(text)
 
 
 def laid_over(content: dict[str, Any], given: Any) -> Any:

@@ -2,16 +2,17 @@
 
 import copy
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from cosim.scene import fleet
 from cosim.scene.errors import SceneError, Source
 from cosim.scene.files import Files, parse_toml
-from cosim.scene.locate import source_of
+from cosim.scene.locate import line_of, source_of
 from cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
 from cosim.scene.scene import Scene, Section, Vocabulary
 from dynamics.errors import KeyedError
@@ -56,9 +57,53 @@ def again(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
 def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary) -> Scene:
     tree, files = parse_toml(text, path), Files(path.parent)
     files.sources[SCENE_FILE] = text.encode()
-    locate = partial(source_of, path=path, text=text, overrides=tuple(o.key for o in given), files=files)
-    scene = Scene(path, {}, vocabulary, files.sources, tuple(given), locate)
-    with scene.located():
+    locate = partial(_locate, path=path, text=text, keys=[o.key for o in given], files=files)
+    with Scene(path, {}, vocabulary, locate=locate).located():
+        vehicles = fleet.count(tree)
+        if vehicles:
+            members = [_member(path, text, tree, i, given, vocabulary) for i in range(vehicles)]
+            common = fleet.common_tables(members, vocabulary)
+            sources = files.sources | {name: text for scene in members for name, text in scene.sources.items()}
+            return Scene(path, common, vocabulary, sources, tuple(given), locate, members)
+    return _scene(path, tree, given, vocabulary, files, locate)
+
+
+def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+    """The key and where it was said."""
+    return key, source_of(key, path, text, keys, files)
+
+
+def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+    """`_locate` of a key of one of several vehicles, which may be its own or common to all."""
+    full = fleet.own_key(key, vehicle)
+    said = line_of(text, full)[1] > len(f"{fleet.VEHICLE}.{vehicle}.")
+    if said or key.partition(".")[0] == fleet.VEHICLE or any(f"{full}.".startswith(f"{k}.") for k in keys):
+        return _locate(full, path, text, keys, files)
+    return _locate(key, path, text, keys, files)
+
+
+def _member(
+    path: Path, text: str, tree: dict[str, Any], i: int, given: list[Override], vocabulary: Vocabulary
+) -> Scene:
+    """The scene of vehicle i of several."""
+    files, keys = Files(path.parent), [o.key for o in given]
+    own = fleet.overrides_of(given, i, fleet.count(tree), vocabulary)
+    locate = partial(_locate_own, vehicle=i, path=path, text=text, keys=keys, files=files)
+    scene = _scene(path, fleet.member(tree, i, vocabulary), own, vocabulary, files, locate)
+    name = scene.lookup(f"{fleet.VEHICLE}.name")
+    scene.sources = {f"{name}.{source}": content for source, content in files.sources.items()}
+    return scene
+
+
+def _scene(
+    path: Path,
+    tree: dict[str, Any],
+    given: list[Override],
+    vocabulary: Vocabulary,
+    files: Files,
+    locate: Callable[[str], tuple[str, Source]],
+) -> Scene:
+    with Scene(path, {}, vocabulary, files.sources, tuple(given), locate).located():
         _resolve(tree, given, vocabulary, files)
         tables = _tables(tree, vocabulary)
         scene = Scene(path, tables, vocabulary, files.sources, tuple(given), locate)
@@ -73,6 +118,10 @@ def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) ->
         SceneError: it is no longer a sound scene.
     """
     with Scene(Path(name), {}, vocabulary).located():
+        if isinstance(entries := tree.get(fleet.VEHICLE), list):
+            shared = {name: table for name, table in tree.items() if name != fleet.VEHICLE}
+            members = [from_resolved({**shared, **entry}, vocabulary, name) for entry in entries]
+            return Scene(Path(name), fleet.common_tables(members, vocabulary), vocabulary, vehicles=members)
         tables = _tables(tree, vocabulary)
         scene = Scene(Path(name), tables, vocabulary)
         _check(scene, tables, vocabulary)

@@ -45,7 +45,7 @@ def line_of(text: str, key: str) -> tuple[int | None, int]:
     best, found = 0, None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*(\[\[?)\s*([\w.]+)\s*\]", line):
-            table = header[2]
+            table = _numbered(header[2], entries, last=header[1] == "[")
             if header[1] == "[[":
                 entries[table] = entries.get(table, -1) + 1
                 table = f"{table}.{entries[table]}"
@@ -57,3 +57,14 @@ def line_of(text: str, key: str) -> tuple[int | None, int]:
         if f"{key}.".startswith(f"{full}.") and len(full) > best:
             best, found = len(full), number
     return found, best
+
+
+def _numbered(table: str, entries: dict[str, int], last: bool) -> str:
+    """A table's name with the number of the newest entry behind each array of tables in it, the last only if asked."""
+    *parents, name = table.split(".")
+    full = ""
+    for parent in parents:
+        full = f"{full}.{parent}" if full else parent
+        full = f"{full}.{entries[full]}" if full in entries else full
+    full = f"{full}.{name}" if full else name
+    return f"{full}.{entries[full]}" if last and full in entries else full

@@ -37,12 +37,19 @@ def _parsed(text: str) -> Override:
         expected = "KEY=VALUE, for example solver.step=0.001"
         raise SceneError(key, f"got {text}", expected, Source(override=text))
     try:
-        return Override(key, tomllib.loads(f"value = {value}")["value"], text)
+        return Override(key, value_of(value), text)
+    except ValueError as error:
+        raise SceneError(key, str(error), source=Source(override=text)) from None
+
+
+def value_of(text: str) -> Any:
+    """The value of a text in TOML; a bare word, as one types it in a shell, is a text. ValueError for anything else."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        if not re.fullmatch(r"[\w./:+-]+", value):
-            message = f"{value} is not a TOML value; quote a text"
-            raise SceneError(key, message, source=Source(override=text)) from None
-        return Override(key, value, text)  # a bare word, as one types it in a shell
+        if not re.fullmatch(r"[\w./:+-]+", text):
+            raise ValueError(f"{text} is not a TOML value; quote a text") from None
+        return text
 
 
 def _plain(value: Any) -> Any:

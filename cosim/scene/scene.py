@@ -1,6 +1,6 @@
 """A validated scene, the tables that it consists of, and the vocabulary of tables that there are."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +24,8 @@ class Section(BaseModel):
     TABLE: ClassVar[str]
     OPTIONAL: ClassVar[bool] = False  # whether a scene may do without it; `scene.has` says if it does
     FROM_FILE: ClassVar[bool] = False  # whether its content is that of a file which another table names
+    SHARED: ClassVar[bool] = False  # whether all vehicles of a scene have it in common
+    DISTINCT: ClassVar[str] = ""  # its key of which each of several vehicles has another value
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
@@ -32,6 +34,11 @@ class Section(BaseModel):
         Raises:
             KeyedError: no such file, or its content is not of the right form.
         """
+
+    @classmethod
+    def numbered(cls, i: int) -> dict[str, Any]:
+        """What its keys are by default for vehicle i (from 0) of several, where that goes by the number."""
+        return {}
 
     def resolved(self) -> dict[str, Any]:
         """All its keys, also those left at their defaults, as plain data that validates to the same table."""
@@ -67,6 +74,7 @@ class Vocabulary(NamedTuple):
 
 
 S = TypeVar("S", bound=Section)
+T = TypeVar("T")
 
 
 class Scene:
@@ -79,27 +87,47 @@ class Scene:
         vocabulary: Vocabulary,
         sources: Mapping[str, bytes] | None = None,
         given: tuple[Override, ...] | None = None,
-        locate: Callable[[str], Source] | None = None,
+        locate: Callable[[str], tuple[str, Source]] | None = None,
+        vehicles: Sequence["Scene"] = (),
     ):
         self.path = path  # where it was read from
         self.sources = dict(sources or {})  # every file that was read, by what it says: airframe.toml
         self.given = given  # overrides; None where the scene is more than its file and these
-        self._locate = locate  # who gave a key its value
+        self.vehicles = tuple(vehicles)  # a scene of each vehicle, where the file lists them; its own tables are common
+        self._locate = locate  # what a key is called in the file, and who gave it its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
+        self._found: dict[Callable[[Scene], Any], Any] = {}
+
+    def once(self, of: Callable[["Scene"], T]) -> T:
+        """What a function finds in the scene, which never changes: called once, and remembered."""
+        if of not in self._found:
+            self._found[of] = of(self)
+        return self._found[of]
 
     def __getitem__(self, section: type[S]) -> S:
-        return self._tables[section]  # type: ignore[return-value]
+        return self._known(section)._tables[section]  # type: ignore[return-value]
+
+    def _known(self, section: type[Section] | None) -> "Scene":
+        """This scene; SceneError where that is one of several vehicles, who each have such a table of their own."""
+        if self.vehicles and section is not None and not section.SHARED:
+            expected = "a scene of one vehicle, which is all that can be used here"
+            raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, Source(self.path))
+        return self
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and (self.name, self._tables) == (other.name, other._tables)
+        return isinstance(other, Scene) and (self.name, self._tables, self.vehicles) == (
+            other.name,
+            other._tables,
+            other.vehicles,
+        )
 
     __hash__ = None  # type: ignore[assignment]
 
     def has(self, section: type[Section] | str) -> bool:
         """Whether there is this table, by its class or name: always, unless it is optional."""
         known = self._vocabulary.sections.get(section) if isinstance(section, str) else section
-        return known in self._tables
+        return known in self._known(known)._tables
 
     def replaced(self, section: Section) -> "Scene":
         """The same scene with this table in the place of its own; not checked against the others."""
@@ -114,8 +142,8 @@ class Scene:
         except SceneError:
             raise
         except KeyedError as error:
-            source = self._locate(error.key) if self._locate else Source(self.path)
-            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
+            key, source = self._locate(error.key) if self._locate else (error.key, Source(self.path))
+            raise SceneError(key, error.message, error.expected, source) from error.__cause__
 
     def __repr__(self) -> str:
         return f"<Scene {self.name}{''.join(f', {override}' for override in self.overrides)}>"
@@ -133,12 +161,16 @@ class Scene:
     @property
     def resolved(self) -> dict[str, Any]:
         """All that the scene says and names, as dicts, lists, texts and numbers; `from_resolved` gives it back."""
-        tables = {section.TABLE: table.resolved() for section, table in self._tables.items()}
+        tables: dict[str, Any] = {section.TABLE: table.resolved() for section, table in self._tables.items()}
+        if self.vehicles:
+            tables["vehicle"] = [
+                {name: table for name, table in scene.resolved.items() if name not in tables} for scene in self.vehicles
+            ]
         return _plain({name: tables[name] for name in sorted(tables)})
 
     def section(self, name: str) -> Any:
         """A table by its name; for those who do not know its class."""
-        return self._tables[self._vocabulary.sections[name]]
+        return self[self._vocabulary.sections[name]]
 
     def tables(self, name: str) -> Mapping[str, Any]:
         """The tables inside a table whose keys are names, for example each sensor's of "sensors"."""

@@ -40,6 +40,8 @@ SERVICES = {
 BESIDE = {
     "recorder": Box(0.0, -1.6, 2.0, -0.8),
     "router": Box(4.6, -1.6, 6.9, -0.8),
+    "foxglove": Box(2.3, -1.6, 4.3, -0.8),
+    "ros2": Box(7.2, -1.6, 9.3, -0.8),
     "mavlink": Box(9.6, -1.6, 12.4, -0.8),
 }
 LANES = {"battery": 2.35, "actuators": 1.8, "status": 1.35}  # height of arrows that pass under the boxes between
@@ -100,7 +102,7 @@ def batches(axes: Axes, setup: Setup) -> None:
     axes.plot([1.0, 10.4], [BUS, BUS], **{**style, "ls": "-"})
     axes.text(8.5, BUS + 0.07, "batches of encoded messages", ha="center", fontsize=8.5, color=GREY)
     down = {"arrowstyle": "-|>", "color": GREY, "lw": 1.1}
-    for name, x in {"recorder": 1.0, "mavlink": 10.4}.items():
+    for name, x in {"recorder": 1.0, "foxglove": 3.3, "mavlink": 10.4}.items():
         axes.annotate("", (x, BESIDE[name].top), (x, BUS), arrowprops=down)
     up = {"arrowstyle": "-|>", "color": ORANGE, "lw": 1.4}
     axes.annotate("", (11.6, SERVICES["autopilot"].bottom), (11.6, BESIDE["mavlink"].top), arrowprops=up)
@@ -127,6 +129,7 @@ def draw(path: Path) -> None:
             lines.append((f"{name} (Python)", ORANGE) if python else (name, DARK))
         process(axes, SERVICES[service.name], f"{number}  {service.name}", lines if len(lines) > 1 else [])
     what = {"recorder": "log.mcap", "router": "--open: topics for clients", "mavlink": "--mavlink"}
+    what |= {"foxglove": "--foxglove", "ros2": "--ros2"}
     for entry in PROCESSES:
         if not entry.lock_step:
             process(axes, BESIDE[entry.name], entry.name, [(what[entry.name], GREY)], dashed=True)

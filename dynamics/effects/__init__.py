@@ -2,18 +2,21 @@
 
 The file `body_drag.py` is the effect `body_drag`; it has a parameter NamedTuple `BodyDrag` and registers hooks for it
 (see `_hooks`). Its parameters are the keys of the scene's table, checked against the annotations, unless the class has
-`from_scene(table, airframe)`. A module constant `KIND` names what only one active effect may be.
+`from_scene(table, airframe)`. One that depends on where it flies has `in_environment(environment)`, which gives it as
+it is there. A module constant `KIND` names what only one active effect may be; a module's `check(table, tables)`
+refuses what it cannot be beside.
 
 An effect of the user's own is such a file elsewhere, which Python finds; the scene's table names it with `module`.
 """
 
 import importlib
-import pkgutil
 from collections.abc import Mapping
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from dynamics import discovery
 from dynamics.effects._scene import checked
+from dynamics.environment import STANDARD, Environment
 from dynamics.errors import KeyedError
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -24,7 +27,7 @@ __all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
 
 def names() -> list[str]:
     """Every effect's name: its file name."""
-    return sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+    return discovery.names(__name__)
 
 
 def get(name: str, module: str | None = None) -> ModuleType:
@@ -56,7 +59,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
     return getattr(found, wanted)
 
 
-def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe") -> tuple:
+def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment: Environment = STANDARD) -> tuple:
     """The active effects of a scene, sorted by name, from the table of each.
 
     Raises:
@@ -72,10 +75,16 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe") -> tuple:
         if kind in kinds:
             raise KeyedError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
         kinds[kind] = name
+        if hasattr(get(name, module), "check"):
+            try:
+                get(name, module).check(table, tables)
+            except KeyedError as error:
+                raise error.under(f"effects.{name}") from None
         cls = parameter_class(name, module)
         build = getattr(cls, "from_scene", None)
         try:
-            active.append(build(table, airframe) if build else checked(cls, table))
+            effect = build(table, airframe) if build else checked(cls, table)
         except KeyedError as error:
             raise error.under(f"effects.{name}") from None
+        active.append(effect.in_environment(environment) if hasattr(effect, "in_environment") else effect)
     return tuple(active)

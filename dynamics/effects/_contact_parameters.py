@@ -1,13 +1,14 @@
 """What a scene says about the contact with the ground, and the two effects that come of it."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from dynamics.effects._ground import Ground
 from dynamics.effects._scene import cannot, checked
+from dynamics.environment import Environment
 from dynamics.errors import KeyedError
+from dynamics.terrain import LEVEL, upright
 from dynamics.vector import Vec3
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -30,9 +31,6 @@ class Settings(NamedTuple):
     tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
     stick_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
     critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "smooth"
-    slope: tuple[float, float] = (0.0, 0.0)  # rise of the ground along world x and y, tangent of the angle
-    bump_height: Annotated[float, Ge(0), Le(100)] = 0.0  # [m] amplitude of bumps A sin(k x) sin(k y)
-    bump_length: Annotated[float, Ge(0.01), Le(1e4)] = 1.0  # [m] their wavelength 2 pi / k
 
 
 class GroundContact(NamedTuple):
@@ -41,12 +39,12 @@ class GroundContact(NamedTuple):
     The friction is a spring and damper between each foot and its anchor on the ground; the anchor is dragged along
     when the force leaves the Coulomb cone. Source: Cundall and Strack, Geotechnique 29 (1979) 47, with a static
     coefficient for feet at rest or coming to rest and a dynamic one for feet that break away. Valid for hard ground
-    and feet that are points; the ground's slope below 45 degrees.
+    and feet that are points; the ground is that of [environment].
     """
 
-    ground: Ground
+    terrain: Any  # Level or Relief
     feet: tuple[Vec3, ...]  # [m] body, with the hull's points
-    reach: float  # [m] beyond which no foot can be from the centre of mass, measured along world z
+    reach: float  # [m] beyond which no foot can be from the centre of mass, measured along world z from the slope
     stiffness: float  # [N/m]
     damping: float  # [N s/m]
     inverse_width: float  # [1/m]
@@ -65,17 +63,8 @@ class GroundContact(NamedTuple):
             raise KeyedError("friction_dynamic", f"got {given.friction_dynamic}", expected)
         points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
         feet = points.feet + points.hull
-        steep = math.hypot(*given.slope, given.bump_height * 2.0 * math.pi / given.bump_length)
-        if steep > 1.0:
-            key = "bump_height" if given.bump_height else "slope"
-            raise KeyedError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
-        reach = max(math.hypot(*foot) for foot in feet) * math.sqrt(1.0 + steep**2) + given.bump_height
-        a, b = given.slope
-        normal_z = 1.0 / math.sqrt(1.0 + a * a + b * b)
-        normal = (-a * normal_z, -b * normal_z, normal_z)
         common = (
-            Ground(given.slope, given.bump_height, 2.0 * math.pi / given.bump_length, normal),
-            feet, reach, given.stiffness, given.damping, 1.0 / given.transition_width,
+            LEVEL, feet, _reach(feet), given.stiffness, given.damping, 1.0 / given.transition_width,
             given.friction_static, given.friction_dynamic,
         )  # fmt: skip
         if given.friction == "smooth":
@@ -86,9 +75,13 @@ class GroundContact(NamedTuple):
         )
         return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
 
-    def initial_memory(self) -> tuple[tuple[float, float, float, float], ...]:
+    def in_environment(self, environment: Environment) -> "GroundContact":
+        """On the ground that is there."""
+        return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
+
+    def initial_memory(self) -> tuple[tuple[float, float, float, float, float], ...]:
         """No foot is on the ground."""
-        return ((0.0, 0.0, FREE, 0.0),) * len(self.feet)
+        return (NOWHERE,) * len(self.feet)
 
 
 class GroundContactSmooth(NamedTuple):
@@ -99,7 +92,7 @@ class GroundContactSmooth(NamedTuple):
     contact.
     """
 
-    ground: Ground
+    terrain: Any  # Level or Relief
     feet: tuple[Vec3, ...]  # [m] body
     reach: float  # [m]
     stiffness: float  # [N/m]
@@ -111,17 +104,26 @@ class GroundContactSmooth(NamedTuple):
     rate_bound: float  # [1/s]
     mobility: float  # [1/kg] maximum acceleration of a foot by a unit force on all feet
 
+    def in_environment(self, environment: Environment) -> "GroundContactSmooth":
+        """On the ground that is there."""
+        return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
+
     def initial_memory(self) -> tuple[tuple[()], ...]:
         """Nothing to remember, foot by foot."""
         return ((),) * len(self.feet)
 
 
-# A foot's memory: x and y of its anchor [m], one of these, and the square of its slip [m^2/s^2] after the last step.
+# A foot's memory: its anchor [m], one of these, and the square of its slip [m^2/s^2] after the last step.
 FREE, STICKING, SLIDING = 0.0, 1.0, 2.0
+NOWHERE = (0.0, 0.0, 0.0, FREE, 0.0)
 STABLE = 1.25  # [rad] of the fastest oscillation in one step
 SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
 STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
 STABLE_DAMPER = 2.75  # the same of the damper, whose rate is known to the digit
+
+
+def _reach(feet: tuple[Vec3, ...], terrain: Any = LEVEL) -> float:
+    return max(math.hypot(*foot) for foot in feet) * math.hypot(*upright(terrain))
 
 
 def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:

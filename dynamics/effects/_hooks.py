@@ -8,11 +8,12 @@ not in the tuple leaves no trace in the machine code.
 The stages of one evaluation, in order, each a hook:
 
     air       (e, memory, s, air) -> Air                     density and wind at the vehicle
+    air_rate  (e, memory, s, rate_body) -> rate_body [rad/s] at which the air turns
     factors   (e, memory, s, factors) -> Factors             on each rotor's thrust and torque
     loads     (e, memory, s, factors, loads) -> Loads        thrust and torque of each rotor, added to those before
     supply    (e, memory, voltage) -> voltage                what the battery lets the motors have
-    gauge     (e, memory) -> (charge, voltage [V], current [A]) of the battery, charge a fraction
-    motor     (e, memory, s, loads, voltage) -> (acceleration, current) of each rotor; one effect only
+    gauge     (e, memory) -> (charge, voltage [V], current [A], temperature [K], NaN where not modelled) of the battery
+    motor     (e, memory, s, loads, voltage) -> (acceleration, current, power) of each rotor; one effect only
     wrench    (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
     wrench_body  the same with the force in body coordinates
     torque    (e, memory, s, rotors) -> torque_body [N m], where there is no force
@@ -24,13 +25,16 @@ and between evaluations:
     sample    (e, memory, s, rotors, key, tick, interval) -> memory    once an exchange interval, before its first step;
                                                        s and rotors are those without the effects that can sleep
     asleep    (e, memory, motion, h) -> bool           can the effect do nothing within the next step?
-    substeps  (e, memory, motion, h) -> int            how many steps to split the next one into, when awake
+    substeps  (e, memory, motion, h) -> int            of an effect that can sleep and is stiff: how many steps to split
+                                                       the next one into at least, when awake
     settle    (e, memory, motion, h) -> memory         after every step, when awake
+    event     (e, before, after) -> bool               of two memories: did forces jump in the step between them?
     contact   (e, memory, s) -> bool                   does the vehicle touch the ground?
     wind      (e, memory, wind) -> wind                [m/s] world: for the log, of an effect that blows without moving
                                                        the air that others feel
 
-While all effects that can sleep are asleep, steps are taken without them, at no cost but the question.
+While all effects that can sleep are asleep, steps are taken without them, at no cost but the question. While one that
+is stiff is awake, steps are taken under error control, their memory included (`dynamics.vehicles.multirotor`).
 
 The memory of an effect is a tuple of floats that its parameter class gives with `initial_memory()`; () without it.
 """
@@ -40,6 +44,7 @@ from typing import Any
 
 from numba.core.errors import TypingError
 
+from dynamics.effects._axes import beside, in_world
 from dynamics.generate import define, generated
 from dynamics.kernel import ByClass, leaf
 from dynamics.vector import add, apply
@@ -62,6 +67,7 @@ def _hook(name: str) -> Callable:
 
 body = _hook("body")
 air = _hook("air")
+air_rate = _hook("air_rate")
 factors = _hook("factors")
 loads = _hook("loads")
 supply = _hook("supply")
@@ -75,6 +81,7 @@ sample = _hook("sample")
 settle = _hook("settle")
 substeps = _hook("substeps")
 contact = _hook("contact")
+event = _hook("event")
 asleep = _hook("asleep")
 wind = _hook("wind")
 
@@ -102,7 +109,7 @@ def _written_out(
                 raise TypingError(
                     f"effect {effect.instance_class.__name__} has no hook: the module of its hooks is not imported"
                 )
-        names: dict[str, Any] = {"add": add, "apply": apply}
+        names: dict[str, Any] = {"add": add, "apply": apply, "beside": beside, "in_world": in_world}
         lines: list[str] = []
         members = [f"memory[{i}]" for i, _ in active]
         for i, parameters in active:
@@ -125,6 +132,7 @@ def _chain(hook: str, before: str = "") -> Callable:
 
 all_body = _chain("body")
 all_air = _chain("air", "s, ")
+all_air_rate = _chain("air_rate", "s, ")
 all_factors = _chain("factors", "s, ")
 all_loads = _chain("loads", "s, factors, ")
 all_supply = _chain("supply")
@@ -139,11 +147,10 @@ all_torques = _written_out(
 all_body_wrenches = _written_out(
     "all_body_wrenches",
     "wrench_body",
-    "s, rotors, lift, torque",
+    "s, rotors, thrust, torque",
     "force, moment = f{i}(effects[{i}], memory[{i}], s, rotors); torque = add(torque, moment)",
-    "(apply(s.R_world_body, (force[0], force[1], force[2] + lift)), torque)",
-    # thrust alone needs only the third column
-    default="((lift * s.R_world_body[2], lift * s.R_world_body[5], lift * s.R_world_body[8]), torque)",
+    "(apply(s.R_world_body, beside(thrust, force)), torque)",
+    default="(in_world(thrust, s.R_world_body), torque)",
     more="w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
 )
 all_wrenches = _written_out(
@@ -199,6 +206,15 @@ all_substeps = _written_out(
     default="1",
     more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
 )
+all_events = _written_out(
+    "all_events",
+    "event",
+    "after",
+    "happened = f{i}(effects[{i}], memory[{i}], after[{i}])",
+    "happened",
+    default="False",
+    more="happened = happened or f{i}(effects[{i}], memory[{i}], after[{i}])",
+)
 all_contacts = _written_out(
     "all_contacts",
     "contact",
@@ -216,6 +232,22 @@ all_asleep = _written_out(
     "sleeping",
     default="True",
     more="sleeping = sleeping and f{i}(effects[{i}], memory[{i}], motion, h)",
+)
+
+
+def _all_calm(effects: Any, *_rest: Any) -> Callable:
+    both = HOOKS["substeps"], HOOKS["asleep"]
+    stiff = [i for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)]
+    names = {f"f{i}": HOOKS["asleep"][effects.types[i].instance_class] for i in stiff}
+    calm = " and ".join(f"f{i}(effects[{i}], memory[{i}], motion, h)" for i in stiff)
+    return define("all_calm(effects, memory, motion, h)", names, f"return {calm or 'True'}")
+
+
+all_calm = generated(
+    "all_calm(effects, memory, motion, h)",
+    _all_calm,
+    "Whether every effect that is stiff is asleep.",
+    inline=True,
 )
 
 

@@ -19,9 +19,26 @@ def _total(a):
     return define("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
 
 
+def total_vector(a: tuple[Vec3, ...]) -> Vec3:
+    """Sum of a tuple of vectors."""
+    found = a[0]
+    for more in a[1:]:
+        found = add(found, more)
+    return found
+
+
+@implements(total_vector, inline=True)
+def _total_vector(a):
+    lines = [f"found = add(found, a[{i}])" for i in range(1, len(a))]
+    return define("total_vector(a)", {"add": add}, "found = a[0]", *lines, "return found")
+
+
 def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
-    """Sum of a tuple of (force [N], torque [N m]); in compiled code only."""
-    raise NotImplementedError("compiled code only")
+    """Sum of a tuple of (force [N], torque [N m])."""
+    force, torque = a[0]
+    for more_force, more_torque in a[1:]:
+        force, torque = add(force, more_force), add(torque, more_torque)
+    return force, torque
 
 
 @implements(total_wrench, inline=True)

@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from dynamics.lie.quaternion import Quaternion
 from dynamics.vector import Mat3, Vec3
 
@@ -28,12 +30,72 @@ class MassProperties(NamedTuple):
     gyration: Vec3  # ((I_y - I_z) / I_x, (I_z - I_x) / I_y, (I_x - I_y) / I_z)
 
 
-def body_of(mass: float, inertia: Vec3) -> MassProperties:
-    """Mass properties with what the hot path needs of them."""
+class FullMassProperties(NamedTuple):
+    """Mass properties with products of inertia."""
+
+    mass: float  # [kg]
+    inverse_mass: float  # [1/kg]
+    inertia: Mat3  # [kg m^2] matrix about the centre of mass, along the body axes
+    inverse_inertia: Mat3  # [1/(kg m^2)]
+
+
+class OffsetMassProperties(NamedTuple):
+    """Mass properties of a body whose centre of mass is not where the motion's position is."""
+
+    mass: float  # [kg]
+    inverse_mass: float  # [1/kg]
+    inertia: Mat3  # [kg m^2] matrix about the centre of mass, along the body axes
+    inverse_inertia: Mat3  # [1/(kg m^2)]
+    centre_body: Vec3  # [m] centre of mass, from the motion's position
+
+
+AnyMassProperties = MassProperties | FullMassProperties | OffsetMassProperties
+
+
+def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
+    """What a mass [kg] at an arm [m] adds to an inertia matrix [kg m^2], shape (3, 3): the parallel axis theorem."""
+    return mass * (np.dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
+
+
+def offset_body(mass: float, inertia: np.ndarray, centre_body: np.ndarray) -> OffsetMassProperties:
+    """Mass properties about a centre of mass [m] off the motion's position; inertia [kg m^2], shape (3, 3)."""
+    matrix, inverse = (tuple(m.ravel().tolist()) for m in (inertia, np.linalg.inv(inertia)))
+    return OffsetMassProperties(mass, 1.0 / mass, matrix, inverse, tuple(np.asarray(centre_body, float).tolist()))
+
+
+def body_of(mass: float, inertia: Vec3, products: Vec3 = (0.0, 0.0, 0.0)) -> MassProperties | FullMassProperties:
+    """Mass properties with what the hot path needs of them.
+
+    Args:
+        mass: [kg].
+        inertia: diagonal of the inertia matrix [kg m^2].
+        products: its elements xy, xz and yz [kg m^2].
+    """
     x, y, z = inertia
+    if any(products):
+        xy, xz, yz = products
+        matrix = (x, xy, xz, xy, y, yz, xz, yz, z)
+        inverse = (
+            y * z - yz * yz,
+            xz * yz - xy * z,
+            xy * yz - xz * y,
+            x * z - xz * xz,
+            xy * xz - x * yz,
+            x * y - xy * xy,
+        )
+        a, b, c, d, e, f = (v / (x * inverse[0] + xy * inverse[1] + xz * inverse[2]) for v in inverse)
+        return FullMassProperties(mass, 1.0 / mass, matrix, (a, b, c, b, d, e, c, e, f))
     return MassProperties(
         mass, 1.0 / mass, inertia, (1.0 / x, 1.0 / y, 1.0 / z), ((y - z) / x, (z - x) / y, (x - y) / z)
     )
+
+
+def principal_moments(inertia: Vec3, products: Vec3) -> tuple[float, ...]:
+    """Of an inertia matrix, in rising order [kg m^2]; arguments as of `body_of`."""
+    if not any(products):
+        return tuple(sorted(inertia))
+    (x, y, z), (xy, xz, yz) = inertia, products
+    return tuple(map(float, np.linalg.eigvalsh([[x, xy, xz], [xy, y, yz], [xz, yz, z]])))
 
 
 class Air(NamedTuple):
@@ -64,7 +126,8 @@ class Rotors(NamedTuple):
     torque: PerRotor  # [N m]
     acceleration: PerRotor  # [rad/s^2]
     current: PerRotor  # [A] of each motor
-    voltage: PerRotor  # [V] at each motor
+    voltage: PerRotor  # [V] asked of each controller
+    power: PerRotor  # [W] taken by each motor and its controller
 
 
 class Situation(NamedTuple):
@@ -73,6 +136,7 @@ class Situation(NamedTuple):
     t: float  # [s] simulation time
     motion: Motion
     R_world_body: Mat3
-    body: MassProperties
+    body: Any  # AnyMassProperties
     layout: Any  # RotorLayout, see dynamics/vehicles/multirotor.py
     air: Air
+    air_rate_body: Vec3  # [rad/s] at which the air turns, body coordinates

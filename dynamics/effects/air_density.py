@@ -1,57 +1,52 @@
 """Air density that falls with altitude."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from annotated_types import Ge, Le
-
+from dynamics.atmosphere import Atmosphere, density, density_slope
 from dynamics.effects._hooks import air, sample
 from dynamics.effects._scene import checked
 from dynamics.effects._types import Air
+from dynamics.environment import Environment
+from dynamics.kernel import leaf, uncompiled
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
 
-KELVIN = 273.0  # [K] at 0 degC, as the paper rounds it
-LAPSE_RATE = 0.0065  # [K/m]
-EXPONENT = 5.2561
-SEA_LEVEL_DENSITY = 1.293  # [kg/m^3] at 0 degC and 1 atm
-
-
-ORDER = 6  # of the series
-
 
 class Settings(NamedTuple):
-    """What a scene says."""
-
-    temperature: Annotated[float, Ge(-60), Le(60)] = 15.0  # [degC] at the ground
-    home_altitude: Annotated[float, Ge(-500), Le(9000)] = 0.0  # [m] of the world frame's origin above the sea
+    """No keys: [environment] has the air, and home's altitude."""
 
 
 class AirDensity(NamedTuple):
-    """Density from temperature and altitude (theory.md, eq. (2.3)), by the series of its power law about home; between
-    exchanges by the tangent.
+    """Density of the scene's atmosphere at the vehicle's altitude (theory.md, eq. (2.3)); between exchanges by the
+    tangent.
 
-    Source: Pappalardo et al. 2023, section 2.6 (the barometric formula of the International Standard Atmosphere, but
-    with the temperature at the ground also aloft). Valid to 11 km above the sea; the series is within 1e-12 of the
-    power law 500 m from home and within 3e-9 at 5 km.
+    Source: the International Standard Atmosphere, ISO 2533:1975. Valid to 20 km above the sea.
     """
 
-    series: tuple[float, ...]  # [kg/m^3], [kg/m^4], ... in powers of the height above home
+    atmosphere: Atmosphere = Atmosphere()
+    home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AirDensity":
-        """Taylor coefficients of rho_0 (1 - L (h + z) / T)^n in z."""
-        settings = checked(Settings, table)
-        kelvin = KELVIN + settings.temperature
-        base = 1.0 - LAPSE_RATE * settings.home_altitude / kelvin
-        coefficients = [SEA_LEVEL_DENSITY * KELVIN / kelvin * base**EXPONENT]
-        for k in range(ORDER):
-            coefficients.append(-coefficients[-1] * (EXPONENT - k) / (k + 1) * LAPSE_RATE / (kelvin * base))
-        return cls(tuple(coefficients))
+        """The standard's at sea level."""
+        checked(Settings, table)
+        return cls()
+
+    def in_environment(self, environment: Environment) -> "AirDensity":
+        """That of the place and the day."""
+        return AirDensity(environment.atmosphere, environment.home.height)
 
     def initial_memory(self) -> tuple[float, float]:
         """The tangent at home."""
-        return (self.series[0], self.series[1])
+        return uncompiled(_tangent)(self, 0.0)
+
+
+@leaf
+def _tangent(e, height):
+    altitude = e.home_altitude + height
+    slope = density_slope(e.atmosphere, altitude)
+    return (density(e.atmosphere, altitude) - slope * height, slope)
 
 
 @sample(AirDensity)
@@ -60,12 +55,7 @@ def tangent(e, memory, s, rotors, key, tick, interval):
 
     Over an interval the height changes by centimetres: the tangent is within 1e-9 of the law, at a tenth of the cost.
     """
-    c, z = e.series, s.motion.position_world[2]
-    value, slope = c[6], 0.0
-    for k in range(5, -1, -1):
-        slope = slope * z + value
-        value = value * z + c[k]
-    return (value - slope * z, slope)
+    return _tangent(e, s.motion.position_world[2])
 
 
 @air(AirDensity)

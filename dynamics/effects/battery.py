@@ -9,10 +9,12 @@ from dynamics.effects._hooks import gauge, sample, supply
 from dynamics.effects._rotors import total
 from dynamics.effects._scene import cannot, checked
 from dynamics.generate import each
-from dynamics.kernel import leaf
+from dynamics.kernel import leaf, uncompiled
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
+
+KIND = "battery model"
 
 
 class Settings(NamedTuple):
@@ -46,7 +48,7 @@ class Battery(NamedTuple):
 
     def initial_memory(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
-        return (self.charge, self.cells * open_circuit_voltage(self.charge), 0.0)
+        return (self.charge, self.cells * uncompiled(open_circuit_voltage)(self.charge), 0.0)
 
 
 @leaf
@@ -56,12 +58,8 @@ def open_circuit_voltage(charge):
 
 
 @leaf
-def _power(_, voltage, current):
-    return voltage * current
-
-
-@leaf
-def _at_most(limit, voltage, _):
+def at_most(limit, voltage, _):
+    """A voltage, or the limit where that is lower."""
     return min(voltage, limit)
 
 
@@ -71,7 +69,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     charge, voltage, _ = memory
     if voltage == 0.0:
         return (charge, 0.0, 0.0)
-    current = total(each(_power, 0.0, rotors.voltage, rotors.current)) / voltage
+    current = total(rotors.power) / voltage
     charge = max(charge - current * interval / e.capacity, 0.0)
     voltage = e.cells * open_circuit_voltage(charge) - e.resistance * current
     return (charge, voltage if voltage > e.cut_off else 0.0, current)
@@ -80,10 +78,10 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 @supply(Battery)
 def battery(e, memory, voltage):
     """Voltage [V] that each motor gets."""
-    return each(_at_most, memory[1], voltage, voltage)
+    return each(at_most, memory[1], voltage, voltage)
 
 
 @gauge(Battery)
 def read(e, memory):
-    """What a battery monitor shows: charge, voltage [V] under load, current [A]."""
-    return memory
+    """What a battery monitor shows: charge, voltage [V] under load, current [A]; no temperature."""
+    return memory[0], memory[1], memory[2], math.nan

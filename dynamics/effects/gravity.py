@@ -1,23 +1,40 @@
 """Constant gravity."""
 
-from typing import Annotated, NamedTuple
-
-from annotated_types import Ge, Le
+from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import field, wrench
+from dynamics.effects._scene import checked
+from dynamics.environment import STANDARD_GRAVITY, Environment
 from dynamics.vector import NOTHING
 
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
+
 KIND = "gravity"
+
+
+class Settings(NamedTuple):
+    """No keys: [environment] has gravity."""
 
 
 class Gravity(NamedTuple):
     """Weight m g down (theory.md, eq. (2.1)).
 
-    Source: the standard acceleration of ISO 80000-3. Valid to 0.03 % within 500 m of the ground; `gravity_altitude`
-    beyond that.
+    Source: the scene's gravity at sea level, wherever the vehicle is. Valid to 0.03 % within 1 km of the sea level;
+    `gravity_altitude` beyond that.
     """
 
-    acceleration: Annotated[float, Ge(0), Le(30)] = 9.80665  # [m/s^2]
+    acceleration: float = STANDARD_GRAVITY  # [m/s^2]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Gravity":
+        """The standard acceleration."""
+        checked(Settings, table)
+        return cls()
+
+    def in_environment(self, environment: Environment) -> "Gravity":
+        """That of the place."""
+        return Gravity(environment.gravity)
 
     @property
     def acceleration_at_home(self) -> float:

@@ -1,15 +1,22 @@
 """Gravity that weakens with altitude."""
 
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from annotated_types import Ge, Le
-
+from dynamics.atmosphere import EARTH_RADIUS
 from dynamics.effects._hooks import field, sample, wrench
+from dynamics.effects._scene import checked
+from dynamics.environment import STANDARD_GRAVITY, Environment
 from dynamics.kernel import leaf
 from dynamics.vector import NOTHING
 
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
+
 KIND = "gravity"
-EARTH_RADIUS = 6_356_766.0  # [m] the U.S. Standard Atmosphere's
+
+
+class Settings(NamedTuple):
+    """No keys: [environment] has gravity, and home's altitude."""
 
 
 class GravityAltitude(NamedTuple):
@@ -19,8 +26,18 @@ class GravityAltitude(NamedTuple):
     interval. Valid wherever there is air.
     """
 
-    acceleration: Annotated[float, Ge(0), Le(30)] = 9.80665  # [m/s^2] at sea level
-    home_altitude: Annotated[float, Ge(-500), Le(9000)] = 0.0  # [m] of the world frame's origin above the sea
+    acceleration: float = STANDARD_GRAVITY  # [m/s^2] at sea level
+    home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GravityAltitude":
+        """The standard acceleration at sea level."""
+        checked(Settings, table)
+        return cls()
+
+    def in_environment(self, environment: Environment) -> "GravityAltitude":
+        """That of the place."""
+        return GravityAltitude(environment.gravity, environment.home.height)
 
     @property
     def acceleration_at_home(self) -> float:

@@ -4,6 +4,7 @@ import math
 
 from dynamics.effects._contact_parameters import (
     FREE,
+    NOWHERE,
     SLIDING,
     STABLE,
     STABLE_REAL,
@@ -13,34 +14,41 @@ from dynamics.effects._contact_parameters import (
     GroundContactSmooth,
 )
 from dynamics.effects._feet import above, foot_on, stance_of
-from dynamics.effects._ground import clearance, surface
-from dynamics.effects._hooks import asleep, contact, settle, substeps, wrench
-from dynamics.generate import each, implements
+from dynamics.effects._hooks import asleep, contact, event, settle, substeps, wrench
+from dynamics.generate import any_of, each, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
+from dynamics.terrain import over_plane, summit, surface
 from dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, norm, scale, subtract
+
+WALL = 0.5  # z of the normal of a face, below which it is a wall
 
 
 @leaf
 def _far(e, motion, h):
     """Can no foot reach the ground within a step, whatever happens in it?"""
     velocity = motion.velocity_world
-    approach = max(-clearance(e.ground, velocity), 0.0)
-    return clearance(e.ground, motion.position_world) > e.reach + h * (2.0 * approach + h * SUDDEN)
+    approach = max(-over_plane(e.terrain, velocity), 0.0)
+    over = over_plane(e.terrain, motion.position_world) - summit(e.terrain)
+    return over > e.reach + h * (2.0 * approach + h * SUDDEN)
 
 
 @leaf
 def _spring(e, anchor, foot):
     """Pull of the anchor on a foot, tangential [N]; none before the foot has touched."""
-    k = 0.0 if anchor[2] == FREE else e.tangential_stiffness
-    dx, dy = k * (anchor[0] - foot.x), k * (anchor[1] - foot.y)
-    return (dx, dy, foot.rise[0] * dx + foot.rise[1] * dy)
+    k = 0.0 if anchor[3] == FREE else e.tangential_stiffness
+    x, y, z = foot.place
+    dx, dy, n = k * (anchor[0] - x), k * (anchor[1] - y), foot.normal
+    if n[2] > WALL:  # brought into the plane along z: by its normal, feet on a slope would step on at 1 ms
+        return (dx, dy, -(n[0] * dx + n[1] * dy) / n[2])
+    pull = (dx, dy, k * (anchor[2] - z))
+    return subtract(pull, scale(dot(n, pull), n))
 
 
 @leaf
 def _trial(e, anchor, foot):
     """(force if the foot sticks, maximum friction) [N]."""
-    limit = (e.static if anchor[2] == STICKING else e.dynamic) * foot.press
+    limit = (e.static if anchor[3] == STICKING else e.dynamic) * foot.press
     return subtract(_spring(e, anchor, foot), scale(e.damping, foot.slip)), limit
 
 
@@ -118,38 +126,57 @@ def far_smooth(e, memory, motion, h):
     return _far(e, motion, h)
 
 
+@leaf
+def _anchored(foot, anchor, how, square):
+    """A foot's memory; how high its anchor is counts on a wall only, and would else disturb the error control."""
+    return (anchor[0], anchor[1], anchor[2] if foot.normal[2] <= WALL else 0.0, how, square)
+
+
 @kernel
 def _settled_foot(c, foot_body, anchor):
-    e, stance = c
+    e, stance, h = c
     if above(stance, foot_body):
-        return (0.0, 0.0, FREE, 0.0)
+        return NOWHERE
     foot = foot_on(e, stance, foot_body)
     if foot.press <= 0.0:
-        return (0.0, 0.0, FREE, 0.0)
+        return NOWHERE
     square = dot(foot.slip, foot.slip)
-    if anchor[2] == FREE:
-        anchor = (foot.x, foot.y, SLIDING, square)
+    if anchor[3] == FREE:
+        since = min(h, foot.depth / foot.approach) if foot.approach > 0.0 else h  # [s] it has touched
+        start = subtract(foot.place, scale(since, foot.slip))
+        anchor = (start[0], start[1], start[2], SLIDING, square)
     trial, limit = _trial(e, anchor, foot)
     if dot(trial, trial) <= limit * limit:
-        return (anchor[0], anchor[1], STICKING, square)
+        return _anchored(foot, anchor, STICKING, square)
     # a foot that is slowing down is held by the static coefficient, one that breaks away by the dynamic one
-    caught = square < min(e.square_stick_velocity, anchor[3])
+    caught = square < min(e.square_stick_velocity, anchor[4])
     limit = (e.static if caught else e.dynamic) * foot.press
     pull = norm(_spring(e, anchor, foot))
     kept = limit / pull if pull > limit else 1.0
-    x, y = foot.x + kept * (anchor[0] - foot.x), foot.y + kept * (anchor[1] - foot.y)
-    return (x, y, STICKING if caught else SLIDING, square)
+    dragged = add(foot.place, scale(kept, subtract(anchor, foot.place)))
+    return _anchored(foot, dragged, STICKING if caught else SLIDING, square)
 
 
 @settle(GroundContact)
 def drag_anchors(e, memory, motion, h):
     """Anchors after a step: kept by feet that stick, dragged along by feet that slide."""
-    return each(_settled_foot, (e, stance_of(e, motion, rotation_matrix(motion.attitude))), e.feet, memory)
+    return each(_settled_foot, (e, stance_of(e, motion, rotation_matrix(motion.attitude)), h), e.feet, memory)
+
+
+@leaf
+def _lets_go(_, before, after):
+    return before[3] + after[3] == STICKING + SLIDING
+
+
+@event(GroundContact)
+def lets_go(e, before, after):
+    """Has any foot begun to slide, or to stick?"""
+    return any_of(each(_lets_go, 0.0, before, after))
 
 
 @substeps(GroundContact)
 def split(e, memory, motion, h):
-    """As many as the stiffest mode needs; default stiffness and 1 ms need no split."""
+    """As many as the stiffest mode needs to be stable; default stiffness and 1 ms need no split."""
     return math.ceil(h * e.rate_bound / STABLE)
 
 
@@ -161,7 +188,7 @@ def split_smooth(e, memory, motion, h):
     for i in range(len(e.feet)):
         arm = apply(R_world_body, e.feet[i])
         position = add(motion.position_world, arm)
-        height, _, _ = surface(e.ground, position[0], position[1])
+        height, _ = surface(e.terrain, position[0], position[1])
         velocity = add(motion.velocity_world, apply(R_world_body, cross(motion.omega_body, e.feet[i])))
         approach = max(-velocity[2], 0.0)
         press += max(e.stiffness * (height - position[2] + h * approach) + e.damping * approach, 0.0)

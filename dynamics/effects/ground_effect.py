@@ -1,13 +1,15 @@
 """More thrust close to the ground."""
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynamics.effects._hooks import asleep, factors
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import Factors
+from dynamics.environment import Environment
 from dynamics.generate import each
 from dynamics.kernel import leaf
+from dynamics.terrain import LEVEL, over_plane, summit, surface, upright
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
@@ -21,14 +23,15 @@ class Settings(NamedTuple):
 
 
 class GroundEffect(NamedTuple):
-    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z over level ground (theory.md, eq. (2.25)).
+    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z over the ground under it (theory.md, eq. (2.25)).
 
-    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), hovering, each rotor by itself. Valid over the plane z = 0 for
-    heights above half a radius.
+    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), hovering, each rotor by itself. Valid for
+    heights above half a radius, over ground that is flat for some radii around.
     """
 
     inverse_radius: float  # [1/m]
-    highest: float  # [m] of the centre of mass, above which no rotor feels the ground
+    highest: float  # [m] of the centre of mass over the slope, above which no rotor feels the ground
+    terrain: Any = LEVEL  # Level or Relief
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
@@ -38,6 +41,11 @@ class GroundEffect(NamedTuple):
         radius = 0.5 * propeller.diameter
         reach = max(math.hypot(*position) for position in airframe.rotors.position)
         return cls(1.0 / radius, FADE_TO * radius + reach)
+
+    def in_environment(self, environment: Environment) -> "GroundEffect":
+        """Over the ground that is there."""
+        stretch = math.hypot(*upright(environment.terrain))
+        return self._replace(highest=self.highest * stretch, terrain=environment.terrain)
 
 
 @leaf
@@ -52,8 +60,9 @@ def gain(height):
 @leaf
 def _height(c, x, y):
     e, s = c
-    R = s.R_world_body
-    return e.inverse_radius * (s.motion.position_world[2] + R[6] * x + R[7] * y)
+    R, (px, py, pz) = s.R_world_body, s.motion.position_world
+    ground, _ = surface(e.terrain, px + R[0] * x + R[1] * y, py + R[3] * x + R[4] * y)
+    return e.inverse_radius * (pz + R[6] * x + R[7] * y - ground)
 
 
 @leaf
@@ -71,4 +80,5 @@ def ground_effect(e, memory, s, before):
 @asleep(GroundEffect)
 def high(e, memory, motion, h):
     """Too high for any rotor to feel the ground within a step?"""
-    return motion.position_world[2] + 2.0 * h * min(motion.velocity_world[2], 0.0) > e.highest
+    over, climb = over_plane(e.terrain, motion.position_world), over_plane(e.terrain, motion.velocity_world)
+    return over - summit(e.terrain) + 2.0 * h * min(climb, 0.0) > e.highest

@@ -2,11 +2,13 @@
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from dynamics.effects._axes import by_axis
 from dynamics.effects._hooks import torque
-from dynamics.effects._rotors import total
+from dynamics.effects._rotors import total, total_vector
 from dynamics.effects._scene import checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
+from dynamics.vector import cross, scale, subtract
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
@@ -19,8 +21,8 @@ class Settings(NamedTuple):
 class GyroscopicTorque(NamedTuple):
     """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
 
-    Source: Euler's equations of a body with rotors that spin about its z axis; the propeller's inertia is averaged over
-    a turn. Valid while the rotors turn many times faster than the body.
+    Source: Euler's equations of a body with rotors that spin about axes fixed in it; the propeller's inertia is
+    averaged over a turn. Valid while the rotors turn many times faster than the body.
     """
 
     inertia: float  # [kg m^2] of one rotor about its axis
@@ -37,11 +39,37 @@ def _signed(_, sign, value):
     return sign * value
 
 
-@torque(GyroscopicTorque)
-def gyroscopic_torque(e, memory, s, rotors):
-    """Torque [N m] in body coordinates."""
+@leaf
+def _along_z(given):
+    e, s, rotors = given
     sign, omega = s.layout.reaction_sign, s.motion.omega_body
     # a rotor that pushes the body to +z turns about -z itself
     momentum = -e.inertia * total(each(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
     spin_up = e.inertia * total(each(_signed, 0.0, sign, rotors.acceleration))
     return (-omega[1] * momentum, omega[0] * momentum, spin_up)
+
+
+@leaf
+def _scaled(_, value, axis):
+    return scale(value, axis)
+
+
+@leaf
+def _sum_along(axis, sign, values):
+    """Sum of a value of each rotor along its axis, with the sign of its reaction."""
+    return total_vector(each(_scaled, 0.0, each(_signed, 0.0, sign, values), axis))
+
+
+@leaf
+def _tilted(given):
+    e, s, rotors = given
+    sign, axis = s.layout.reaction_sign, s.layout.axis
+    momentum = scale(-e.inertia, _sum_along(axis, sign, s.motion.rotor_speed))
+    spin_up = scale(e.inertia, _sum_along(axis, sign, rotors.acceleration))
+    return subtract(spin_up, cross(s.motion.omega_body, momentum))
+
+
+@torque(GyroscopicTorque)
+def gyroscopic_torque(e, memory, s, rotors):
+    """Torque [N m] in body coordinates."""
+    return by_axis(_along_z, _tilted, s.layout.axis, (e, s, rotors))

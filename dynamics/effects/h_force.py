@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
+from dynamics.effects._axes import air_body, by_axis, places
 from dynamics.effects._hooks import wrench_body
-from dynamics.effects._rotors import total
+from dynamics.effects._rotors import total, total_wrench
 from dynamics.effects._scene import cannot, checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vector import apply_transposed, subtract
-from dynamics.vehicles.propeller import drag_coefficients
+from dynamics.vector import add, cross, dot, pair, scale, subtract
+from dynamics.vehicles.propeller import h_force_coefficient
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
@@ -32,7 +33,7 @@ class HForce(NamedTuple):
     """
 
     coefficient: float  # [m^3/rad]
-    height: float  # [m] of all rotors over the centre of mass
+    height: float  # [m] of all rotors over the centre of mass; not used where rotors have axes of their own
     square_arm: tuple[float, ...]  # [m^2] squared distance of each rotor from the body z axis
 
     @classmethod
@@ -40,14 +41,12 @@ class HForce(NamedTuple):
         """From the airframe's propeller unless the table has the coefficient."""
         given = checked(Settings, table)
         positions = airframe.rotors.position
-        if len({z for _, _, z in positions}) > 1:
+        if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
             cannot("the rotors must all be at one height")
         coefficient = given.coefficient
         if coefficient is None:
             propeller = airframe.propeller or cannot("needs the key coefficient: the vehicle has no [propeller]")
-            radius = 0.5 * propeller.diameter
-            blade_area = propeller.blades * radius * propeller.diameter / propeller.aspect_ratio
-            coefficient = blade_area * sum(drag_coefficients(propeller)) * radius / 4.0
+            coefficient = h_force_coefficient(propeller)
         return cls(coefficient, positions[0][2], tuple(x * x + y * y for x, y, _ in positions))
 
 
@@ -56,11 +55,11 @@ def _product(_, a, b):
     return a * b
 
 
-@wrench_body(HForce)
-def h_force(e, memory, s, rotors):
-    """Force [N] and torque [N m] in body coordinates."""
-    layout, omega, speed = s.layout, s.motion.omega_body, s.motion.rotor_speed
-    v = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))
+@leaf
+def _along_z(given):
+    e, s = given
+    layout, speed = s.layout, s.motion.rotor_speed
+    v, omega = air_body(s)
     # sums over the rotors of speed times 1, x, y and x^2 + y^2 give the force and torque of all of them
     k, h = e.coefficient * s.air.density, e.height
     w = k * total(speed)
@@ -71,3 +70,26 @@ def h_force(e, memory, s, rotors):
     y = -(w * (v[1] - h * omega[0]) + wx * omega[2])
     yaw = wy * (v[0] + h * omega[1]) - wx * (v[1] - h * omega[0]) - w_square * omega[2]
     return (x, y, 0.0), (-h * y, h * x, yaw)
+
+
+@leaf
+def _of_rotor(c, speed, at):
+    k, air, omega = c
+    place, axis = at
+    v = add(air, cross(omega, place))
+    force = scale(-k * speed, subtract(v, scale(dot(axis, v), axis)))
+    return force, cross(place, force)
+
+
+@leaf
+def _tilted(given):
+    e, s = given
+    air, omega = air_body(s)
+    at = each(pair, 0.0, places(s.layout), s.layout.axis)
+    return total_wrench(each(_of_rotor, (e.coefficient * s.air.density, air, omega), s.motion.rotor_speed, at))
+
+
+@wrench_body(HForce)
+def h_force(e, memory, s, rotors):
+    """Force [N] and torque [N m] in body coordinates."""
+    return by_axis(_along_z, _tilted, s.layout.axis, (e, s))

@@ -1,11 +1,13 @@
 """Motors with a winding, instead of a rotor speed that follows the voltage with a lag."""
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from dynamics.effects._hooks import motor
 from dynamics.effects._scene import checked
 from dynamics.generate import each
 from dynamics.kernel import leaf
+from dynamics.vector import pair
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
@@ -19,18 +21,24 @@ class Settings(NamedTuple):
 
 
 class MotorElectrics(NamedTuple):
-    """Direct-current motor behind a belt: J w' = K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9)).
+    """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9)).
 
-    The current stays between 0 (the controller does not brake) and the controller's limit. Source: the usual steady
-    model of a brushless motor, from its speed constant, resistance and idle current; inductance neglected. Valid
-    for changes slower than about 1 ms.
+    The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
+    The controller keeps the current between 0 (it does not brake) and the lowest of its own limit, the motor's peak
+    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. Then it
+    gives less voltage than it is asked for, and takes the power of that, over its efficiency. Source: the usual steady
+    model of a brushless motor, from its speed constant, resistance and idle current; inductance neglected. Valid for
+    changes slower than about 1 ms.
     """
 
     motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, behind the belt
     inverse_resistance: float  # [1/ohm]
     no_load_current: float  # [A]
     current_limit: float  # [A]
-    inverse_inertia: float  # [1/(kg m^2)] of one rotor
+    power_limit: float  # [W] taken by the motor
+    inverse_inertia: float  # [1/(kg m^2)] of one rotor and its motor
+    efficiency: float  # of the belt
+    inverse_esc_efficiency: float
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "MotorElectrics":
@@ -39,34 +47,52 @@ class MotorElectrics(NamedTuple):
         engine = airframe.motor
         return cls(
             engine.rotor_constant,
-            1.0 / engine.resistance,
+            1.0 / (engine.resistance + engine.esc_resistance),
             engine.no_load_current,
-            engine.esc_current,
-            1.0 / airframe.rotors.inertia,
+            airframe.motor_current_limit,
+            engine.power_limit,
+            1.0 / (airframe.rotors.inertia + engine.inertia / engine.gear_ratio**2),
+            engine.belt_efficiency,
+            1.0 / engine.esc_efficiency,
         )
 
 
 @leaf
+def _unlimited(e, speed, voltage):
+    """Current [A] without the controller's limits, but that it does not brake."""
+    return max(voltage * e.inverse_resistance - (e.motor_constant * e.inverse_resistance) * speed, 0.0)
+
+
+@leaf
 def _current(e, speed, voltage):
-    short = voltage * e.inverse_resistance
-    return min(max(short - (e.motor_constant * e.inverse_resistance) * speed, 0.0), e.current_limit)
+    wanted = min(_unlimited(e, speed, voltage), e.current_limit)
+    # the power K w I + R I^2 is at its limit where I = 2 P / (K w + sqrt((K w)^2 + 4 R P))
+    back = e.motor_constant * speed
+    if wanted * (back + wanted / e.inverse_resistance) <= e.power_limit:
+        return wanted
+    return 2.0 * e.power_limit / (back + math.sqrt(back * back + 4.0 * e.power_limit / e.inverse_resistance))
 
 
 @leaf
 def _acceleration(e, torque, both):
     speed, current = both
     friction = e.no_load_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
-    return (e.motor_constant * e.inverse_inertia) * (current - friction) - torque * e.inverse_inertia
+    return (e.efficiency * e.motor_constant * e.inverse_inertia) * (current - friction) - torque * e.inverse_inertia
 
 
 @leaf
-def _pair(_, a, b):
-    return a, b
+def _power(e, voltage, both):
+    """[W] at the controller: of the voltage asked for, or of the lower one that keeps the current in its limits."""
+    speed, current = both
+    if current < _unlimited(e, speed, voltage):
+        voltage = e.motor_constant * speed + current / e.inverse_resistance
+    return voltage * current * e.inverse_esc_efficiency
 
 
 @motor(MotorElectrics)
 def motor_electrics(e, memory, s, loads, voltage):
-    """(acceleration [rad/s^2], current [A]) of each rotor."""
+    """(acceleration [rad/s^2], current [A], power [W]) of each rotor."""
     speed = s.motion.rotor_speed
     current = each(_current, e, speed, voltage)
-    return each(_acceleration, e, loads.torque, each(_pair, 0.0, speed, current)), current
+    both = each(pair, 0.0, speed, current)
+    return each(_acceleration, e, loads.torque, both), current, each(_power, e, voltage, both)

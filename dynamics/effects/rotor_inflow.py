@@ -3,16 +3,19 @@
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from dynamics.effects._axes import axial_speeds
 from dynamics.effects._hooks import loads
 from dynamics.effects._scene import cannot, checked
 from dynamics.effects._types import Loads
 from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vector import subtract
+from dynamics.vector import pair
 from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
+
+KIND = "flow through the rotors"
 
 
 class Settings(NamedTuple):
@@ -23,9 +26,9 @@ class RotorInflow(NamedTuple):
     """What climb takes from, and descent adds to, the static loads of `rotor_thrust` (theory.md, eq. (2.5)).
 
     The blade meets the air at an angle that falls with the advance per turn over the pitch: T = T_0 (1 - w / speed) and
-    the induced part of the torque with the square, where w = 2 pi V / pitch. Source: the paper's blade section at the
-    pitch minus the inflow angle, both small. Valid for |w| below half the rotor speed, where
-    it is held, outside the vortex ring state.
+    the induced part of the torque with the square, where w = 2 pi V / pitch of each hub's own speed V along the axis,
+    so that rolling and pitching are damped. Source: the paper's blade section at the pitch minus the inflow angle, both
+    small. Valid for |w| below half the rotor speed, where it is held, outside the vortex ring state.
     """
 
     thrust_constant: float  # [m^4/rad^2]
@@ -49,8 +52,9 @@ class RotorInflow(NamedTuple):
 
 
 @leaf
-def _slowed(w, speed, _):
-    return min(max(w, -0.5 * speed), 0.5 * speed)
+def _advance(turn_per_metre, axial, speed):
+    """[rad/s] of a hub: its axial speed in turns over the pitch, held to where the model is valid."""
+    return min(max(turn_per_metre * axial, -0.5 * speed), 0.5 * speed)
 
 
 @leaf
@@ -64,23 +68,17 @@ def _less(constant, before, both):
 
 
 @leaf
-def _pair(_, a, b):
-    return a, b
-
-
-@leaf
 def _product(_, a, b):
     return a * b
 
 
 @loads(RotorInflow)
 def rotor_inflow(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`; the axial speed is that of the centre of mass."""
-    R, air = s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world)
+    """Loads of each rotor, added to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
-    w = each(_slowed, e.turn_per_metre * (R[2] * air[0] + R[5] * air[1] + R[8] * air[2]), speed, speed)
+    w = each(_advance, e.turn_per_metre, axial_speeds(s), speed)
     linear, square = each(_product, 0.0, speed, w), each(_square_change, 0.0, speed, w)
     return Loads(
-        each(_less, e.thrust_constant * density, before.thrust, each(_pair, 0.0, linear, factors.thrust)),
-        each(_less, e.induced_torque_constant * density, before.torque, each(_pair, 0.0, square, factors.torque)),
+        each(_less, e.thrust_constant * density, before.thrust, each(pair, 0.0, linear, factors.thrust)),
+        each(_less, e.induced_torque_constant * density, before.torque, each(pair, 0.0, square, factors.torque)),
     )

@@ -8,6 +8,7 @@ from dynamics.effects._hooks import loads
 from dynamics.effects._types import Loads
 from dynamics.generate import each
 from dynamics.kernel import leaf
+from dynamics.vector import pair
 
 KIND = "rotor thrust model"
 
@@ -28,16 +29,11 @@ def _added(constant, speed, both):
     return both[0] + constant * (speed * speed) * both[1]
 
 
-@leaf
-def _pair(_, a, b):
-    return a, b
-
-
 @loads(RotorQuadratic)
 def rotor_quadratic(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed = s.motion.rotor_speed
     return Loads(
-        each(_added, e.thrust_constant, speed, each(_pair, 0.0, before.thrust, factors.thrust)),
-        each(_added, e.torque_constant, speed, each(_pair, 0.0, before.torque, factors.torque)),
+        each(_added, e.thrust_constant, speed, each(pair, 0.0, before.thrust, factors.thrust)),
+        each(_added, e.torque_constant, speed, each(pair, 0.0, before.torque, factors.torque)),
     )

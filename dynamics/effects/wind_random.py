@@ -1,44 +1,95 @@
-"""Random gust force: the paper's wind, as a force of random size instead of a motion of the air."""
+"""Random force: the paper's wind, as a force of random size instead of a motion of the air."""
 
+import math
 import zlib
-from typing import Annotated, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from dynamics.effects._hooks import sample, wind, wrench
+from dynamics.effects._scene import checked
+from dynamics.errors import KeyedError
+from dynamics.kernel import leaf
 from dynamics.noise import normal3
 from dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from dynamics.vehicles.airframe import Airframe
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
 LANE = zlib.crc32(b"wind_random")
+ROUNDING = 1e-6  # of an interval
 
 
-class WindRandom(NamedTuple):
-    """Force 1/2 C_s S rho |v| v at the centre of mass, of the air's speed v past the vehicle (theory.md, eq. (2.8)).
-
-    The wind is the mean plus one normal draw for each axis and exchange interval; the force is held over the interval.
-    Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`): the draws
-    are independent, so that the force's spectrum is flat up to the exchange rate.
-    """
+class Settings(NamedTuple):
+    """What a scene says."""
 
     mean: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)  # [m/s] world
     sigma: Annotated[float, Ge(0), Le(30)] = 1.0  # [m/s] of each axis
     area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2] S
     density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
     shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
+    interval: Annotated[float, Ge(1e-4), Le(10)] = 0.004  # [s] between two draws, whatever the exchange interval
+    beside_drag: bool = False  # whether body_drag may act as well, though both are drag in this wind
+
+
+class WindRandom(NamedTuple):
+    """A random force 1/2 C_s S rho |v| v at the centre of mass, of a wind's speed v past the vehicle (theory.md, eq.
+    (2.8)); the air that other effects feel stands still.
+
+    The wind is the mean plus one normal draw for each axis and interval; over an exchange interval the force is held at
+    its mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
+    the draws are independent, so that the wind's spectrum is flat, sigma^2 times the interval, up to the interval's
+    frequency. As it is drag already, it is refused beside `body_drag`.
+    """
+
+    mean: Vec3  # [m/s] world
+    sigma: float  # [m/s] of each axis
+    factor: float  # [N s^2/m^2] 1/2 C_s S rho
+    interval: float  # [s] between two draws
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindRandom":
+        """What a scene says."""
+        given = checked(Settings, table)
+        return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
 
     def initial_memory(self) -> tuple[Vec3, Vec3]:
         """The force and the wind: none before the first exchange."""
         return ZERO, ZERO
 
 
+def check(table: Mapping, tables: Mapping) -> None:
+    """KeyedError beside `body_drag`, unless the table insists."""
+    if "body_drag" in tables and not table.get("beside_drag"):
+        message = "is drag already, and counts it twice beside effects.body_drag"
+        expected = "wind_constant or wind_dryden with body_drag, or beside_drag = true"
+        raise KeyedError("", message, expected)
+
+
+@leaf
+def _blow(e, key, number, velocity_world):
+    """(force [N], wind [m/s]) of one draw, world."""
+    drawn = add(e.mean, scale(e.sigma, normal3(key, number, LANE)))
+    v = subtract(drawn, velocity_world)
+    return scale(e.factor * norm(v), v), drawn
+
+
 @sample(WindRandom)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """Force [N] and wind [m/s] in world coordinates for the next interval."""
-    drawn = add(e.mean, scale(e.sigma, normal3(key, tick, LANE)))
-    v = subtract(drawn, s.motion.velocity_world)
-    return scale(0.5 * e.shape_coefficient * e.area * e.density * norm(v), v), drawn
+    """Mean force [N] and wind [m/s] of the next exchange interval, in world coordinates."""
+    start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws
+    first, last = math.floor(start + ROUNDING), math.ceil(end - ROUNDING) - 1
+    if first >= last:
+        return _blow(e, key, first, s.motion.velocity_world)
+    force, drawn = ZERO, ZERO
+    for number in range(first, last + 1):
+        part = (min(end, number + 1.0) - max(start, 1.0 * number)) / (end - start)
+        one = _blow(e, key, number, s.motion.velocity_world)
+        force, drawn = add(force, scale(part, one[0])), add(drawn, scale(part, one[1]))
+    return force, drawn
 
 
 @wrench(WindRandom)

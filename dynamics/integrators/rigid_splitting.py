@@ -7,6 +7,7 @@ is kept to round-off in the world, and the energy error stays bounded for all ti
 """
 
 import math
+from typing import Any
 
 from dynamics.integrators._march import token
 from dynamics.kernel import leaf
@@ -17,14 +18,21 @@ from dynamics.vector import add, cross, divide, multiply, scale
 ORDER = 6
 EVALUATIONS = 10
 ON_MANIFOLD = True
-REQUIRES = (
-    "attitude",
-    "omega_body",
-)  # the state, exactly; its parameters have `inertia`, the principal moments [kg m^2]
 Method = token(__name__)
 
 _HALF = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023)
 STAGES = (*_HALF, 1.0 - 2.0 * sum(_HALF), *_HALF[::-1])
+
+
+def unfit(p: Any, x: Any) -> str:
+    """Why a system with parameters p and states like x is not for this method, "" if it is.
+
+    The state must be (attitude, omega_body), the parameters have `inertia`, the principal moments [kg m^2], and
+    `torque_without_rate`, whether the torque is one of time and attitude only: else the kicks are of order 1.
+    """
+    if getattr(x, "_fields", ()) != ("attitude", "omega_body"):
+        return "it is for states of attitude and omega_body"
+    return "" if getattr(p, "torque_without_rate", False) else "it is for a torque that does not depend on the rate"
 
 
 @leaf

@@ -12,7 +12,7 @@ arguments that are functions or whose class cannot be imported by name: put kern
 from dynamics.kernel._began import BEGAN  # noqa: F401 (first of all)
 from dynamics.kernel._by_class import ByClass
 from dynamics.kernel._cache import Statistics, on_compile, statistics
-from dynamics.kernel._decorators import kernel, leaf, uncompiled
+from dynamics.kernel._decorators import apart, kernel, leaf, uncompiled
 from dynamics.kernel._files import root as cache_folder
 from dynamics.kernel._pipeline import Pipeline
 from dynamics.kernel._sources import digest as source_digest
@@ -22,6 +22,7 @@ __all__ = [
     "ByClass",
     "Pipeline",
     "Statistics",
+    "apart",
     "cache_folder",
     "forget_sources",
     "kernel",

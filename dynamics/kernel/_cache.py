@@ -15,7 +15,7 @@ from numba.core.serialize import dumps
 
 from dynamics.kernel import _files, _sources
 from dynamics.kernel._key import Key, NotKeptError, key
-from dynamics.kernel._pipeline import InnerLibrary, is_nested, restored
+from dynamics.kernel._pipeline import InnerLibrary, is_nested, reduced, restored
 
 
 class Statistics(NamedTuple):
@@ -88,7 +88,7 @@ class KernelCache(_Cache):
         found = self._key(sig, data.codegen) if self._enabled else None
         if found is not None:
             name = self._file(found, isinstance(data.library, InnerLibrary))
-            _files.write(self._folder, name, found.sources, dumps((found, data._reduce())))
+            _files.write(self._folder, name, found.sources, dumps((found, reduced(data))))
 
     def _loaded(self, sig: Any, target_context: Any) -> CompileResult | None:
         found, inner = self._key(sig, target_context.codegen()), is_nested()

@@ -1,6 +1,8 @@
 """The decorators of compiled functions."""
 
 from collections.abc import Callable
+from functools import cache
+from types import FunctionType
 from typing import Any, TypeVar
 
 from numba.core import config
@@ -20,14 +22,37 @@ def _compile(function: Callable, **options: Any) -> Any:
     return compiled
 
 
+@cache
 def uncompiled(function: F) -> F:
-    """The Python function of a kernel: for numpy arrays instead of numbers, and for single numbers in Python code."""
-    return function.py_func  # type: ignore[attr-defined]
+    """The Python function of a kernel, on those of the kernels that it calls by name.
+
+    For numpy arrays instead of numbers, and for single numbers in Python code: the first call of anything compiled
+    takes a process a quarter of a second.
+    """
+    python: Any = getattr(function, "py_func", function)
+    known = python.__globals__
+    called = {
+        name: uncompiled(known[name])
+        for name in python.__code__.co_names
+        if isinstance(known.get(name), KernelDispatcher)
+    }
+    if not called:
+        return python
+    return FunctionType(python.__code__, {**known, **called}, python.__name__, python.__defaults__, python.__closure__)  # type: ignore[return-value]
 
 
 def kernel(function: F) -> F:
     """Compile a pure function: cached on disk, releases the GIL, divides as IEEE 754 says (no ZeroDivisionError)."""
     return _compile(function)
+
+
+def apart(function: F) -> F:
+    """The same for large functions that others call: never inlined, so that LLVM looks at them once, not at each copy.
+
+    A function that is not marked so inherits from the first that calls it whether it is always inlined.
+    """
+    function.__apart__ = True  # type: ignore[attr-defined]
+    return _compile(function, forceinline=False)
 
 
 def leaf(function: F) -> F:

@@ -28,13 +28,21 @@ def _checksum(content: bytes) -> bytes:
     return hashlib.blake2b(content, digest_size=CHECKSUM).digest()
 
 
+def _ours(status: os.stat_result) -> bool:
+    """Whether only this user, or root, can have written a file: what is read from here is run."""
+    return status.st_uid in (0, os.geteuid()) and not status.st_mode & 0o022
+
+
 def read(folder: str, name: str, version: str) -> bytes | None:
-    """The content that `write` was given; None if there is none, or it has been damaged."""
+    """The content that `write` was given; None if there is none, it is damaged, or others could have written it."""
     base = root()
     if base is None:
         return None
     try:
-        data = (base / folder / f"{name}-{version}").read_bytes()
+        with (base / folder / f"{name}-{version}").open("rb") as file:
+            if not _ours(os.fstat(file.fileno())):
+                return None
+            data = file.read()
     except OSError:
         return None
     content = data[CHECKSUM:]
@@ -58,7 +66,8 @@ def write(folder: str, name: str, version: str, content: bytes) -> None:
     try:
         for path in (base, *reversed([base / p for p in Path(folder).parents if p.name]), place):
             path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
-        temporary.write_bytes(_checksum(content) + content)
+        with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(_checksum(content) + content)
         temporary.replace(place / f"{name}-{version}")
         versions = sorted(place.glob(f"{name}-*"), key=lambda path: path.stat().st_mtime_ns)
     except OSError:

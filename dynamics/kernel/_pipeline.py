@@ -2,22 +2,32 @@
 
 Of every function, however small, numba makes machine code and two wrappers, for calls from Python and from C. A kernel
 calls hundreds that end up inlined in it, so that most of the compile time went there. Here such a function is an
-`InnerLibrary`: optimised LLVM code, linked into its caller as numba links any. The outermost kernel's own code is the
-same with or without (docs/benchmarks.md, "Compile time").
+`InnerLibrary`: optimised LLVM code, linked into its caller as numba links any, which takes its arguments whole
+(`_calls`). The outermost kernel's own code does the same with or without (docs/benchmarks.md, "Compile time").
 """
 
+import gc
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numba
 from llvmlite import binding
-from numba.core import sigutils, types
+from llvmlite.binding.newpassmanagers import FunctionPassManager, ModulePassManager, NewPassManager
+from numba.core import ir, sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, DefaultPassBuilder, PassManager
 from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+
+from dynamics.kernel._calls import InnerLower, KernelLower, is_whole, offer
+
+# llvmlite 0.50 frees no pass manager: what would stands behind another base class's method, which does nothing.
+FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._dispose
 
 
 class _Depth(threading.local):
@@ -29,32 +39,115 @@ class _Depth(threading.local):
 _depth = _Depth()
 
 
+@contextmanager
+def _nested() -> Iterator[None]:
+    _depth.value += 1
+    try:
+        yield
+    finally:
+        _depth.value -= 1
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Without looking for garbage: of what a compilation makes nearly all is in use until it ends."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
 def is_nested() -> bool:
     """Does a compilation in this thread wait for the next one?"""
     return _depth.value > 0
 
 
-class InnerLibrary(JITCodeLibrary):
-    """Optimised code to link into others, never emitted."""
+class KernelLibrary(JITCodeLibrary):
+    """Code of a kernel, to which the functions apart that it reaches are linked only when all else is optimised."""
+
+    def __init__(self, codegen: Any, name: str):
+        super().__init__(codegen, name)
+        self._apart: dict[str, InnerLibrary] = {}  # by the symbol of the function
+
+    def add_linking_library(self, library: Any) -> None:
+        """Link a library, or declare its function if that is apart: LLVM would optimise it again in every caller."""
+        library._ensure_finalized()
+        self._apart |= getattr(library, "_apart", {})
+        if getattr(library, "apart", ""):
+            self._apart[library.apart] = library
+        else:
+            super().add_linking_library(library)
+
+    def _optimize_functions(self, module: Any) -> None:
+        """As numba does, which makes a pass manager for each function that is declared only, too: most of its time."""
+        module.data_layout = self._codegen._data_layout
+        for function in module.functions:
+            if not function.is_declaration:
+                manager, builder = self._codegen._function_pass_manager()
+                manager.run(function, builder)
+
+    def _finalize_final_module(self) -> None:
+        for library in reversed(self._apart.values()):  # callers first: of a module only what is called is linked
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        super()._finalize_final_module()
+
+
+class InnerLibrary(KernelLibrary):
+    """Optimised code to link into others, never emitted.
+
+    Attributes:
+        apart: the symbol of its function if that is apart, else "".
+        forwards: whether its function only calls another, which is optimised, and is inlined itself.
+    """
+
+    apart, forwards = "", False
+
+    def _optimize_final_module(self) -> None:
+        if not self.forwards:
+            super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
 
-    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """Name, kind and bitcode."""
+    def environments(self) -> tuple:
+        """What its functions, and those apart that they reach, refer to in numba."""
+        modules = [library._final_module for library in (self, *self._apart.values())]
+        names = {value.name for module in modules for value in module.global_variables}
+        found = (lookup_environment(name) for name in sorted(names) if name.startswith("_ZN08NumbaEnv"))
+        return tuple(environment for environment in found if environment is not None and environment.can_cache())
+
+    def serialize_using_object_code(self) -> tuple:
+        """Name, symbol if apart, and bitcode; the same of the functions apart that it reaches."""
         self._ensure_finalized()
-        return self.name, "inner", self._get_module_for_linking().as_bitcode()
+        return tuple(
+            (library.name, library.apart, library._get_module_for_linking().as_bitcode())
+            for library in (self, *self._apart.values())
+        )
 
     @classmethod
-    def restored(cls, codegen: Any, serialised: tuple[str, str, bytes]) -> "InnerLibrary":
+    def restored(cls, codegen: Any, serialised: tuple) -> "InnerLibrary":
         """The library of what `serialize_using_object_code` gave."""
-        name, _, bitcode = serialised
-        library = cls(codegen, name)
-        library._final_module = library._shared_module = binding.parse_bitcode(bitcode)
-        library._finalize_final_module()
-        return library
+        made = []
+        for name, apart, bitcode in serialised:
+            library = cls(codegen, name)
+            library.apart = apart
+            library._final_module = library._shared_module = binding.parse_bitcode(bitcode)
+            made.append(library)
+        made[0]._apart = {library.apart: library for library in made[1:]}
+        for library in made:
+            library._finalize_final_module()
+        return made[0]
+
+
+def reduced(result: CompileResult) -> tuple:
+    """What is kept of a result."""
+    parts = result._reduce()
+    return (*parts[:-1], result.library.environments()) if isinstance(result.library, InnerLibrary) else parts
 
 
 def restored(target_context: Any, reduced: tuple) -> CompileResult:
@@ -83,21 +176,6 @@ def _refusal(target_context: Any) -> Any:
     return target_context.get_executable(result.library, result.fndesc, result.environment)
 
 
-class _Lower(Lower):
-    """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
-
-    def incref(self, typ: types.Type, val: Any) -> None:
-        if self._is_counted(typ):
-            super().incref(typ, val)
-
-    def decref(self, typ: types.Type, val: Any) -> None:
-        if self._is_counted(typ):
-            super().decref(typ, val)
-
-    def _is_counted(self, typ: types.Type) -> bool:
-        return self.context.data_model_manager[typ].contains_nrt_meminfo()
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelLowering(NativeLowering):
     """To machine code with wrappers for Python and C."""
@@ -107,7 +185,28 @@ class KernelLowering(NativeLowering):
     @property
     def lowering_class(self) -> type[Lower]:
         """What writes the LLVM code."""
-        return _Lower
+        return KernelLower
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower the function of `state`."""
+        if state.library is None:
+            state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.enable_object_caching()
+        return super().run_pass(state)
+
+
+def _forwards(func_ir: Any) -> bool:
+    """Whether a function hands its arguments to another, and returns what that returns.
+
+    Not with a kernel among them: its address, of which nothing is made, goes only when the code is optimised.
+    """
+    if len(func_ir.blocks) != 1:
+        return False
+    (block,) = func_ir.blocks.values()
+    values = [instruction.value for instruction in block.find_insts(ir.Assign)]
+    operations = [value.op for value in values if isinstance(value, ir.Expr)]
+    names = [value for value in values if isinstance(value, ir.Global | ir.FreeVar)]
+    return operations.count("call") == 1 and set(operations) <= {"call", "cast"} and len(names) <= 1
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -116,14 +215,22 @@ class InnerLowering(KernelLowering):
 
     _name = "inner_lowering"
 
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """The same, for a function that takes its arguments whole."""
+        return InnerLower
+
     def run_pass(self, state: Any) -> bool:
         """Lower the function of `state`."""
         state.flags = state.flags.copy()
         state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
         state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.forwards = state.flags.forceinline and _forwards(state.func_ir)
         super().run_pass(state)
         entry, lowered = _refusal(state.targetctx), state["cr"]
-        state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
+        if hasattr(state.func_id.func, "__apart__") and is_whole(lowered.fndesc):
+            state.library.apart = lowered.fndesc.mangled_name
+        offer(state.targetctx, entry, lowered.fndesc, state.library)
         state.reload_init.extend(state.library._reload_init)
         state["cr"] = lowered._replace(cfunc=entry)
         return True
@@ -141,15 +248,13 @@ class Pipeline(Compiler):
         return [pipeline]
 
     def _compile_core(self) -> CompileResult:
-        _depth.value += 1
-        try:
+        with _nested(), _no_collection():
             result = super()._compile_core()
-        finally:
-            _depth.value -= 1
         if not is_nested():  # those of the inner functions that it holds
             for environment in result._find_referenced_environments():
                 result.library.codegen.set_env(environment.env_name, environment)
-        return result
+        # numba's own form of the function, only to be printed: most of what Python keeps, and slow to put into text
+        return result._replace(type_annotation="")
 
 
 class KernelDispatcher(CPUDispatcher):
@@ -167,5 +272,6 @@ class KernelDispatcher(CPUDispatcher):
         """Offer a version to kernels, and to Python if it is emitted."""
         if isinstance(cres.library, InnerLibrary):
             self.overloads[tuple(cres.signature.args)] = cres
+            offer(self.targetctx, cres.entry_point, cres.fndesc, cres.library)  # also what came from the disk
         else:
             super().add_overload(cres)

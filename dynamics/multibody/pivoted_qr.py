@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import apart, kernel, leaf
 from dynamics.lanes import load, spread, store
 
 BLOCK = 16  # numbers that a vectorised loop takes at once; rows are padded with empty columns to a multiple of it
@@ -59,7 +59,7 @@ def _reflect(b, v, beta, k):
                 store(b, at + 12, load(b, at + 12) - f * w3)
 
 
-@kernel
+@apart
 def factor(matrix, tolerance, most):
     """Factor a matrix (n, m); what is left of a dependent column after elimination is below `tolerance` of its length.
     At most `most` columns are taken as independent."""
@@ -116,7 +116,7 @@ def factor(matrix, tolerance, most):
     return Factor(b, reflection, beta, order, scale, rank)
 
 
-@kernel
+@apart
 def shortest(f, r):
     """The shortest y with B^T y = r on the independent rows: (y of shape (n,), Q^T y, conflict).
 
@@ -176,7 +176,7 @@ def _solve_positive(m, x):
             x[i] -= m[k, i] * x[k]
 
 
-@kernel
+@apart
 def minimum_norm(f, z):
     """The shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
     m = len(f.order)

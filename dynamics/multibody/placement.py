@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynamics.kernel import kernel
+from dynamics.kernel import apart, kernel
 from dynamics.lie import quaternion
 from dynamics.multibody import euler
 from dynamics.vector import IDENTITY, ZERO, apply
@@ -47,7 +47,7 @@ def put(a, i, values):
         a[i, k] = values[k]
 
 
-@kernel
+@apart
 def place(configuration, velocity):
     """Placement of the bodies of a configuration (n, 6 or 7) and velocity (n, 6); theory.md, eqs. (8.1)-(8.3)."""
     n, width = configuration.shape

@@ -7,7 +7,7 @@ generalised coordinate partitioning. Baumgarte's feedback is `augmented.stabilis
 
 import numpy as np
 
-from dynamics.kernel import kernel
+from dynamics.kernel import apart, kernel
 from dynamics.multibody import pivoted_qr
 from dynamics.multibody.augmented import ANY, RANK_TOLERANCE, divide_root_transposed, factor_rows
 from dynamics.multibody.constraints import equations, in_coordinates, velocity_defect
@@ -59,7 +59,7 @@ def _tolerance(e):
     return max(RANK_TOLERANCE, min(10.0 * largest(e.residual), 1e-3))
 
 
-@kernel
+@apart
 def project(a, configuration, velocity, drive, ranks):
     """Nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
 
@@ -102,7 +102,7 @@ def _correction(jacobian, mask, defect, tolerance, most):
     return pivoted_qr.basic(pivoted_qr.factor(reduced, tolerance, most), -defect)
 
 
-@kernel
+@apart
 def partition(a, configuration, velocity, drive, ranks):
     """Generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)): column pivoting of the Jacobian picks the
     dependent coordinates, Newton's iteration corrects those alone; the same for the velocities. `ranks` as above."""

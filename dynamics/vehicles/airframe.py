@@ -5,9 +5,11 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from dynamics.effects._types import principal_moments, steiner
 from dynamics.errors import KeyedError
 from dynamics.validation import fault
 
@@ -17,6 +19,9 @@ Triple = tuple[float, float, float]
 PositiveTriple = tuple[Positive, Positive, Positive]
 
 
+SHORTEST_AXIS = 1e-6  # below which a direction is none
+
+
 class Section(BaseModel):
     """A table of the file: no unknown keys, numbers finite."""
 
@@ -24,15 +29,24 @@ class Section(BaseModel):
 
 
 class Mass(Section):
-    """Mass properties with payload, about the centre of mass and along the body axes."""
+    """Mass properties with payload, about the centre of mass and along the body axes (theory.md, eq. (1.6a)).
+
+    Where the payload has a table of its own, these are the vehicle's without it.
+    """
 
     total: Positive  # [kg]
     payload: NotNegative  # [kg] part of the total
-    inertia: PositiveTriple  # [kg m^2]
+    inertia: PositiveTriple  # [kg m^2] diagonal of the inertia matrix
+    products: Triple = (0.0, 0.0, 0.0)  # [kg m^2] its elements xy, xz and yz, as in URDF; minus the integrals of xy dm
+    centre: Triple = (0.0, 0.0, 0.0)  # [m] centre of mass, from where the positions of the airframe are measured
 
     @model_validator(mode="after")
     def _physical(self) -> "Mass":
-        a, b, c = sorted(self.inertia)
+        a, b, c = principal_moments(self.inertia, self.products)
+        if a <= 0.0:
+            raise KeyedError(
+                "products", f"got {list(self.products)}", "smaller ones: a principal moment is not above 0"
+            )
         if a + b < c:
             raise KeyedError(
                 "inertia", f"got {list(self.inertia)}", "none above the sum of the others (triangle inequality)"
@@ -41,12 +55,33 @@ class Mass(Section):
             raise KeyedError("payload", f"got {self.payload:g}", f"less than total = {self.total:g} kg")
         return self
 
+    @property
+    def matrix(self) -> np.ndarray:
+        """Inertia [kg m^2] about the centre of mass, shape (3, 3)."""
+        xy, xz, yz = self.products
+        return np.diag(self.inertia) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+
+
+class CarriedBox(Section):
+    """A payload with a place: a uniform box, beside the mass properties of the vehicle without it."""
+
+    mass: Positive  # [kg]
+    position: Triple  # [m] of its centre, body
+    size: PositiveTriple  # [m] along body x, y, z
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """[kg m^2] about its centre, shape (3, 3)."""
+        square = np.square(self.size)
+        return self.mass / 12.0 * np.diag(square.sum() - square)
+
 
 class RotorPlacement(Section):
     """Where the rotors are and which way they turn."""
 
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
     spin_direction: tuple[Literal["cw", "ccw"], ...]  # of each rotor seen from above: clockwise or counter-clockwise
+    axis: tuple[Triple, ...] = ()  # direction of each rotor's thrust in the body, of any length; body z if left out
     inertia: Positive  # [kg m^2] of one rotor about its axis
     mass: Positive | None = None  # [kg] of one rotor, part of the total; for models that give it a body of its own
     blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
@@ -58,10 +93,29 @@ class RotorPlacement(Section):
             raise KeyedError("spin_direction", f"got {len(self.spin_direction)} of them", expected)
         return self
 
+    @model_validator(mode="after")
+    def _upward(self) -> "RotorPlacement":
+        if len(self.axis) not in (0, len(self.position)):
+            expected = f"a direction for each of the {len(self.position)} rotors"
+            raise KeyedError("axis", f"got {len(self.axis)} of them", expected)
+        for k, (x, y, z) in enumerate(self.axis):
+            if math.hypot(x, y, z) < SHORTEST_AXIS or z <= 0.0:
+                expected = "a direction that points up, with z above 0: rotors push upwards"
+                raise KeyedError(f"axis.{k}", f"got {[x, y, z]}", expected)
+        return self
+
     @property
     def reaction_sign(self) -> tuple[float, ...]:
-        """Sign of each rotor's reaction torque on the body about z, opposite to the rotor's own turning."""
+        """Sign of each rotor's reaction torque on the body about its axis, opposite to the rotor's own turning."""
         return tuple(1.0 if spin == "cw" else -1.0 for spin in self.spin_direction)
+
+    @property
+    def tilted_axis(self) -> tuple[Triple, ...]:
+        """Unit vector in the body along which each rotor pushes; () where that is body z for all of them."""
+        if not any(x or y for x, y, _ in self.axis):
+            return ()
+        lengths = (math.hypot(*axis) for axis in self.axis)
+        return tuple((x / n, y / n, z / n) for (x, y, z), n in zip(self.axis, lengths, strict=True))
 
 
 class Propeller(Section):
@@ -90,6 +144,22 @@ class Motor(Section):
     time_constant: Annotated[float, Ge(1e-6)]  # [s] of rotor speed after a step of voltage
     max_voltage: Positive  # [V] that the controller can ask for
     esc_current: Positive  # [A] limit of the speed controller
+    esc_resistance: NotNegative = 0.0  # [ohm] of the speed controller and its leads
+    esc_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # power of the motor and resistances over that of the battery
+    peak_current: Positive | None = None  # [A] of the motor, which the controller keeps; none if left out
+    peak_power: Positive | None = None  # [W] taken by the motor, which the controller keeps; none if left out
+    belt_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # torque that reaches the rotor over that of belt and motor
+    inertia: NotNegative = 0.0  # [kg m^2] of the motor's own rotor about its axis
+
+    @property
+    def current_limit(self) -> float:
+        """[A] that neither controller nor motor exceeds."""
+        return min(self.esc_current, self.peak_current or math.inf)
+
+    @property
+    def power_limit(self) -> float:
+        """[W] that the motor takes at the most."""
+        return self.peak_power or math.inf
 
     @property
     def rotor_constant(self) -> float:
@@ -104,6 +174,11 @@ class Battery(Section):
     capacity: Positive  # [A s]
     c_rating: Positive  # [1/h] maximum current over capacity in A h
     cell_resistance: NotNegative  # [ohm] of one cell
+
+    @property
+    def current_limit(self) -> float:
+        """[A] that its C rating allows."""
+        return self.c_rating * self.capacity / 3600.0
 
 
 class Contact(Section):
@@ -141,6 +216,7 @@ class Published(Section):
 class Airframe(Section):
     """A multirotor; the parts that it does not have are None, and so are closed to the effects that need them."""
 
+    mesh: str | None = None  # an STL or OBJ file beside this one, in metres and its axes: how the vehicle is shown
     mass: Mass
     rotors: RotorPlacement
     motor: Motor
@@ -148,7 +224,60 @@ class Airframe(Section):
     battery: Battery | None = None
     contact: Contact | None = None
     drag: Drag | None = None
+    payload: CarriedBox | None = None
     published: Published | None = None
+
+    @model_validator(mode="after")
+    def _one_payload(self) -> "Airframe":
+        if self.payload and self.mass.payload:
+            message = f"got {self.mass.payload:g} beside a table [payload], of which [mass] has nothing"
+            raise KeyedError("mass.payload", message, "0")
+        return self
+
+    @property
+    def motor_current_limit(self) -> float:
+        """[A] of one motor: what its controller keeps, or its share of what the battery's C rating allows."""
+        pack = self.battery.current_limit if self.battery else math.inf
+        return min(self.motor.current_limit, pack / len(self.rotors.position))
+
+    @property
+    def loaded(self) -> "Airframe":
+        """The same with the box of [payload] as a part of its mass (theory.md, eq. (2.41))."""
+        box, own = self.payload, self.mass
+        if box is None or own.payload:
+            return self
+        total = own.total + box.mass
+        centre = (own.total * np.array(own.centre) + box.mass * np.array(box.position)) / total
+        inertia = own.matrix + steiner(own.total, own.centre - centre)
+        inertia += box.inertia + steiner(box.mass, box.position - centre)
+        joint = own.model_copy(
+            update={
+                "total": total,
+                "payload": box.mass,
+                "inertia": tuple(np.diag(inertia).tolist()),
+                "products": (float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
+                "centre": tuple(centre.tolist()),
+            }
+        )
+        return self.model_copy(update={"mass": joint})
+
+    @property
+    def about_centre(self) -> "Airframe":
+        """The same with every position measured from the centre of mass."""
+        if not any(self.mass.centre):
+            return self
+        x, y, z = self.mass.centre
+
+        def moved(places: tuple[Triple, ...]) -> tuple[Triple, ...]:
+            return tuple((a - x, b - y, c - z) for a, b, c in places)
+
+        mass = self.mass.model_copy(update={"centre": (0.0, 0.0, 0.0)})
+        rotors = self.rotors.model_copy(update={"position": moved(self.rotors.position)})
+        contact = self.contact and self.contact.model_copy(
+            update={"feet": moved(self.contact.feet), "hull": moved(self.contact.hull)}
+        )
+        payload = self.payload and self.payload.model_copy(update={"position": moved((self.payload.position,))[0]})
+        return self.model_copy(update={"mass": mass, "rotors": rotors, "contact": contact, "payload": payload})
 
 
 def load_airframe(path: str | Path) -> Airframe:

@@ -30,6 +30,12 @@ class GyrostatParameters(NamedTuple):
     rate_gain: float  # [N m s] of that control
     target: Quaternion  # attitude to reach
 
+    @property
+    def torque_without_rate(self) -> bool:
+        """Whether rotors, friction and feedback leave a torque of time and attitude only."""
+        of_rate = (*self.rotor_momentum, self.damping, *self.linear_gain, *self.cubic_gain, self.rate_gain)
+        return not any(of_rate)
+
 
 @leaf
 def rotor_momentum(p, t):

@@ -10,18 +10,36 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from dynamics.effects import _hooks as hooks
+from dynamics.effects._axes import thrust_wrench
 from dynamics.effects._rotors import total
-from dynamics.effects._types import Air, Factors, Loads, MassProperties, Motion, PerRotor, Rotors, Situation, body_of
+from dynamics.effects._types import (
+    Air,
+    AnyMassProperties,
+    Factors,
+    Loads,
+    Motion,
+    PerRotor,
+    Rotors,
+    Situation,
+    body_of,
+    offset_body,
+)
 from dynamics.generate import each, implements
+from dynamics.integrators import SHORTEST, shorter
 from dynamics.kernel import ByClass, kernel, leaf
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotation_matrix
-from dynamics.vector import ZERO, Vec3, scale
+from dynamics.tree import apart, finite
+from dynamics.vector import ZERO, Vec3
+from dynamics.vehicles.newton_euler import newton_euler
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from dynamics.vehicles.airframe import Airframe
 
 FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
+CONTACT_TOLERANCE = 1e-5  # error of a part of a step in contact where nobody says otherwise
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
 
@@ -31,7 +49,7 @@ class RotorLayout(NamedTuple):
     x_body: PerRotor  # [m]
     y_body: PerRotor  # [m]
     z_body: PerRotor  # [m]
-    reaction_sign: PerRotor  # sign of the torque on the body about z
+    reaction_sign: PerRotor  # sign of the torque on the body about the rotor's axis
     inertia: float  # [kg m^2] of one rotor about its axis
     volt_per_speed: float  # [V s/rad] at the rotor = [N m/A]: motor constant over belt ratio
     speed_per_volt: float  # [rad/(s V)]
@@ -39,14 +57,16 @@ class RotorLayout(NamedTuple):
     max_voltage: float  # [V]
     no_load_current: float  # [A]
     bodies: Any = ()  # what a form with several bodies needs to know of them
+    axis: tuple[Vec3, ...] = ()  # unit vector of each rotor in the body, along which it pushes; () where that is body z
 
 
 class MultirotorParameters(NamedTuple):
     """A vehicle in a scene."""
 
-    body: MassProperties
+    body: AnyMassProperties
     layout: RotorLayout
     effects: tuple  # parameter NamedTuples of the active effects, sorted by name
+    tolerance: float  # error of a part of a step while the vehicle is in contact, relative to 1 + size
 
 
 class MultirotorState(NamedTuple):
@@ -72,7 +92,7 @@ class MultirotorDrive(NamedTuple):
     """What the rate of change depends on and stays fixed over a step."""
 
     parameters: MultirotorParameters
-    body: MassProperties
+    body: AnyMassProperties
     memory: tuple
     voltage: PerRotor  # [V]
 
@@ -80,19 +100,19 @@ class MultirotorDrive(NamedTuple):
 class MultirotorObservation(NamedTuple):
     """What can be said about a state beyond the state itself."""
 
-    acceleration_world: Vec3  # [m/s^2] of the centre of mass
+    acceleration_world: Vec3  # [m/s^2] of the motion's position
     angular_acceleration_body: Vec3  # [rad/s^2]
     thrust: PerRotor  # [N]
     torque: PerRotor  # [N m] of the air against each rotor
     rotor_acceleration: PerRotor  # [rad/s^2]
     motor_voltage: PerRotor  # [V]
     motor_current: PerRotor  # [A]
-    motor_power: PerRotor  # [W] taken by each motor
+    motor_power: PerRotor  # [W] taken by each motor and its controller
     air_density: float  # [kg/m^3]
     wind_world: Vec3  # [m/s] of the air and of winds that are forces only
     mass: float  # [kg]
     in_contact: bool
-    battery: tuple[float, float, float]  # charge (fraction, NaN where no effect counts it), voltage [V], current [A]
+    battery: tuple[float, float, float, float]  # charge, voltage [V], current [A], temperature [K]; NaN: not modelled
 
 
 @leaf
@@ -124,47 +144,31 @@ def evaluate(drive, t, motion):
     body = drive.body
     R_world_body = rotation_matrix(motion.attitude)
     still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
-    s = Situation(t, motion, R_world_body, body, layout, still)
-    s = Situation(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still))
+    s = Situation(t, motion, R_world_body, body, layout, still, ZERO)
+    air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
+    s = Situation(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
     # adding to -0.0 changes no number, so the compiler drops it
     one, zero = each(_constant, 1.0, speed, speed), each(_constant, -0.0, speed, speed)
     factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
     voltage = hooks.all_supply(p.effects, memory, drive.voltage)
-    lag = (each(_lag, s, speed, voltage), each(_static_current, s, loads.torque, voltage))
-    acceleration, current = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
-    rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage)
-    torque = (
-        total(each(_product, 0.0, layout.y_body, loads.thrust)),
-        -total(each(_product, 0.0, layout.x_body, loads.thrust)),
-        total(each(_product, 0.0, layout.reaction_sign, loads.torque)),
-    )
+    current = each(_static_current, s, loads.torque, voltage)
+    lag = (each(_lag, s, speed, voltage), current, each(_product, 0.0, voltage, current))
+    acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
+    rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
+    thrust, torque = thrust_wrench(layout, loads)
     torque = hooks.all_torques(p.effects, memory, s, rotors, torque)
-    force, torque = hooks.all_body_wrenches(p.effects, memory, s, rotors, total(loads.thrust), torque)
+    force, torque = hooks.all_body_wrenches(p.effects, memory, s, rotors, thrust, torque)
     force, torque = hooks.all_wrenches(p.effects, memory, s, rotors, force, torque)
     return s, rotors, force, torque
-
-
-@leaf
-def _angular_acceleration(body, omega, torque):
-    """Euler's equations along principal axes."""
-    gyration, inverse = body.gyration, body.inverse_inertia
-    return (
-        gyration[0] * (omega[1] * omega[2]) + inverse[0] * torque[0],
-        gyration[1] * (omega[2] * omega[0]) + inverse[1] * torque[1],
-        gyration[2] * (omega[0] * omega[1]) + inverse[2] * torque[2],
-    )
 
 
 @leaf
 def rate(drive, t, motion):
     """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
     s, rotors, force, torque = evaluate(drive, t, motion)
-    omega = motion.omega_body
-    acceleration = scale(s.body.inverse_mass, force)
-    return Motion(
-        motion.velocity_world, omega, acceleration, _angular_acceleration(s.body, omega, torque), rotors.acceleration
-    )
+    linear, angular = newton_euler(s.body, drive, s, force, torque)
+    return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)
 
 
 @leaf
@@ -176,7 +180,7 @@ def _itself(_, motion):
 def accelerations(drive, t, motion):
     """(linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
     s, _, force, torque = evaluate(drive, t, motion)
-    return scale(s.body.inverse_mass, force), _angular_acceleration(s.body, motion.omega_body, torque)
+    return newton_euler(s.body, drive, s, force, torque)
 
 
 FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
@@ -226,18 +230,86 @@ def _airborne(p, body, memory, voltage):
     """The drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
     kept = hooks.without_sleepers(p.effects, memory)
-    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects), body, kept, voltage)
+    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, kept, voltage)
 
 
 @kernel
 def _awake_step(method, drive, t, x, h):
-    """(state's form, memory) a step later with every effect taking part, in as many parts as they ask for."""
+    """(state's form, memory) a step later with every effect taking part."""
+    x = _step(method, drive, t, x, h)
+    return x, hooks.all_settled(drive.parameters.effects, drive.memory, seen(drive.parameters.layout, x), h)
+
+
+@kernel
+def _stiff_steps(method, drive, t, x, h, end):
+    """(state's form, memory) at the time `end`, by parts of steps whose error is controlled (theory.md, eq. (2.33)).
+
+    Each part is taken whole and in halves, effects' memories included: what they differ by is its error. Halves are
+    kept, and are no longer than h and than effects ask for.
+    """
     p, body, memory, voltage = drive
-    parts = hooks.all_substeps(p.effects, memory, seen(p.layout, x), h)
-    part = h / parts
-    for j in range(parts):
-        x = _step(method, MultirotorDrive(p, body, memory, voltage), t + j * part, x, part)
-        memory = hooks.all_settled(p.effects, memory, seen(p.layout, x), part)
+    allowed, part = p.tolerance, 2.0 * h
+    smallest = SHORTEST * allowed
+    while True:
+        left = end - t
+        drive = MultirotorDrive(p, body, memory, voltage)
+        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, seen(p.layout, x), h))
+        last = part > (1.0 - 1e-9) * left
+        taken = left if last else part
+        half = 0.5 * taken
+        whole, at_once = _awake_step(method, drive, t, x, taken)
+        y, settled = _awake_step(method, drive, t, x, half)
+        y, settled = _awake_step(method, MultirotorDrive(p, body, settled, voltage), t + half, y, half)
+        sound = finite(y)
+        error = max(apart(y, whole), apart(settled, at_once)) if sound else math.inf
+        if taken > smallest and (error > allowed or hooks.all_events(p.effects, memory, settled)):
+            part = shorter(taken, error, allowed)
+            continue
+        x, memory = y, settled
+        if last or not sound:
+            return x, memory
+        t += taken
+        if error < allowed / 32.0:
+            part = 2.0 * taken
+
+
+@leaf
+def begin(p, key, tick, state, command, interval):
+    """The drive of the exchange interval `tick`, with what effects draw for it; arguments as of `advance`."""
+    layout, memory = p.layout, state.memory
+    voltage = each(_within, layout.max_voltage, command, command)
+    before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
+    s, rotors, _, _ = evaluate(before, tick * interval, seen(layout, state.motion))
+    memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
+    return MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
+
+
+@leaf
+def parts(layout, h):
+    """How many parts a step of h [s] is split into for the motors' lag."""
+    return max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
+
+
+@leaf
+def airborne_step(method, drive, t, x, h):
+    """The state's form a step later, without the effects that can sleep."""
+    return _step(method, _airborne(drive.parameters, drive.body, drive.memory, drive.voltage), t, x, h)
+
+
+@leaf
+def steps(method, drive, x, start, end, h, first, n):
+    """(state's form, memory) at the `end` [s] of an interval that begins at `start`, from step `first` of its n on."""
+    p, body, memory, voltage = drive
+    layout, airborne = p.layout, _airborne(p, body, memory, voltage)
+    for i in range(first, n):
+        if hooks.all_asleep(p.effects, memory, seen(layout, x), h):
+            x = _step(method, airborne, start + i * h, x, h)
+            continue
+        drive = MultirotorDrive(p, body, memory, voltage)
+        if not hooks.all_calm(p.effects, memory, seen(layout, x), h):
+            x, memory = _stiff_steps(method, drive, start + i * h, x, h, end)
+            break
+        x, memory = _awake_step(method, drive, start + i * h, x, h)
     return x, memory
 
 
@@ -257,23 +329,11 @@ def advance(method, p, key, tick, state, command, h, n):
         h: [s] step.
         n: steps in the interval.
     """
-    layout = p.layout
-    voltage = each(_within, layout.max_voltage, command, command)
-    x, memory = state
     interval = n * h
     start = tick * interval
-    before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
-    s, rotors, _, _ = evaluate(before, start, seen(layout, x))
-    memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
-    body = hooks.all_body(p.effects, memory, p.body)
-    airborne = _airborne(p, body, memory, voltage)
-    split = max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
-    h, n = h / split, n * split
-    for i in range(n):
-        if hooks.all_asleep(p.effects, memory, seen(layout, x), h):
-            x = _step(method, airborne, start + i * h, x, h)
-        else:
-            x, memory = _awake_step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+    drive = begin(p, key, tick, state, command, interval)
+    split = parts(p.layout, h)
+    x, memory = steps(method, drive, state.motion, start, start + interval, h / split, 0, n * split)
     return MultirotorState(x, memory)
 
 
@@ -294,12 +354,12 @@ def observe(p, tick, interval, state, command):
         rotors.acceleration,
         rotors.voltage,
         rotors.current,
-        each(_product, 0.0, rotors.voltage, rotors.current),
+        rotors.power,
         s.air.density,
         hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
-        hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current))),
+        hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current), math.nan)),
     )
 
 
@@ -310,9 +370,13 @@ def parameters(airframe: "Airframe", effects: tuple = ()) -> MultirotorParameter
     layout = RotorLayout(
         x_body, y_body, z_body, rotors.reaction_sign, rotors.inertia,
         engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
-        engine.max_voltage, engine.no_load_current,
+        engine.max_voltage, engine.no_load_current, axis=rotors.tilted_axis,
     )  # fmt: skip
-    return MultirotorParameters(body_of(mass.total, mass.inertia), layout, effects)
+    if airframe.payload:  # of the class of the mass properties once it is released, which has more numbers
+        body: AnyMassProperties = offset_body(mass.total, mass.matrix, np.zeros(3))
+    else:
+        body = body_of(mass.total, mass.inertia, mass.products)
+    return MultirotorParameters(body, layout, effects, CONTACT_TOLERANCE)
 
 
 def initial_state(

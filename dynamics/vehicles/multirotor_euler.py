@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import apart, kernel, leaf
 from dynamics.lie import quaternion
 from dynamics.multibody import euler, hold, stabilisation
 from dynamics.multibody.augmented import RANK_TOLERANCE, solve
@@ -155,13 +155,13 @@ def _stopped(b):
     return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
 
 
-@kernel
+@apart
 def seen(layout, x):
     """The Motion of the chassis with the speeds of the rotors."""
     return on_se3.seen(layout, five(x))
 
 
-@kernel
+@apart
 def rate(drive, t, x):
     """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
     if not _all_upright(x):
@@ -176,7 +176,7 @@ def rate(drive, t, x):
     return _tree(v, s.acceleration)
 
 
-@kernel
+@apart
 def struck(drive, x):
     """As `multirotor_multibody.struck`."""
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
@@ -186,7 +186,7 @@ def struck(drive, x):
     return _tree(q, v)
 
 
-@kernel
+@apart
 def held(drive, x):
     """The bodies brought together again, as the assembly says."""
     given = drive.parameters.layout.bodies

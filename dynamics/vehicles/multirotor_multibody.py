@@ -17,7 +17,7 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate_back
 from dynamics.multibody import five_bodies, hold
 from dynamics.multibody.delivery_drone import Drone
 from dynamics.multibody.five_bodies import NO_WRENCH, BodyState, FiveBodies, Machine, Rotor, Wrench
-from dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
+from dynamics.vector import ZERO, Vec3, add, cross, pair, scale, subtract
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
 
@@ -80,11 +80,6 @@ def _triple(accelerations, load, k):
 
 
 @leaf
-def _pair(_, a, b):
-    return a, b
-
-
-@leaf
 def acting(drive, t, motion):
     """(situation, Acting): the effects of `multirotor.evaluate`, taken apart by body."""
     s, rotors, force, torque = evaluate(drive, t, motion)
@@ -96,7 +91,7 @@ def acting(drive, t, motion):
         -total(each(_product, 0.0, layout.x_body, rotors.thrust)),
         total(each(_product, 0.0, layout.reaction_sign, rotors.torque)),
     )
-    loads = each(_pair, 0.0, rotors.thrust, rotors.torque)
+    loads = each(pair, 0.0, rotors.thrust, rotors.torque)
     parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
     return s, Acting(field, subtract(force, known), subtract(torque, arms), parts)
 
@@ -221,11 +216,17 @@ def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
     """The five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
 
     Raises:
-        ValueError: "key: message"; not four rotors, or nothing said of a single one.
+        ValueError: "key: message"; not four rotors, nothing said of a single one, tilted ones, or products of inertia.
     """
     rotors = airframe.rotors
     if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
         raise ValueError("rotors: the five bodies need four rotors with mass and blade_inertia")
+    if airframe.payload:
+        raise ValueError("payload: the five bodies have no place for one; leave the table out")
+    if rotors.tilted_axis:
+        raise ValueError("rotors.axis: the five bodies need rotors that push along body z")
+    if any(airframe.mass.products):
+        raise ValueError("mass.products: the five bodies need principal axes, and products of 0")
     spins = 1.0 if drive == "torque" else 0.0
     mass = airframe.mass.total - 4.0 * rotors.mass
     blade = (*rotors.blade_inertia, rotors.inertia)

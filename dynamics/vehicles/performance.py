@@ -1,7 +1,8 @@
 """What a multirotor can do in steady flight, from the same models that the plant integrates.
 
-Steady level flight balances weight, fuselage drag (theory.md, eq. (2.7)) and the thrust of equal rotors in the air that
-comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque (theory.md, section 1.4).
+Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)) and the thrust of
+equal rotors in the air that comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque
+(theory.md, section 1.4). Of rotors that are tilted the sum of their thrusts counts, and the mean air along their axes.
 """
 
 import math
@@ -9,13 +10,16 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq, minimize_scalar
 
-from dynamics.effects.air_density import EXPONENT, KELVIN, LAPSE_RATE, SEA_LEVEL_DENSITY
+from dynamics import atmosphere
+from dynamics.atmosphere import Atmosphere
+from dynamics.environment import STANDARD
 from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+from dynamics.vehicles.propeller import drag_coefficients, h_force_coefficient, thrust_coefficient, torque_coefficient
 
 GRAVITY = 9.80665  # [m/s^2]
 DENSITY = 1.225  # [kg/m^3]
 CELL_VOLTAGE = 3.7  # [V] nominal
+ITERATIONS = 100  # of the rotor speed; each takes off a tenth and more of what is left
 
 
 class Trim(NamedTuple):
@@ -37,6 +41,7 @@ class Rotor(NamedTuple):
     with_density: bool = True
     pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
     parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
+    drag: float = 0.0  # [m^3/rad] across the axis, over density, rotor speed and velocity
 
     def constants(self, density: float) -> tuple[float, float]:
         """Thrust and torque over the square of the speed at a density [kg/m^3]."""
@@ -58,7 +63,14 @@ def rotor_of(airframe: Airframe) -> Rotor:
         torque_coefficient(propeller) * propeller.diameter**5 / square,
         pitch=propeller.pitch,
         parts=drag_coefficients(propeller),
+        drag=h_force_coefficient(propeller),
     )
+
+
+def _lift(airframe: Airframe) -> float:
+    """Force of all rotors over the thrust of one: their number, less where they push past one another."""
+    axes = airframe.rotors.tilted_axis
+    return math.hypot(*map(sum, zip(*axes, strict=True))) if axes else len(airframe.rotors.position)
 
 
 def trim(
@@ -80,38 +92,55 @@ def trim(
     ahead, _, below = airframe.drag.area if airframe.drag else (0.0, 0.0, 0.0)
     pressure = 0.5 * density * speed * speed
 
-    def forces(tilt: float) -> tuple[float, float]:
-        """What the rotors must push forward and up."""
-        c, s = math.cos(tilt), math.sin(tilt)
-        return pressure * (ahead * c * c + below * s * s), weight + pressure * (below - ahead) * s * c
-
-    tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
-    thrust = math.hypot(*forces(tilt)) / count
     k_thrust, k_torque = rotor.constants(density)
+    lift = _lift(airframe)
+    omega = math.sqrt(weight / (lift * k_thrust))
+    for _ in range(ITERATIONS):  # the rotors' drag goes with their speed
+        before, across = omega, pressure * ahead + count * density * rotor.drag * omega * speed
+
+        def forces(tilt: float, across: float = across) -> tuple[float, float]:
+            """What the thrust must push forward and up."""
+            c, s = math.cos(tilt), math.sin(tilt)
+            return across * c * c + pressure * below * s * s, weight + (pressure * below - across) * s * c
+
+        tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
+        thrust = math.hypot(*forces(tilt)) / lift
+        w = 2.0 * math.pi * speed * math.sin(tilt) * (lift / count) / rotor.pitch
+        omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
+        if abs(omega - before) < 1e-12 * omega:
+            break
     profile, induced = rotor.parts
-    w = 2.0 * math.pi * speed * math.sin(tilt) / rotor.pitch
-    omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
     torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
     motor = airframe.motor
-    current = torque / motor.rotor_constant + motor.no_load_current
-    voltage = motor.rotor_constant * omega + motor.resistance * current
-    return Trim(tilt, thrust, omega, voltage, current, count * voltage * current)
+    current = torque / (motor.belt_efficiency * motor.rotor_constant) + motor.no_load_current
+    voltage = motor.rotor_constant * omega + (motor.resistance + motor.esc_resistance) * current
+    return Trim(tilt, thrust, omega, voltage, current, count * voltage * current / motor.esc_efficiency)
 
 
 def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Of all rotors at rest in the air [N], at the maximum voltage, or at the maximum current if that comes first."""
+    """Of all rotors at rest in the air [N], at the highest voltage, current or power, whichever comes first."""
     k_thrust, k_torque = (rotor or rotor_of(airframe)).constants(density)
     motor = airframe.motor
-    constant, resistance = motor.rotor_constant, motor.resistance
+    constant, resistance = motor.rotor_constant, motor.resistance + motor.esc_resistance
 
     def excess(omega: float) -> float:
-        return (
-            constant * omega + resistance * (k_torque * omega**2 / constant + motor.no_load_current) - motor.max_voltage
+        """The largest of what voltage, current and power are above their limits, in parts of these."""
+        current = k_torque * omega**2 / (motor.belt_efficiency * constant) + motor.no_load_current
+        voltage = constant * omega + resistance * current
+        used = (
+            voltage / motor.max_voltage,
+            current / airframe.motor_current_limit,
+            voltage * current / motor.power_limit,
         )
+        return max(used) - 1.0
 
-    by_voltage = brentq(excess, 0.0, motor.max_voltage / constant)
-    by_current = math.sqrt((motor.esc_current - motor.no_load_current) * constant / k_torque)
-    return len(airframe.rotors.position) * k_thrust * min(by_voltage, by_current) ** 2
+    highest = brentq(excess, 0.0, motor.max_voltage / constant)
+    return _lift(airframe) * k_thrust * highest**2
+
+
+def thrust_over_weight(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Of the loaded vehicle at rest in the air; the voltage that the motors' resistance takes is counted."""
+    return maximum_thrust(airframe, density, rotor) / (airframe.mass.total * GRAVITY)
 
 
 def battery_energy(airframe: Airframe) -> float:
@@ -136,19 +165,18 @@ def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | No
     return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
 
 
-def ceiling(airframe: Airframe, temperature: float = 15.0, rotor: Rotor | None = None) -> float:
-    """Altitude [m] at which the maximum thrust is the weight, by the density law of theory.md, eq. (2.3).
+def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Rotor | None = None) -> float:
+    """Altitude [m] at which the maximum thrust is the weight (theory.md, eq. (2.3)).
 
     Raises:
         ValueError: the thrust does not depend on the density.
     """
     if rotor is not None and not rotor.with_density:
         raise ValueError("[effects.rotor_quadratic] knows no density of the air")
-    kelvin, weight = KELVIN + temperature, airframe.mass.total * GRAVITY
+    weight = airframe.mass.total * GRAVITY
 
     def excess(altitude: float) -> float:
-        density = SEA_LEVEL_DENSITY * KELVIN / kelvin * (1.0 - LAPSE_RATE * altitude / kelvin) ** EXPONENT
-        return maximum_thrust(airframe, density, rotor) - weight
+        return maximum_thrust(airframe, atmosphere.density(air, altitude), rotor) - weight
 
     return brentq(excess, 0.0, 30_000.0) if excess(0.0) > 0.0 else 0.0
 

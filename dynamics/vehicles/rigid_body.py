@@ -20,6 +20,11 @@ class FreeBodyParameters(NamedTuple):
 
     inertia: Vec3  # [kg m^2] principal moments
 
+    @property
+    def torque_without_rate(self) -> bool:
+        """There is none."""
+        return True
+
 
 @leaf
 def rate(p, t, x):

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from dynamics.effects import _ground
-from dynamics.effects._contact_parameters import FREE, STICKING, GroundContact, GroundContactSmooth
-from dynamics.effects._ground import Ground
+from dynamics.effects._contact_parameters import NOWHERE, STICKING, GroundContact, GroundContactSmooth
 from dynamics.kernel import uncompiled
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from dynamics.terrain import LEVEL, Level, Relief, surface
 from dynamics.vector import Mat3, Vec3
 from dynamics.vector import apply as compiled_apply
 from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState
@@ -22,38 +21,40 @@ ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three
 CONVERGED = 1e-12  # change of the slope between two iterations
 BALANCED, TOLERATED = 1e-12, 1e-8  # force that is not balanced, over the weight: sought, and found at least
 NUDGE = 1e-8  # [m] for slopes of the forces
-LEVEL = (0.0, 0.0)
+NO_SLOPE = (0.0, 0.0)
 
 Pose = tuple[Vec3, Quaternion]  # position of the centre of mass [m] in the world, attitude
+Place = tuple[float, float]  # world x and y [m]
 
 # thousands of calls, each cheaper than handing its arguments to machine code
-apply, surface = uncompiled(compiled_apply), uncompiled(_ground.surface)
+apply = uncompiled(compiled_apply)
 from_matrix, rotation_matrix = uncompiled(quaternion.from_matrix), uncompiled(quaternion.rotation_matrix)
 
 
-def standing_pose(feet: Sequence[Vec3], ground: Ground | None) -> Pose:
-    """Where a vehicle stands whose centre of mass is over the world's origin, heading along world x.
+def standing_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: Place = (0.0, 0.0)) -> Pose:
+    """Where a vehicle stands whose centre of mass is over a place, heading along world x.
 
     It is tilted so that three feet around its centre of mass touch without pressing and no other is below the ground;
     equal feet on a plane all touch. Where there are no such three, it is not tilted, and will fall over.
 
     Args:
         feet: points that may touch [m], body coordinates.
-        ground: None for level ground at height 0.
+        terrain: the ground.
+        place: world x and y of the centre of mass [m]; the origin is home.
     """
+    x0, y0 = place
     if not feet:
-        return (0.0, 0.0, 0.0), NO_ROTATION
-    ground = ground or Ground(LEVEL, 0.0, 0.0, (0.0, 0.0, 1.0))
-    slope = LEVEL
+        return (x0, y0, 0.0), NO_ROTATION
+    slope = NO_SLOPE
     for _ in range(ITERATIONS):
         R_world_body = _aligned(slope)
         arms = [apply(R_world_body, foot) for foot in feet]
-        lifts = [surface(ground, x, y)[0] - z for x, y, z in arms]  # [m] of the vehicle, at which that foot touches
-        change = _carrying([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or LEVEL
+        lifts = [surface(terrain, x0 + x, y0 + y)[0] - z for x, y, z in arms]  # [m] at which that foot touches
+        change = _carrying([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or NO_SLOPE
         if math.hypot(*change) < CONVERGED:
             break
         slope = (slope[0] + change[0], slope[1] + change[1])
-    return (0.0, 0.0, max(lifts)), NO_ROTATION if slope == LEVEL else from_matrix(R_world_body)
+    return (x0, y0, max(lifts)), NO_ROTATION if slope == NO_SLOPE else from_matrix(R_world_body)
 
 
 def at_rest(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
@@ -83,29 +84,30 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
     R = rotation_matrix(attitude)
     x = np.array([position[2], R[6] / R[0], R[7] / R[4] - R[6] * R[1] / (R[0] * R[4])])  # height, slopes of the body
     x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring beyond its onset
-    residual = _springs(e, weight, x)
+    place = position[:2]
+    residual = _springs(e, weight, x, place)
     for _ in range(ITERATIONS):
         if np.linalg.norm(residual) < BALANCED * weight:
             break
-        growth = np.array([_springs(e, weight, x + change) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
+        growth = np.array([_springs(e, weight, x + change, place) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
         try:
             step = np.linalg.solve(growth, -residual)
         except np.linalg.LinAlgError:  # fewer than three feet press
             return position, attitude
         shares = 0.5 ** np.arange(20.0)
         trials = (x + share * step for share in shares)
-        nearer = (t for t in trials if np.linalg.norm(_springs(e, weight, t)) < np.linalg.norm(residual))
+        nearer = (t for t in trials if np.linalg.norm(_springs(e, weight, t, place)) < np.linalg.norm(residual))
         if (better := next(nearer, None)) is None:
             break  # as near as numbers allow
-        x, residual = better, _springs(e, weight, better)
+        x, residual = better, _springs(e, weight, better, place)
     if not np.linalg.norm(residual) < TOLERATED * weight:
         return position, attitude
     slope = (float(x[1]), float(x[2]))
     level = NO_ROTATION if attitude == NO_ROTATION and math.hypot(*slope) < CONVERGED else None
-    return (0.0, 0.0, float(x[0])), level or from_matrix(_aligned(slope))
+    return (*place, float(x[0])), level or from_matrix(_aligned(slope))
 
 
-def _springs(e: Any, weight: float, x: np.ndarray) -> np.ndarray:
+def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
     """Vertical force [N] of the feet less the weight, and its moments about the centre of mass [N m].
 
     `x`: height [m] and slopes of the vehicle. A foot that friction holds pushes straight up.
@@ -114,16 +116,16 @@ def _springs(e: Any, weight: float, x: np.ndarray) -> np.ndarray:
     found = np.array([-weight, 0.0, 0.0])
     for foot in e.feet:
         arm = apply(R_world_body, foot)
-        depth, normal = _depth(e, arm, float(x[0]))
+        depth, normal = _depth(e, arm, (*place, float(x[0])))
         if depth > 0.0:
             found += _press(e, depth) / normal[2] * np.array([1.0, arm[0], arm[1]])
     return found
 
 
-def _depth(e: Any, arm: Vec3, height: float) -> tuple[float, Vec3]:
+def _depth(e: Any, arm: Vec3, centre: Vec3) -> tuple[float, Vec3]:
     """(how deep a foot is in the ground [m], the ground's normal), as in `dynamics.effects._feet`."""
-    ground, _, normal = surface(e.ground, arm[0], arm[1])
-    return (ground - (height + arm[2])) * normal[2], normal
+    ground, normal = surface(e.terrain, centre[0] + arm[0], centre[1] + arm[1])
+    return (ground - (centre[2] + arm[2])) * normal[2], normal
 
 
 def _press(e: Any, depth: float) -> float:
@@ -139,15 +141,15 @@ def _anchors(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Any, ...] | 
     found = []
     for foot in e.feet:
         arm = apply(rotation_matrix(attitude), foot)
-        depth, (nx, ny, nz) = _depth(e, arm, position[2])
+        depth, (nx, ny, nz) = _depth(e, arm, position)
         if depth <= 0.0:
-            found.append((0.0, 0.0, FREE, 0.0))
+            found.append(NOWHERE)
             continue
         if math.hypot(nx, ny) > e.static * nz:
             return None
         # straight up is: press along the normal, and across it what has -n_x press, -n_y press along x and y
         pull = _press(e, depth) / e.tangential_stiffness
-        found.append((position[0] + arm[0] - pull * nx, position[1] + arm[1] - pull * ny, STICKING, 0.0))
+        found.append((position[0] + arm[0] - pull * nx, position[1] + arm[1] - pull * ny, 0.0, STICKING, 0.0))
     return tuple(found)
 
 

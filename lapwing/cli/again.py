@@ -1,20 +1,25 @@
 """A log again: published as it was, or flown with its inputs."""
 
+import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.errors import fail, user_errors
 from lapwing.cli.files import check_writable
-from lapwing.cli.links import check_links, mavlink_options
+from lapwing.cli.links import check_links, check_ros2, mavlink_options
 from lapwing.cli.options import (
+    FoxgloveAddress,
     Insecure,
     KeyPrefix,
     MavlinkKey,
     MavlinkUrls,
+    Ros2Domain,
+    Ros2Router,
     Speed,
     parse_speed,
 )
@@ -39,6 +44,14 @@ def _recorded_hub(log: Path, options: "Options") -> "Hub":
     return Hub(setup.beside.get("mavlink", VehicleDescription(setup.vehicle)), options, None)
 
 
+def _topics(log: Path) -> dict[str, str]:
+    """The type of each topic of a log."""
+    from cosim.log import LogReader
+
+    with LogReader(log) as recorded:
+        return recorded.topics()
+
+
 @app.command()
 def replay(
     log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
@@ -46,36 +59,75 @@ def replay(
     start: Annotated[float, typer.Option("--from", metavar="S", help="begin at this simulation time")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", metavar="S", help="end at this simulation time")] = None,
     loop: Annotated[bool, typer.Option("--loop", help="begin again at the end")] = False,
+    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="only these: /clock,/drone1/imu")] = None,
     key_prefix: KeyPrefix = "lapwing",
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="where subscribers connect")] = "tcp/127.0.0.1:7447",
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="also write what is published to a log")] = None,
     mavlink: MavlinkUrls = None,
     mavlink_key: MavlinkKey = None,
     insecure: Insecure = False,
+    foxglove: FoxgloveAddress = None,
+    ros2: Ros2Domain = None,
+    ros2_router: Ros2Router = None,
 ) -> None:
-    """Publish a log on Zenoh with its own timing, as the live run did."""
+    """Publish a log on Zenoh with its own timing, as the live run did.
+
+    In a terminal the space bar holds it and lets it go on, a full stop lets one instant go, q ends it.
+    """
     from cosim.interrupt import Stop
-    from cosim.key_prefix import reserve
+    from cosim.key_prefix import check_key_prefix
+    from lapwing.cli.keyboard import Keyboard
+    from services.replay.pace import Pace
     from services.replay.player import play
     from services.replay.schedule import Cut
 
     with user_errors():
-        cut, pace = Cut.of(start, end), parse_speed(speed)
+        check_key_prefix(key_prefix)
+        cut, factor = Cut.of(start, end), parse_speed(speed)
         if record and loop:
             raise ValueError("--record and --loop exclude each other: a log has an end")
         if record and record.resolve() == log.resolve():
             raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
         check_writable(record)
-        check_links(mavlink, mavlink_key, insecure)
+        check_links(mavlink, mavlink_key, insecure and ros2_router is None)
+        router = check_ros2(ros2, ros2_router, insecure)
         with ExitStack() as stack:
             hub = None
             if mavlink:
-                options = mavlink_options(mavlink, mavlink_key, insecure, log, pace)
+                options = mavlink_options(mavlink, mavlink_key, insecure, log, factor)
                 hub = stack.enter_context(_recorded_hub(log, options))
-            stack.enter_context(reserve(key_prefix))
+            listeners: list[Callable[[str, int, bytes], None]] = [hub.replay] if hub else []
+            viewers: list[Any] = []
+            if foxglove is not None or ros2 is not None:
+                kinds = _topics(log)
+            if foxglove is not None:
+                from services.foxglove.server import Server
+
+                viewers.append(stack.enter_context(Server(foxglove)))
+            if ros2 is not None:
+                from services.ros2.node import Node
+
+                viewers.append(stack.enter_context(Node(ros2, router, insecure)))
+            for viewer in viewers:
+                for topic, kind in kinds.items():
+                    viewer.declare(topic, kind)
+                listeners.append(viewer.put)
             stop = stack.enter_context(Stop())
-            listeners = (hub.replay, hub.wait) if hub else ()
-            count = play(log, key_prefix, listen, cut, pace, loop, record, lambda: stop.number is not None, *listeners)
+            keyboard = stack.enter_context(Keyboard())
+            pace = Pace(keyboard.keys, typer.echo, hub.wait if hub else time.sleep)
+            count = play(
+                log,
+                key_prefix,
+                listen,
+                cut,
+                factor,
+                loop,
+                record,
+                lambda: stop.number is not None,
+                lambda *message: [listener(*message) for listener in listeners],
+                pace,
+                topics.split(",") if topics is not None else None,
+            )
             for line in hub.report() if hub else ():
                 typer.echo(f"mavlink: {line}")
             stop.check()

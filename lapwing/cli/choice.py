@@ -13,9 +13,12 @@ def decided(path: Path, overrides: list[str]) -> "Scene":
     """The scene, with integrator and step chosen where it asks for an accuracy instead."""
     from services.plant.config import Solver
     from services.table import load
+    from studies.figures import check_success
 
     scene = load(path, overrides)
-    if not scene[Solver].undecided:
+    for vehicle in scene.vehicles or (scene,):
+        check_success(vehicle)
+    if scene.vehicles or not scene[Solver].undecided:  # of several vehicles each would choose its own
         return scene
     from studies.accuracy import choice
 
@@ -28,5 +31,7 @@ def warn_of_gains(scene: "Scene") -> None:
     """Say which of the autopilot's loops are unstable, a line each; the scene may be flown all the same."""
     from services.autopilot.unstable import unstable_loops
 
-    for line in unstable_loops(scene):
-        typer.echo(f"lapwing: warning: {line}", err=True)
+    for vehicle in scene.vehicles or (scene,):
+        of = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
+        for line in unstable_loops(vehicle):
+            typer.echo(f"lapwing: warning: {of}{line}", err=True)

@@ -23,10 +23,11 @@ def left(elapsed: float, done: float, total: float) -> str:
 
 
 class Countdown:
-    """A bar in a terminal, a line for each flight elsewhere; a context manager."""
+    """A bar in a terminal, lines elsewhere; a context manager."""
 
-    def __init__(self, console: Console):
-        self._console, self._started = console, time.monotonic()
+    def __init__(self, console: Console, every: float = 0.0):
+        """Between two lines are `every` seconds at least."""
+        self._console, self._started, self._every, self._said = console, time.monotonic(), every, -every
         columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} flights"), _Left())
         said = TextColumn("{task.description}", markup=False)
         self._bar = Progress(*columns, said, console=console, transient=True) if console.is_terminal else None
@@ -46,5 +47,8 @@ class Countdown:
         if self._bar and self._task is not None:
             self._bar.update(self._task, description=text, completed=done, total=total)
             return
-        told = left(time.monotonic() - self._started, done, total)
+        if (now := time.monotonic()) - self._said < self._every and done < total:
+            return
+        self._said = now
+        told = left(now - self._started, done, total)
         self._console.print(f"{done} of {total} flights{f', {told}' if told else ''}: {text}", soft_wrap=True)

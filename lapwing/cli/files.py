@@ -23,7 +23,7 @@ def log_path(scene: "Scene", given: Path | None, exists: bool) -> Path:
 
 @contextmanager
 def left_as_it_was(log: Path) -> Iterator[None]:
-    """Make the folder of recordings where it is missing; leave neither it nor a log behind when a run is refused."""
+    """Make the folder of recordings where it is missing; leave neither it nor an empty log when a run is refused."""
     new_log, new_folder = not log.exists(), log.parent == Path("recordings") and not log.parent.exists()
     refused = False
     try:
@@ -33,13 +33,24 @@ def left_as_it_was(log: Path) -> Iterator[None]:
     except OSError as error:
         raise ValueError(f"{log}: cannot be written: {(error.strerror or str(error)).lower()}") from None
     except ValueError:
-        refused = True
+        refused = not _has_flown(log)
         raise
     finally:
         if new_log and refused:
             log.unlink(missing_ok=True)
         if new_folder and log.parent.is_dir() and not any(log.parent.iterdir()):
             log.parent.rmdir()
+
+
+def _has_flown(log: Path) -> bool:
+    """Whether a log holds anything of a flight."""
+    from cosim.log import LogReader
+
+    try:
+        with LogReader(log) as read:
+            return bool(read.deterministic_topics())
+    except ValueError:
+        return False
 
 
 def written(path: Path) -> int | None:

@@ -1,5 +1,6 @@
-"""The MAVLink links that commands open: checked, and handed on."""
+"""Endpoints and links that commands open: checked, and handed on."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,8 +8,27 @@ if TYPE_CHECKING:
     from services.mavlink.options import Options
 
 
+def check_endpoints(option: str, endpoints: Iterable[str], keys: Path | None, insecure: bool) -> None:
+    """Refuse Zenoh endpoints at which nobody has to prove who he is, unless that is asked for."""
+    for endpoint in endpoints:
+        kind = endpoint.partition("/")[0]
+        if kind == "tls" and not keys:
+            raise ValueError(f"{option} {endpoint}: expected --keys FOLDER with it; `lapwing keys FOLDER` makes one")
+        if kind not in ("tls", "unixsock-stream") and not insecure:
+            expected = "expected tls/HOST:PORT with --keys FOLDER, or --insecure"
+            raise ValueError(f"{option} {endpoint}: anybody could join there: {expected}")
+
+
+def check_external(texts: Iterable[str], insecure: bool) -> None:
+    """Refuse programs of the user's own at endpoints where another could stand in their place, unless asked for."""
+    for text in texts:
+        if "=unixsock-stream/" not in text and not insecure:
+            expected = "expected unixsock-stream/PATH in a folder of your own, or --insecure"
+            raise ValueError(f"--external {text}: whoever listens there first is taken for the program: {expected}")
+
+
 def check_links(urls: list[str] | None, key: Path | None, insecure: bool) -> None:
-    """Refuse links that cannot be, before anything is started for them."""
+    """Refuse MAVLink links that cannot be, before anything is started for them."""
     if not urls:
         if key or insecure:
             raise ValueError(f"{'--mavlink-key' if key else '--insecure'}: expected with --mavlink URL")
@@ -20,6 +40,18 @@ def check_links(urls: list[str] | None, key: Path | None, insecure: bool) -> Non
         check(url)
     if key:
         read_key(key)
+
+
+def check_ros2(domain: int | None, router: str | None, insecure: bool) -> str:
+    """The router of a ROS 2 graph, "" where none is asked for; refuses one that cannot be."""
+    if domain is None:
+        if router is not None:
+            raise ValueError(f"--ros2-router {router}: expected with --ros2 DOMAIN")
+        return ""
+    from services.ros2.node import ROUTER, parse_router
+
+    parse_router(router or ROUTER, insecure)
+    return router or ROUTER
 
 
 def mavlink_options(

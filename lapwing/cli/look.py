@@ -20,8 +20,7 @@ def scenes(
 ) -> None:
     """List the scenes, a line each."""
     from cosim.scene import SceneError
-    from services.common.sections import SHIPPED, Run
-    from services.table import load
+    from services.common.sections import SHIPPED, title
 
     with user_errors():
         paths = sorted((folder or SHIPPED).glob("*.toml"))
@@ -31,7 +30,7 @@ def scenes(
         width = max(map(len, names))
         for name, path in zip(names, paths, strict=True):
             try:
-                line = load(path)[Run].title
+                line = title(path)
             except SceneError as error:
                 line = f"(broken: {error})"
             typer.echo(f"{name:<{width}}  {line}")
@@ -48,37 +47,45 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
     with user_errors():
         loaded = decided(scene, set_ or [])
         setup = resolve(loaded)
-        vehicle, exchange = loaded[Vehicle], loaded[Exchange]
+        exchange, lines = loaded[Exchange], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
         warn_of_gains(loaded)
-        for label, line in {
-            "title": loaded[Run].title or loaded.name,
-            "vehicle": f"{vehicle.name}, {vehicle.airframe or vehicle.model}",
-            "effects": ", ".join(sorted(loaded.tables("effects"))) or "none",
-            "sensors": ", ".join(sorted(loaded.tables("sensors"))) or "none",
-            "services": f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}",
-        }.items():
+        for each in loaded.vehicles or (loaded,):
+            vehicle = each[Vehicle]
+            lines += [
+                ("vehicle", f"{vehicle.name}, {vehicle.airframe or vehicle.model}"),
+                ("effects", ", ".join(sorted(each.tables("effects"))) or "none"),
+                ("sensors", ", ".join(sorted(each.tables("sensors"))) or "none"),
+            ]
+        lines.append(("services", f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}"))
+        for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
 
 
 @app.command()
 def warm(
-    scenes: Annotated[list[Path] | None, typer.Argument(metavar="[SCENE]...", help="[delivery_mission]")] = None,
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(metavar="[SCENE|FOLDER]...", help="[delivery_mission]; of a folder all")
+    ] = None,
 ) -> None:
     """Compile what scenes need, so that their first run starts at once."""
-    import time
-
-    from cosim.graph import Graph
-    from cosim.single import PAGE
-    from services.processes import create_all
+    from lapwing.runs.ahead import compile_ahead
     from services.table import resolve
+    from studies.terminal import console
 
     with user_errors():
-        for path in scenes or [Path("delivery_mission")]:
-            started = time.perf_counter()
-            setup = resolve(decided(path, []))
-            Graph(setup, create_all(setup), PAGE)
-            typer.echo(f"{path}: ready after {time.perf_counter() - started:.1f} s")
+        paths = [each for given in scenes or [Path("delivery_mission")] for each in _scenes_of(given)]
+        compile_ahead({str(path): resolve(decided(path, [])) for path in paths}, console())
+
+
+def _scenes_of(path: Path) -> list[Path]:
+    """A scene, or all of a folder."""
+    if not path.is_dir():
+        return [path]
+    found = sorted(path.glob("*.toml"))
+    if not found:
+        raise ValueError(f"{path}: no scenes there; expected a folder with .toml files")
+    return found
 
 
 @app.command()
@@ -90,6 +97,9 @@ def report(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.html|pdf|png", help="where to write it [beside the first log, .html]")
     ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME", help="of several in the log, whose report it is [the first]")
+    ] = None,
 ) -> None:
     """Write a report of a log, or of two laid over each other: a page for a browser, or plots on paper."""
     from lapwing.cli.files import check_distinct, check_report
@@ -98,7 +108,30 @@ def report(
     with user_errors():
         check_distinct({"FILE": log, "the second FILE": other, "--out": out})
         check_report("--out", out)
-        typer.echo(Flight.read(log).report(out, Flight.read(other) if other else None))
+        typer.echo(Flight.read(log, vehicle).report(out, Flight.read(other, vehicle) if other else None))
+
+
+@app.command()
+def view(
+    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="open the log in Rerun instead (pip install lapwing[view])")
+    ] = False,
+) -> None:
+    """Write the report of a log, in which the vehicle flies again, and open it in the browser."""
+    import webbrowser
+
+    from lapwing.flight import Flight
+    from lapwing.rerun import open_in_rerun
+
+    with user_errors():
+        if rerun:
+            open_in_rerun(log)
+            return
+        page = Flight.read(log).report()
+        if not webbrowser.open(page.resolve().as_uri()):
+            typer.echo("no browser was found; open the page yourself:")
+        typer.echo(page)
 
 
 @app.command()
@@ -123,6 +156,8 @@ def parameters(
             with LogReader(file) as read:
                 setup = recorded_setup(read)
                 commands = [command for _, given in given_commands(read, setup) for command in given]
+        if not setup.vehicle:
+            raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or a log of one")
         if "autopilot" not in setup.services:
             raise ValueError(f"{file}: nobody steers there; expected a scene with [autopilot], or a log of one")
         known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}

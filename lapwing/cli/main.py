@@ -1,25 +1,36 @@
-"""`lapwing`: the entry point. The commands are in services/commands, the one place that knows services and studies.
-
-Modules are imported where they are used, so that a service's process starts quickly.
-"""
+"""All commands of `lapwing`: the modules beside this one register them, and import what one needs when it runs."""
 
 import sys
 from typing import Annotated
 
 import typer
 
-from lapwing.cli import again, docs, look, new, protocol, run, serve, studies  # noqa: F401 (they register themselves)
+from lapwing.cli import (  # noqa: F401 (they register themselves)
+    again,
+    campaign,
+    docs,
+    keys,
+    logs,
+    look,
+    new,
+    new_vehicle,
+    protocol,
+    run,
+    serve,
+    studies,
+)
 from lapwing.cli.app import app
 from lapwing.cli.errors import USER_ERROR, fail, user_errors
+from lapwing.cli.output import checked_output
 
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
 
 
 def _show_version(wanted: bool) -> None:
-    from cosim.provenance import package_version
-
     if wanted:
+        from cosim.provenance import package_version
+
         typer.echo(f"lapwing {package_version()}")
         raise typer.Exit
 
@@ -34,11 +45,11 @@ def options(
 
 
 def main() -> None:
-    """Entry point of `lapwing`."""
-    with user_errors():
-        from cosim.interrupt import end_at_once
+    """Carry out what the command line says."""
+    with user_errors(), checked_output():
+        from cosim.exit import leave_garbage
 
-        end_at_once()
+        leave_garbage()
         try:
             app(sys.argv[1:] or ["--help"], standalone_mode=False)
         except UsageError as error:

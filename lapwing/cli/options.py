@@ -28,7 +28,24 @@ MavlinkKey = Annotated[
     Path | None,
     typer.Option("--mavlink-key", metavar="FILE", help="a passphrase: sign, and take only what is signed with it"),
 ]
-Insecure = Annotated[bool, typer.Option("--insecure", help="take unsigned MAVLink commands from other machines")]
+Insecure = Annotated[
+    bool,
+    typer.Option("--insecure", help="links whose other end proves nothing: unsigned MAVLink, Zenoh without --keys"),
+]
+Keys = Annotated[
+    Path | None, typer.Option(metavar="FOLDER", help="certificates of `lapwing keys`, for endpoints tls/HOST:PORT")
+]
+FoxgloveAddress = Annotated[
+    str | None,
+    typer.Option("--foxglove", metavar="HOST:PORT", help="let Foxglove or Lichtblick look on: 127.0.0.1:8765"),
+]
+Ros2Domain = Annotated[
+    int | None,
+    typer.Option("--ros2", metavar="DOMAIN", min=0, max=232, help="be a node for ROS 2 (rmw_zenoh), ROS_DOMAIN_ID"),
+]
+Ros2Router = Annotated[
+    str | None, typer.Option("--ros2-router", metavar="HOST:PORT", help="its Zenoh router [127.0.0.1:7447]")
+]
 PlanFile = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="fly this mission (.plan, .waypoints) instead of the scene's trajectory"),

@@ -1,29 +1,39 @@
 """`lapwing run`: fly a scene, record it, and report."""
 
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cosim.child import Child, started_early
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided, warn_of_gains
 from lapwing.cli.errors import FLIGHT_FAILED, fail, user_errors
 from lapwing.cli.files import check_distinct, check_report, check_writable, left_as_it_was, log_path, written
-from lapwing.cli.links import check_links
+from lapwing.cli.links import check_endpoints, check_external, check_links, check_ros2
+from lapwing.cli.modes import check_mode
 from lapwing.cli.options import (
+    FoxgloveAddress,
     Insecure,
     KeyPrefix,
+    Keys,
     MavlinkKey,
     MavlinkUrls,
     Overrides,
     Peers,
     PlanFile,
+    Ros2Domain,
+    Ros2Router,
     SceneFile,
     Speed,
     parse_speed,
 )
 
 if TYPE_CHECKING:
+    from lapwing.flight import Flight
     from lapwing.runs.observer import Elapsed
     from services.participant import Participation
 
@@ -33,6 +43,9 @@ def run(
     scene: SceneFile,
     set_: Overrides = None,
     speed: Speed = None,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="at speed 1, in the scheduler's real-time class where that is allowed")
+    ] = False,
     mode: Annotated[
         str, typer.Option(metavar="processes|single", help="one process a service, or one for all")
     ] = "processes",
@@ -44,48 +57,90 @@ def run(
     key_prefix: KeyPrefix = "lapwing",
     peers: Peers = None,
     open_: Annotated[
-        str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tcp/127.0.0.1:7447")
+        str | None, typer.Option("--open", metavar="ENDPOINT", help="let Zenoh clients listen in: tls/127.0.0.1:7447")
     ] = None,
     mavlink: MavlinkUrls = None,
     mavlink_key: MavlinkKey = None,
     insecure: Insecure = False,
+    view: Annotated[bool, typer.Option("--view", help="show the flight in the browser while it goes on")] = False,
+    foxglove: FoxgloveAddress = None,
+    ros2: Ros2Domain = None,
+    ros2_router: Ros2Router = None,
+    keys: Keys = None,
     plan: PlanFile = None,
     external: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=ENDPOINT", help="a service that is a program of your own, listening there"),
     ] = None,
+    run_: Annotated[
+        int | None, typer.Option("--run", metavar="N", help="fly a run of --campaign again, to the bit")
+    ] = None,
+    campaign: Annotated[Path | None, typer.Option(metavar="DIR", help="the folder of the campaign of --run")] = None,
 ) -> None:
     """Fly a scene, record it, and report."""
-    from cosim.watch import WATCHER
-    from lapwing.cli import summary
-    from lapwing.runs.joined import check_endpoint, parse_external, parse_peers
-    from services.common.plan import OPERATED
-    from services.common.plan import read as read_plan
-    from services.common.sections import Run
-    from services.common.vehicle import start_height
-    from services.participant import Participation
-    from services.processes import needed
-    from services.table import resolve
+    # a ground station waits for its link, which loads while the scene is read
+    ahead = ["mavlink"] if mavlink and mode == "processes" and peers is None else []
+    with user_errors(), started_early(*ahead) as early:
+        from cosim.realtime import why_not
+        from cosim.watch import WATCHER
+        from lapwing.runs.joined import check_complete, check_endpoint, elsewhere, parse_external, parse_peers
+        from services.common.environment import environment
+        from services.common.plan import OPERATED
+        from services.common.plan import read as read_plan
+        from services.common.sections import Run
+        from services.common.success import Success
+        from services.common.vehicle import start_height
+        from services.participant import Participation
+        from services.processes import needed
+        from services.ros2.config import Bus
+        from services.table import load, resolve
+        from studies.figures import end_state, figures
 
-    with user_errors():
-        if mode not in ("processes", "single"):
-            raise ValueError(f"--mode {mode}: expected processes or single")
-        if mode == "single" and (peers is not None or open_ is not None):
-            raise ValueError("--mode single: has no network; leave out --peers and --open")
-        if mavlink and (mode == "single" or peers is not None):
-            raise ValueError("--mavlink: belongs to a run in processes; with --peers start the service mavlink instead")
-        if external and (mode == "single" or peers is not None):
-            raise ValueError("--external: belongs to a run in processes; with --peers leave that service out")
+        links = {"--mavlink": mavlink, "--external": external, "--foxglove": foxglove, "--view": view}
+        check_mode(
+            mode, peers is not None, open_ is not None, {**links, "--realtime": realtime, "--ros2": ros2 is not None}
+        )
+        if realtime and speed == "max":
+            raise ValueError("--realtime: belongs to a run that keeps a speed; leave out --speed max")
         if open_ is not None:
             check_endpoint("--open", open_)
-        check_links(mavlink, mavlink_key, insecure)
+        table = None if peers is None else parse_peers(peers)
+        opened = [*([open_] if open_ else []), *(table or {}).values()]
+        check_endpoints("--peers" if table else "--open", opened, keys, insecure)
+        if keys and not opened:
+            raise ValueError("--keys: expected with --open or --peers")
+        check_external(external or [], insecure)
+        check_links(mavlink, mavlink_key, insecure and not (opened or external) and ros2_router is None)
+        if foxglove is not None:
+            from services.foxglove.server import parse_address
+
+            parse_address(foxglove)
         set_ = [*(set_ or []), *(OPERATED if plan else ["autopilot.operator=true"] if mavlink else [])]
-        loaded = decided(scene, set_)
-        commands = tuple(read_plan(plan, start_height(loaded))) if plan else ()
+        if (run_ is None) != (campaign is None):
+            raise ValueError("--run and --campaign: belong together; expected both")
+        if run_ is not None and campaign is not None:
+            from studies.campaign import again  # which needs scipy
+
+            loaded = load(again.scene_of_run(scene, run_, campaign), set_)
+        else:
+            loaded = decided(scene, set_)
+        if ros2 is None and loaded.has(Bus) and loaded[Bus].ros2:
+            ros2 = loaded[Bus].ros2_domain
+            check_mode(mode, peers is not None, False, {"--ros2": True})
+        if loaded.vehicles:
+            of_one = {"--view": view, "--ros2": ros2 is not None, "--plan": plan}
+            if given_too := [option for option, wanted in of_one.items() if wanted]:
+                raise ValueError(f"{given_too[0]}: is for one vehicle, and {scene} has {len(loaded.vehicles)}")
+        commands = tuple(read_plan(plan, start_height(loaded), environment(loaded).home)) if plan else ()
         warn_of_gains(loaded)
+        router = check_ros2(ros2, ros2_router, insecure)
         setup = resolve(loaded, commands)
-        speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if mavlink else None)
-        table = None if peers is None else parse_peers(peers, [*needed(setup), WATCHER])
+        paced = mavlink or view or realtime or ros2 is not None
+        speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if paced else None)
+        if table is not None:
+            if loaded[Run].restart:
+                raise ValueError("run.restart: `lapwing run` starts again what it has started; leave out --peers")
+            check_complete(table, [*needed(setup, elsewhere(table)), WATCHER])
         check_distinct({"SCENE": scene, "--log": log, "--json": json, "--report": report})
         path = log_path(loaded, log, exists=table is not None)
         check_writable(json)
@@ -103,23 +158,53 @@ def run(
             mavlink=tuple(mavlink or ()),
             mavlink_key=str(mavlink_key.absolute()) if mavlink_key else "",
             insecure=insecure,
-            external=parse_external(external or [], setup),
+            foxglove=foxglove or "",
+            ros2=ros2,
+            ros2_router=router,
+            external=elsewhere(table) if table else parse_external(external or [], setup),
+            keys=str(keys.absolute()) if keys else "",
+            realtime=realtime,
         )
-        elapsed, before = None, written(path)
+        if realtime and (reason := why_not()):
+            given = given._replace(realtime=False)
+            typer.echo(f"lapwing: --realtime: no real-time class: {reason}", err=True)
+        before = written(path)
+
+        def conclude(elapsed: "Elapsed | None") -> "list[Flight]":
+            from lapwing.cli import summary  # not before the flight, whose start would wait for it
+            from lapwing.runs.events import add_events
+
+            mine = elapsed is not None or written(path) != before
+            flights = summary.fleet(path) if mine else []
+            for flown in flights:
+                if flown.digest and not flown.has("events"):  # the log has its end
+                    add_events(path, flown)
+            if flights:
+                summary.conclude(loaded, given, flights, elapsed, json, report)
+            return flights
+
         try:
-            elapsed = _fly(given, path)
-        finally:  # what was flown before an error or Ctrl-C has its verdict, too
-            mine = elapsed is not None or (table is None and written(path) != before)
-            flown = summary.flown(path) if mine else None
-            if flown is not None:
-                summary.conclude(loaded, given, flown, elapsed, json, report)
-        if flown is not None and flown.verdict.kind in loaded[Run].failed:
-            fail(f"the flight has failed: {flown.verdict.kind}", FLIGHT_FAILED)
+            elapsed = _fly(given, path, view, early)
+        except BaseException:  # what was flown before an error or Ctrl-C has its verdict, too
+            with suppress(ValueError):  # the first error is told
+                conclude(None)
+            raise
+        flights = conclude(elapsed)
+        if flights and run_ is not None and campaign is not None:
+            from studies.campaign import again
+
+            same = end_state(flights[0]) == again.end_state_of(run_, campaign)
+            typer.echo(f"run {run_} of {campaign}: {'the same end, to the bit' if same else 'ends in another state'}")
+        for flown, flier in zip(flights, loaded.vehicles or (loaded,), strict=False):
+            if unmet := flier[Success].unmet(figures(flown)):
+                of = f" of {flown.vehicle}" if loaded.vehicles else ""
+                why = f"{flown.verdict.kind}; success.require: {'; '.join(unmet)}"
+                fail(f"the flight{of} has failed: {why}", FLIGHT_FAILED)
 
 
-def _fly(given: "Participation", log: Path) -> "Elapsed":
+def _fly(given: "Participation", log: Path, view: bool, early: dict[str, Child]) -> "Elapsed":
     from lapwing.cli.progress import Display
-    from services.processes import MAVLINK
+    from services.processes import FOXGLOVE, MAVLINK, ROS2
     from studies.terminal import console
 
     setup = given.setup
@@ -128,10 +213,30 @@ def _fly(given: "Participation", log: Path) -> "Elapsed":
             from lapwing.runs.single import fly_single
 
             return fly_single(setup, log, given.sources, given.speed, display)
+        links = {MAVLINK: bool(given.mavlink), FOXGLOVE: bool(given.foxglove), ROS2: given.ros2 is not None}
+        beside = [name for name, wanted in links.items() if wanted or name in given.peers]
+        fly: Callable[..., Elapsed]
         if given.peers:
             from lapwing.runs.joined import fly_joined
 
-            return fly_joined(setup, given.peers, given.key_prefix, display)
-        from lapwing.runs.processes import fly_processes
+            fly = partial(fly_joined, given, display)
+        else:
+            from lapwing.runs.processes import fly_processes
 
-        return fly_processes(given, display, [MAVLINK] if given.mavlink else [])
+            fly = partial(fly_processes, given, display, beside, early=early)
+        with ExitStack() as stack:
+            shows = []
+            if view:
+                import webbrowser
+
+                from lapwing.runs.live import LivePage
+
+                page = stack.enter_context(LivePage(setup))
+                display.say(f"live: {page.address}")
+                webbrowser.open(page.address)
+                shows.append(page.show)
+            if not (view or FOXGLOVE in beside or ROS2 in beside):
+                return fly()
+            from lapwing.runs.following import Following
+
+            return fly(live=Following(setup, shows).observe)

@@ -8,14 +8,18 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided
 from lapwing.cli.errors import user_errors
-from lapwing.cli.links import check_links
+from lapwing.cli.links import check_endpoints, check_links, check_ros2
 from lapwing.cli.options import (
+    FoxgloveAddress,
     Insecure,
     KeyPrefix,
+    Keys,
     MavlinkKey,
     MavlinkUrls,
     Overrides,
     PlanFile,
+    Ros2Domain,
+    Ros2Router,
     SceneFile,
     Speed,
     parse_speed,
@@ -37,12 +41,17 @@ def service(
     mavlink: MavlinkUrls = None,
     mavlink_key: MavlinkKey = None,
     insecure: Insecure = False,
+    foxglove: FoxgloveAddress = None,
+    ros2: Ros2Domain = None,
+    ros2_router: Ros2Router = None,
+    keys: Keys = None,
     plan: PlanFile = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
     from cosim.key_prefix import check_key_prefix
-    from lapwing.runs.joined import parse_peers
+    from lapwing.runs.joined import elsewhere, parse_peers
     from services import processes
+    from services.common.environment import environment
     from services.common.plan import OPERATED
     from services.common.plan import read as read_plan
     from services.common.vehicle import start_height
@@ -52,17 +61,23 @@ def service(
     with user_errors():
         check_key_prefix(key_prefix)
         table = parse_peers(peers)
-        entry = processes.entry(name)
+        entry = processes.entry(processes.encoded(name) or name)
         if name not in table:
             raise ValueError(f"--peers: no endpoint for {name} itself")
+        check_endpoints("--peers", table.values(), keys, insecure)
+        check_endpoints("--open", open_ or [], keys, insecure)
         if name == processes.RECORDER and log is None:
             raise ValueError("--log: the recorder needs the name of its log")
+        if name == processes.FOXGLOVE and foxglove is None:
+            raise ValueError("--foxglove: the service needs an address to listen on, HOST:PORT")
+        if name == processes.ROS2 and ros2 is None:
+            raise ValueError("--ros2: the service needs a domain, ROS_DOMAIN_ID of the nodes")
         if name == processes.MAVLINK:
-            check_links(mavlink, mavlink_key, insecure)
+            check_links(mavlink, mavlink_key, insecure and bool(mavlink))
         loaded = decided(scene, [*(set_ or []), *(OPERATED if plan else [])])
-        commands = tuple(read_plan(plan, start_height(loaded))) if plan else ()
+        commands = tuple(read_plan(plan, start_height(loaded), environment(loaded).home)) if plan else ()
         setup = resolve(loaded, commands)
-        if entry.lock_step and name not in setup.services:
+        if entry.lock_step and entry.name not in setup.services:
             typer.echo(f"{name}: {scene} does not call for it")  # compose starts every service there is
             return
         take_part(
@@ -78,5 +93,10 @@ def service(
                 mavlink=tuple(mavlink or ()),
                 mavlink_key=str(mavlink_key or ""),
                 insecure=insecure,
+                foxglove=foxglove or "",
+                ros2=ros2,
+                ros2_router=check_ros2(ros2, ros2_router, insecure),
+                external=elsewhere(table),
+                keys=str(keys.absolute()) if keys else "",
             )
         )

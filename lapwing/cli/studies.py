@@ -1,4 +1,4 @@
-"""The studies: performance, effects, accuracy, stability, campaign, tune."""
+"""The studies: performance, effects, accuracy, stability, tune."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -147,38 +147,6 @@ def stability(
         stands = command.run(case, long, sweep, json, report)
     if not stands:
         raise SystemExit(1)
-
-
-@app.command()
-def campaign(
-    scene: SceneFile,
-    set_: Overrides = None,
-    seeds: Annotated[int, typer.Option(metavar="N", help="fly seeds 1 to N")] = 100,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write every flight's figures as JSON")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the distribution (PNG, SVG or PDF)")] = None,
-) -> None:
-    """Fly a scene with many seeds, in one compiled closed loop: errors as a distribution, and crashes."""
-    from rich.progress import Progress
-
-    from services.table import load
-    from studies.campaign import show, study
-    from studies.terminal import console
-
-    with user_errors():
-        if seeds < 1:
-            raise ValueError(f"--seeds {seeds}: expected at least 1")
-        screen = console()
-
-        def fly() -> study.Campaign:
-            loaded = load(scene, set_ or [])
-            with Progress(console=screen, transient=True) as progress:
-                task = progress.add_task("flying", total=seeds)
-                with _compiling(loaded, progress, task):
-                    return study.campaign(
-                        loaded, range(1, seeds + 1), lambda: progress.update(task, advance=1, description="flying")
-                    )
-
-        _study("SCENE", scene, json, plot, screen, fly, show)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from cosim.scene import Scene
 from lapwing.flight import Flight
 from services.common.sections import Published
 from studies import terminal
+from studies.separation import Separation, nearest
 from studies.tracking import shown
 
 if TYPE_CHECKING:
@@ -31,10 +33,18 @@ def flown(log: Path) -> Flight | None:
     return found if len(found.truth) else None
 
 
+def fleet(log: Path) -> list[Flight]:
+    """The flights of all vehicles of a log; empty where nothing was flown."""
+    try:
+        return [flight for flight in Flight.read_all(log) if len(flight.truth)]
+    except ValueError:
+        return []
+
+
 def conclude(
     scene: Scene,
     given: "Participation",
-    flight: Flight,
+    flights: Sequence[Flight],
     elapsed: "Elapsed | None",
     write_to: Path | None,
     report: Path | None,
@@ -44,30 +54,47 @@ def conclude(
     Args:
         scene: that was flown.
         given: how.
-        flight: as its log has it.
+        flights: of each vehicle, as the log has them.
         elapsed: how long it took; None where it was ended before its time.
         write_to: the JSON file, if any.
         report: the report's path, None for the log's with another ending.
     """
-    verdict, simulated = flight.verdict, float(flight.truth.times[-1])
+    first, several = flights[0], bool(scene.vehicles)
     result = {
         "scene": scene.name,
         "seed": given.setup.seed,
         "mode": given.mode,
-        "digest": flight.digest,
-        "verdict": {"text": str(verdict), **verdict._asdict()},
-        "events": [event._asdict() for event in flight.events],
-        "sim_time_s": elapsed.simulated if elapsed else simulated,
+        "digest": first.digest,
+        **(_of_fleet(flights) if several else _of_vehicle(first)),
+        "sim_time_s": elapsed.simulated if elapsed else float(first.truth.times[-1]),
         "wall_time_s": elapsed.wall if elapsed else None,
         "real_time_factor": (elapsed.simulated / elapsed.wall if elapsed.wall else 0.0) if elapsed else None,
-        "rmse": flight.rmse,
-        "landed": flight.landed,
-        "log": str(flight.origin.source),
-        "report": str(flight.report(report)),
+        "log": str(first.origin.source),
+        "report": str(first.report(report)),
     }
     if write_to:
         write_json(write_to, result)
-    show(terminal.console(), scene, result)
+    if several:
+        show_fleet(terminal.console(), result)
+    else:
+        show(terminal.console(), scene, result)
+
+
+def _of_vehicle(flight: Flight) -> dict[str, Any]:
+    verdict = flight.verdict
+    return {
+        "verdict": {"text": str(verdict), **verdict._asdict()},
+        "events": [event._asdict() for event in flight.events],
+        "rmse": flight.rmse,
+        "landed": flight.landed,
+    }
+
+
+def _of_fleet(flights: Sequence[Flight]) -> dict[str, Any]:
+    return {
+        "vehicles": {flight.vehicle: _of_vehicle(flight) for flight in flights},
+        "separation": nearest(flights[0].fleet)._asdict() if len(flights) > 1 else None,
+    }
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
@@ -77,10 +104,26 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print `result` for people."""
-    _events(console, result["events"])
+    show_events(console, result["events"])
     _errors(console, scene[Published], result["rmse"])
-    verdict = result["verdict"]
-    console.print(verdict["text"], style=f"bold {COLOURS.get(verdict['kind'], 'red')}")
+    _verdict(console, result["verdict"])
+    _ending(console, result)
+
+
+def show_fleet(console: Console, result: dict[str, Any]) -> None:
+    """Print `result` of several vehicles for people."""
+    for name, one in result["vehicles"].items():
+        _verdict(console, one["verdict"], f"{name}: ")
+    if result["separation"]:
+        console.print(str(Separation(**result["separation"])), highlight=False)
+    _ending(console, result)
+
+
+def _verdict(console: Console, verdict: dict[str, Any], of: str = "") -> None:
+    console.print(f"{of}{verdict['text']}", style=f"bold {COLOURS.get(verdict['kind'], 'red')}")
+
+
+def _ending(console: Console, result: dict[str, Any]) -> None:
     if result["wall_time_s"] is not None:
         console.print(
             f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
@@ -92,7 +135,8 @@ def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
             console.print(f"{name:<7} {result[name]}", soft_wrap=True)
 
 
-def _events(console: Console, events: list[dict[str, Any]]) -> None:
+def show_events(console: Console, events: list[dict[str, Any]]) -> None:
+    """Print what happened, the first of many."""
     if not events:
         return
     table = Table("time [s]", "event", "", box=None, pad_edge=False, header_style="dim")

@@ -5,10 +5,9 @@ import types
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from lapwing.docs.keys import REQUIRED, Key, keys
+from lapwing.docs.keys import REQUIRED, Key, is_table, keys
 
 Schema = dict[str, Any]
 PLAIN = {float: "number", int: "integer", str: "string", bool: "boolean", dict: "object"}
@@ -55,7 +54,7 @@ def key_schema(key: Key) -> Schema:
 
 def _plain(default: Any) -> Any:
     """A default as JSON has it; None where it is none, or a table, or not finite."""
-    if default is REQUIRED or hasattr(default, "_asdict") or isinstance(default, dict):
+    if default is REQUIRED or is_table(type(default)) or isinstance(default, dict):
         return None
     if isinstance(default, float) and not math.isfinite(default):
         return None
@@ -76,7 +75,7 @@ def schema_of(hint: Any) -> Schema:
         return _mapping(*arguments)
     if origin in (tuple, list):
         return _array(arguments, origin is list or arguments[-1] is Ellipsis)
-    if isinstance(hint, type) and (issubclass(hint, BaseModel) or hasattr(hint, "_fields")):
+    if isinstance(hint, type) and is_table(hint):
         return table_schema(hint)
     return {"type": PLAIN[hint]}
 

@@ -41,8 +41,11 @@ ESTIMATOR = """\
 Named in a scene, or given to `lapwing.fly(scene, estimator=MyEstimator)`."""
 
 SECTION = re.compile(r"^(Args|Returns|Raises|Attributes|Yields):$")
-FUNCTIONS = ("load", "fly", "read", "campaign", "normal", "uniform", "choice")
-CLASSES = ("Flight", "Verdict", "Event", "Simulator", "Observation", "Scene", "SceneError", "LockStepError")
+FUNCTIONS = ("load", "fly", "read", "campaign", "normal", "uniform", "loguniform", "linspace", "choice")
+CLASSES = (
+    *("Flight", "Verdict", "Event", "Simulator", "Observation", "Batch", "BatchState"),
+    *("Scene", "SceneError", "LockStepError"),
+)
 SHOWN = {  # of classes that have more than what a user calls
     "Flight": (
         *("rmse", "errors", "reference", "armed", "verdict", "events", "landed", "finished"),

@@ -39,7 +39,12 @@ def keys(cls: type) -> list[Key]:
 def _purpose(hint: Any) -> str:
     """What a table is for, as its class says."""
     members = [member for member in get_args(hint) or (hint,) if isinstance(member, type) and member is not type(None)]
-    return first_sentence(members[0]) if members and issubclass(members[0], BaseModel) else ""
+    return first_sentence(members[0]) if members and is_table(members[0]) else ""
+
+
+def is_table(cls: type) -> bool:
+    """Whether a class declares a table: a pydantic model, or a NamedTuple."""
+    return issubclass(cls, BaseModel) or hasattr(cls, "_fields")
 
 
 def first_sentence(thing: Any) -> str:

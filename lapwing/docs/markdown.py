@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lapwing.docs.annotations import Schema, schema_of
-from lapwing.docs.keys import REQUIRED, Key
+from lapwing.docs.keys import REQUIRED, Key, is_table
 
 KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "object": "table"}
 
@@ -72,7 +72,7 @@ def code(value: Any) -> str:
     """A value as TOML has it; empty for what is left out, or a table."""
     if value is REQUIRED:
         return "required"
-    if value is None or value in ("", (), {}) or hasattr(value, "_asdict"):
+    if value is None or value in ("", (), {}) or is_table(type(value)):
         return ""
     return f"`{toml(value)}`"
 

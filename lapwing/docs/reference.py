@@ -5,13 +5,11 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import Any, get_args
 
-from pydantic import BaseModel
-
 from cosim.scene import Section
 from dynamics import effects, integrators
 from dynamics.vehicles.airframe import Airframe
 from lapwing.docs.catalogue import effect_tables, flight_parameters, sensor_tables
-from lapwing.docs.keys import first_sentence, keys
+from lapwing.docs.keys import first_sentence, is_table, keys
 from lapwing.docs.markdown import key_table, number, table
 from services.autopilot import gains
 from services.autopilot.gains import GainSet
@@ -89,17 +87,25 @@ def _required(section: type[Section]) -> bool:
 def _keys(section: type[Section]) -> str:
     """The keys of a section, those of the tables within it, and what is checked of the whole scene."""
     parts = [key_table(keys(section))]
-    for key in keys(section):
-        for inner in _tables_in(key.hint):
-            parts.append(f"`{section.TABLE}.{key.name}`: {first_sentence(inner)}.\n\n{key_table(keys(inner))}")
+    parts += _inner_tables(section, section.TABLE)
     if "check" in vars(section):
         parts.append(f"Checked: {_doc(section.check)}")
     return "\n\n".join(parts)
 
 
+def _inner_tables(cls: type, path: str) -> list[str]:
+    """The keys of the tables within a table, and within those."""
+    parts = []
+    for key in keys(cls):
+        for inner in _tables_in(key.hint):
+            parts.append(f"`{path}.{key.name}`: {first_sentence(inner)}.\n\n{key_table(keys(inner))}")
+            parts += _inner_tables(inner, f"{path}.{key.name}")
+    return parts
+
+
 def _tables_in(hint: Any) -> list[type]:
     """The classes of tables that an annotation mentions."""
-    if isinstance(hint, type) and issubclass(hint, BaseModel):
+    if isinstance(hint, type) and is_table(hint):
         return [hint]
     return [found for part in get_args(hint) for found in _tables_in(part)]
 
@@ -178,7 +184,7 @@ def _integrators() -> str:
         module = integrators.get(name)
         evaluations = getattr(module, "EVALUATIONS", None)
         kept = "yes" if module.ON_MANIFOLD else "no"
-        states = "rigid bodies" if hasattr(module, "REQUIRES") else "any"
+        states = "rigid bodies" if hasattr(module, "unfit") else "any"
         cost = str(evaluations) if evaluations else "as needed"
         rows.append([f"`{name}`", number(module.ORDER), cost, kept, states, first_sentence(module)])
     text = "`solver.integrator`. On the manifold: attitudes stay rotations to round-off."
@@ -187,8 +193,9 @@ def _integrators() -> str:
 
 def _airframe() -> Iterator[str]:
     yield "A TOML file that `vehicle.airframe` names. How its numbers are measured: [new_airframe.md](new_airframe.md)."
-    for key in keys(Airframe):
-        (cls, *_) = _tables_in(key.hint)
+    tables = {key: _tables_in(key.hint) for key in keys(Airframe)}
+    yield key_table([key for key, found in tables.items() if not found])
+    for key, (cls, *_) in ((key, found) for key, found in tables.items() if found):
         optional = "" if Airframe.model_fields[key.name].is_required() else " May be left out."
         yield f"### [{key.name}]\n\n{_doc(cls)}{optional}\n\n{key_table(keys(cls))}"
         inner = {i for k in keys(cls) for i in _tables_in(k.hint)}

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cosim.scene import Section
+from cosim.scene.fleet import MOST
 from dynamics import integrators
 from dynamics.vehicles.airframe import Airframe
 from lapwing.docs.annotations import Schema, closed, required, table_schema
@@ -47,6 +48,7 @@ def scene_schema() -> Schema:
             "description": f"[{unit}] a segment, or a list of them",
             "anyOf": [segment, {"type": "array", "items": segment}],
         }
+    tables["vehicle"] = {"anyOf": [tables["vehicle"], _fleet(tables, sections)]}
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
     found = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
     return {**found, "definitions": {"segment": {"anyOf": [_segment(kind) for kind in KINDS]}}}
@@ -75,6 +77,28 @@ def _head(title: str) -> Schema:
 
 def _section(section: type[Section]) -> Schema:
     return {"description": " ".join((section.__doc__ or "").split()), **table_schema(section)}
+
+
+def _fleet(tables: Schema, sections: dict[str, type[Section]]) -> Schema:
+    """Several vehicles: each has the keys of a vehicle, and what it says of the tables that it need not share."""
+    names = [name for name, section in sections.items() if name != "vehicle" and not section.SHARED]
+    own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}
+    properties = dict(tables["vehicle"]["properties"])
+    properties["airframe"] = {"anyOf": [properties["airframe"], own.pop("airframe")]}
+    items = closed({**properties, **own})
+    text = "several vehicles: the tables of each are laid over those of the scene"
+    return {"type": "array", "minItems": 1, "maxItems": MOST, "items": items, "description": text}
+
+
+def _partial(schema: Schema, place: str) -> Schema:
+    """A schema at a place of the document without what is required, by reference where nothing is."""
+    optional: Schema = _optional(schema)
+    if optional == schema:
+        return {"$ref": place}
+    if "properties" in schema:
+        inner = {key: _partial(value, f"{place}/properties/{key}") for key, value in schema["properties"].items()}
+        return {**optional, "properties": inner}
+    return optional
 
 
 def _or_own(tables: dict[str, Schema]) -> Schema:

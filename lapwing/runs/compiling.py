@@ -12,6 +12,7 @@ from dynamics.kernel import cache_folder, on_compile
 
 EACH = 12.0  # [s] a service takes to compile, on an idle core of 2020, where nothing is known of this machine
 FILE = "compile_seconds.json"
+ONE = "one process"
 
 
 def notice(guess: float) -> str:
@@ -29,8 +30,8 @@ class Stopwatch:
     def __init__(self, mode: str, services: Iterable[str], say: Callable[[float], None]):
         """`say` is called once with the guess [s], when something compiles."""
         names = list(services)
-        self._key, self._say, self._started = f"{mode}: {', '.join(names)}", say, 0.0
-        self._guess = _known().get(self._key, EACH * len(names))
+        self._key, self._say, self._started = _key(mode, names), say, 0.0
+        self._guess = _guess(mode, names)
 
     def began(self) -> None:
         """Something compiles; said once."""
@@ -54,7 +55,7 @@ def told(setup: Setup, say: Callable[[float], None], alone: bool = True) -> Iter
         say: is told.
         alone: whether the context does nothing else, so that its time is the next guess.
     """
-    watch, waiting = Stopwatch("one process", setup.services, say), True
+    watch, waiting = Stopwatch(ONE, setup.services, say), True
 
     def listener(_: str) -> None:
         if waiting:
@@ -67,6 +68,19 @@ def told(setup: Setup, say: Callable[[float], None], alone: bool = True) -> Iter
             watch.ended()
     finally:
         waiting = False
+
+
+def guessed(setup: Setup) -> float:
+    """How long [s] the kernels of a run in one process compile, where none is kept."""
+    return _guess(ONE, list(setup.services))
+
+
+def _key(mode: str, names: list[str]) -> str:
+    return f"{mode}: {', '.join(names)}"
+
+
+def _guess(mode: str, names: list[str]) -> float:
+    return _known().get(_key(mode, names), EACH * len(names))
 
 
 def _file() -> Path | None:

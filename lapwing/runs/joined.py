@@ -2,71 +2,115 @@
 
 import re
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from cosim.bus import ZenohBus, mesh
+from cosim.errors import RunFailed
 from cosim.interrupt import Stop
 from cosim.key_prefix import check_key_prefix
-from cosim.keys import ALIVE_KEY
-from cosim.launcher import RunFailed
+from cosim.keys import ALIVE_KEY, ENCODER
+from cosim.participants import Participants
 from cosim.setup import Setup
 from cosim.watch import WATCHER, Watch
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.runs.processes import Clock
 from services import processes
+from services.participant import Participation
+from services.security import settings
 
+LOST = 6.0  # [s] without news after which a run counts as lost: after a cut of 2 s, TCP takes up to 4 s to send again
+GRACE = 2.0  # [s] that links of one run may differ by
 JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
+CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has failed
 
 
-def fly_joined(setup: Setup, peers: dict[str, str], key_prefix: str, observer: Observer) -> Elapsed:
-    """Watch a run whose services are started elsewhere, to its end.
+def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch], None] = lambda watch: None) -> Elapsed:
+    """Watch a run whose services are started elsewhere, to its end; `live` is shown it some five times a second.
 
     Raises:
         RunFailed: a service does not come, or is gone before the end.
-        ValueError: not a key prefix.
+        ValueError: not a key prefix, or its certificate cannot be used.
         Interrupted: ended by a signal.
     """
+    setup, peers, key_prefix = given.setup, given.peers, given.key_prefix
     check_key_prefix(key_prefix)
-    clock = Clock(observer, setup)
-    names = set(processes.needed(setup))
+    external = given.external or {}
+    clock, participants = Clock(observer, setup), Participants(key_prefix, external=tuple(external))
+    names = set(processes.needed(setup, external))
     listen, connect = mesh(WATCHER, peers)
-    with Stop() as stop, ZenohBus(listen, connect) as bus:
-        watch = Watch(bus, key_prefix)
-        bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
-        deadline = time.monotonic() + JOIN_TIMEOUT
-        while not (watch.ended and processes.RECORDER in watch.gone):
-            watch.poll(0.2)
-            clock.observe(watch)
-            stop.check()
-            if not names <= watch.present:
-                watch.last_news = time.monotonic()
-                if time.monotonic() > deadline:
-                    raise RunFailed(f"nobody answers as {', '.join(sorted(names - watch.present))}")
-            elif not watch.ended and watch.gone & names:
-                raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
-            elif culprit := watch.frozen(names):
-                raise RunFailed(culprit)
+    mark, security = participants.mark(WATCHER), settings(setup, WATCHER, key_prefix, given.keys)
+    with Stop() as stop, ZenohBus(listen, connect, mark=mark, security=security) as bus:
+        watch = Watch(bus, participants, peers, LOST)
+        leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
+        try:
+            _follow(watch, clock, stop, names, live)
+        except RunFailed:
+            leave()  # at which the others end
+            deadline = time.monotonic() + CLOSE_TIMEOUT
+            while names <= watch.present and processes.RECORDER not in watch.gone and time.monotonic() < deadline:
+                watch.poll(0.2)
+            raise
     return clock.elapsed
 
 
-def parse_peers(text: str, needed: Iterable[str] = ()) -> dict[str, str]:
-    """ "name=endpoint,..." as a table.
+def _follow(watch: Watch, clock: Clock, stop: Stop, names: set[str], live: Callable[[Watch], None]) -> None:
+    """Watch the run of the participants `names` to its end; errors as of `fly_joined`."""
+    deadline = time.monotonic() + JOIN_TIMEOUT
+    while not (watch.ended and processes.RECORDER in watch.gone):
+        live(watch)
+        watch.poll(0.2)
+        clock.observe(watch)
+        stop.check()
+        if not names <= watch.present:
+            watch.last_news = time.monotonic()
+            if time.monotonic() > deadline:
+                raise RunFailed(f"nobody answers as {', '.join(sorted(names - watch.present))}")
+        elif not watch.ended and watch.gone & names and not _ends(watch):
+            raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
+        elif watch.began is None and time.monotonic() < deadline:
+            watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
+        elif culprit := watch.frozen(names):
+            raise RunFailed(culprit)
+    live(watch)
+    if early := watch.broken_off():
+        raise RunFailed(early)
 
-    Args:
-        text: the table as the user gave it.
-        needed: names that it must have.
+
+def _ends(watch: Watch) -> bool:
+    """Whether the news of the end arrives now, by other links than the news that somebody has gone."""
+    deadline = time.monotonic() + GRACE
+    while not watch.ended and time.monotonic() < deadline:
+        watch.poll(0.2)
+    return watch.ended
+
+
+def parse_peers(text: str) -> dict[str, str]:
+    """ "name=endpoint,..." as a table. Programs of somebody else's stand first: all others connect to them.
 
     Raises:
-        ValueError: not of this form, no endpoint, or a name that is missing.
+        ValueError: not of this form, or no endpoint.
     """
     peers = dict(pair.split("=", 1) for pair in text.split(",") if "=" in pair)
     if not peers or len(peers) != len(text.split(",")):
         raise ValueError(f"--peers {text}: expected name=endpoint,..., for example plant=tcp/plant:7447")
     for endpoint in peers.values():
         check_endpoint("--peers", endpoint)
+    return {**elsewhere(peers), **peers}
+
+
+def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
+    """Refuse a table of participants that lacks one.
+
+    Raises:
+        ValueError: names those that are missing.
+    """
     if missing := [name for name in needed if name not in peers]:
-        raise ValueError(f"--peers {text}: no endpoint for {', '.join(missing)}")
-    return peers
+        raise ValueError(f"--peers: no endpoint for {', '.join(missing)}")
+
+
+def elsewhere(peers: Mapping[str, str]) -> dict[str, str]:
+    """The programs of somebody else's in a table: services whose messages have a process of their own in it."""
+    return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
 
 
 def parse_external(texts: Iterable[str], setup: Setup) -> dict[str, str]:
@@ -90,7 +134,7 @@ def check_endpoint(option: str, text: str) -> None:
     """Refuse what is no Zenoh endpoint.
 
     Raises:
-        ValueError: not of the form protocol/address:port.
+        ValueError: not of the form protocol/address:port, and no path of a Unix-domain socket.
     """
-    if not re.fullmatch(r"(tcp|udp|tls|quic|ws)/[^/\s]+:\d+", text):
+    if not re.fullmatch(r"(tcp|udp|tls|quic|ws)/[^/\s]+:\d+|unixsock-stream/\S+", text):
         raise ValueError(f"{option} {text}: expected an endpoint protocol/address:port, for example tcp/127.0.0.1:7447")

@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,11 @@ from lapwing.runs.observer import Observer
 from lapwing.runs.single import fly_single
 from messages import OperatorInput
 from messages.topics import OPERATOR
+from services.processes import Operator
 
 
-def recorded_setup(read: LogReader) -> Setup:
-    """The set-up of a run's log.
+def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> Setup:
+    """The set-up of a run's log, which may have classes of these modules.
 
     Raises:
         ValueError: it carries none, or one of another version.
@@ -26,9 +27,9 @@ def recorded_setup(read: LogReader) -> Setup:
     if SETUP_FILE not in read.attachments:
         raise ValueError(f"{read.path}: carries no set-up; expected a log that `lapwing run` has written")
     try:
-        found = from_json(read.attachments[SETUP_FILE].decode())
+        found = from_json(read.attachments[SETUP_FILE].decode(), modules)
     except ValueError as error:
-        raise ValueError(f"{read.path}: its set-up cannot be read by this version: {error}") from None
+        raise ValueError(f"{read.path}: its set-up cannot be read: {error}; expected {read.versions}") from None
     if not isinstance(found, Setup):
         raise ValueError(f"{read.path}: its attachment {SETUP_FILE} is no set-up")
     return found
@@ -42,11 +43,21 @@ def carried_modules(read: LogReader) -> dict[str, str]:
         return {}
 
 
-def given_commands(read: LogReader, setup: Setup) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """The commands from outside, with the ticks at which they applied; none where nobody was listened to."""
-    topic = OPERATOR.key(setup.vehicle)
+def given_commands(read: LogReader, setup: Setup, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """The commands from outside, with the ticks at which they applied; none where nobody was listened to.
+
+    Args:
+        read: a log.
+        setup: its own.
+        vehicle: whose; "" of the first.
+
+    Raises:
+        ValueError: they are of another version.
+    """
+    topic = OPERATOR.key(vehicle or setup.vehicles[0])
     if topic not in read.topics():
         return
+    read.check_versions([topic])
     for _, _, time_ns, payload in read.messages([topic]):
         yield time_ns // setup.interval_ns, OperatorInput.decode(payload).commands
 
@@ -69,23 +80,27 @@ def refly(log: Path, observer: Observer | None = None, run_code: bool = False) -
             files = ", ".join(f"modules.{name}.py" for name in modules)
             raise ValueError(f"{log}: carries code of its author ({files}): read it, and give --run-code to run it")
         user_module.install(modules)
-        setup = without_plan(recorded_setup(read))
+        setup = without_plan(recorded_setup(read, modules))
         if elsewhere := read.metadata.get("external"):
             raise ValueError(f"{log}: cannot be flown again: {elsewhere} was a program of somebody else's")
-        given = dict(given_commands(read, setup))
+        operators = {vehicle: _at(dict(given_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
         before = read.digest()
     with tempfile.TemporaryDirectory() as place:
         again = Path(place) / "again.mcap"
-        fly_single(setup, again, observer=observer, operator=lambda tick: given.get(tick, ()), last=last)
+        fly_single(setup, again, observer=observer, operator=operators, last=last)
         with LogReader(again) as read:
             return before, read.digest()
 
 
+def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
+    return lambda tick: given.get(tick, ())
+
+
 def without_plan(setup: Setup) -> Setup:
     """The set-up without the plan's commands, which a log has among those that the autopilot took."""
-    if "autopilot" not in setup.services:
+    if "autopilot" not in setup.services or not setup.vehicle:  # a fleet has no plan
         return setup
     autopilot = setup.services["autopilot"]
     flown = autopilot._replace(parameters=autopilot.parameters._replace(plan=()))

@@ -1,22 +1,22 @@
 """A run with all services in this process."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from cosim.errors import DivergedError, LockStepError
+from cosim.fleet import leading
 from cosim.graph import Graph
 from cosim.interrupt import Interrupted, Stop
 from cosim.log import LogWriter
 from cosim.provenance import attachments, failure, metadata
 from cosim.recording import Recording
-from cosim.schedule import DivergedError, LockStepError
 from cosim.setup import Setup
 from cosim.single import PAGE, run_single
 from lapwing.runs.compiling import told
 from lapwing.runs.observer import Elapsed, Observer, Silent
 from messages.topics import POSE, STATUS
-from services.processes import create_all
+from services.processes import Operator, create_all
 
 
 def fly_single(
@@ -25,7 +25,7 @@ def fly_single(
     sources: Mapping[str, str] | None = None,
     speed: float | None = None,
     observer: Observer | None = None,
-    operator: Callable[[int], Iterable[Any]] | None = None,
+    operator: Operator | Mapping[str, Operator] | None = None,
     last: int | None = None,
 ) -> Elapsed:
     """Fly with all services in this process, to the end or until a state is not sound; the log then says so.
@@ -36,7 +36,7 @@ def fly_single(
         sources: the files that were resolved, for the log.
         speed: simulated seconds per second, None for as fast as it goes.
         observer: is told how far the run is.
-        operator: gives the commands that have come until a tick.
+        operator: gives the commands that have come until a tick; for several vehicles one for each, by name.
         last: the tick after which to stop, None for the end of the run.
 
     Raises:
@@ -49,10 +49,11 @@ def fly_single(
         graph = Graph(setup, create_all(setup, operator), PAGE)
     with Stop() as stop, LogWriter(log, metadata(setup, "single"), attachments(setup, sources or {})) as writer:
         recording = Recording(writer, setup)
+        pose, status = leading(setup, POSE), leading(setup, STATUS)
 
         def observe(graph: Graph) -> bool:
             newest = recording.newest
-            watcher.show((graph.tick - 1) * setup.interval_ns, newest.get(POSE), newest.get(STATUS))
+            watcher.show((graph.tick - 1) * setup.interval_ns, newest.get(pose), newest.get(status))
             return stop.number is not None
 
         watcher.begin()

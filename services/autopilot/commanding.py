@@ -15,9 +15,10 @@ from services.autopilot.commander.commander import Commander
 from services.autopilot.commander.request import Request, Status
 from services.autopilot.commander.view import Constants, View
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
+from services.autopilot.injection.motors import Direct
 from services.autopilot.injection.parts import Injection
 from services.autopilot.interface import Setpoint
-from services.autopilot.law import build
+from services.autopilot.law import build, lift
 from services.autopilot.setup import AutopilotSetup
 from services.autopilot.stage import LANDED, ON_GROUND
 from services.common import ports
@@ -86,15 +87,17 @@ class Commanding:
                 table,
                 a.resting_height,
                 a.gravity,
-                self._weight / (4.0 * thrust_max),
+                self._weight / (lift(a) * thrust_max),
                 bool(given.phases),
                 given.operator,
                 injection.units,
+                len(a.rotor_x),
             )
         )
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
         self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
+        self._driven: tuple[float, ...] | None = None  # voltages from outside that hold
         self._estimate: Any = None
         self._estimate_every_tick = False
         self._acknowledgements: list[Any] = []
@@ -136,9 +139,18 @@ class Commanding:
             write(self._thresholds, battery_thresholds(request.parameters))
         if request.faults is not None and self._injection.faults is not None:
             write(self._injection.faults, request.faults)
+        if self._injection.direct is not None and request.motor_voltage != self._driven:
+            self._driven = request.motor_voltage
+            write(self._injection.direct, self._direct(request.motor_voltage))
         graph.put(ORDER, tick, self._order(tick, request, flight))
         self._answer(tick, request)
         return NEVER if request.quiet else tick + 1
+
+    def _direct(self, volts: tuple[float, ...] | None) -> Direct:
+        """Voltages from outside within what the motors take; None: the controller's."""
+        if volts is None:
+            return self._injection.released
+        return Direct(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
 
     def _thrust(self, tick: int) -> float:
         """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""

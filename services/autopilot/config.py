@@ -7,10 +7,12 @@ from pydantic import Field
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics.errors import KeyedError
+from services.autopilot.distance import distance_sensor
 from services.autopilot.gains import FOLDER, GainSet
+from services.autopilot.known_airframe import known_airframe
+from services.autopilot.law import build
 from services.common import modules, parameters, user_code
 from services.common.parameter_file import parse
-from services.common.vehicle import airframe
 
 ESTIMATORS = ("sensors", "truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
@@ -58,10 +60,12 @@ class Autopilot(Section):
         if not self.trajectory and not self.operator:
             message = "false leaves nobody to say what to fly; set operator = true too"
             raise KeyedError("autopilot.trajectory", message)
-        if (n := len(airframe(scene).rotors.position)) != 4:
-            raise KeyedError(
-                "vehicle.airframe", f"got one of {n} rotors", "a vehicle of 4 rotors, which the autopilot flies"
-            )
+        try:
+            build(scene[GainSet].plain(), known_airframe(scene))
+        except KeyedError:
+            raise
+        except ValueError as error:
+            raise KeyedError("airframe", str(error)) from None
         for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 message = "nobody to take them"
@@ -70,3 +74,9 @@ class Autopilot(Section):
             missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
                 raise KeyedError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
+            reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
+            sensor = parameters.HEIGHT_SENSORS[reference]
+            known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
+            if known not in scene.tables("sensors"):
+                message = f"{reference} takes the height from a sensor that is not carried"
+                raise KeyedError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")

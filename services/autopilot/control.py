@@ -10,8 +10,8 @@ from dynamics.lie.quaternion import to_roll_pitch_yaw
 from dynamics.vector import ZERO, Vec3, subtract
 from services.autopilot.attitude import error_by_angle, error_on_so3
 from services.autopilot.interface import Command, Estimate, Setpoint
-from services.autopilot.mixer import Demands, Signs, clamp, mix, saturate
-from services.autopilot.motor import Motor, voltage
+from services.autopilot.mixer import Demands, Shares, at_rest, clamp, mix, possible, saturate, shares_in_force
+from services.autopilot.motor import Motor, voltages
 from services.autopilot.pid import Pid, integrate, output
 from services.autopilot.reference import AT_REST, Angle, Smoothing, advance
 from services.autopilot.stage import FLYING, INITIAL_STAGE, LANDED, Stage, advance_stage
@@ -32,7 +32,7 @@ class Parameters(NamedTuple):
     gravity: float  # [m/s^2]
     torque_demands: Vec3  # (roll, pitch, yaw) demand of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
     geometric: bool  # attitude error on SO(3) instead of angle by angle
-    signs: Signs  # (roll, pitch, yaw) share of every rotor, each +1 or -1
+    shares: tuple[Shares, ...]  # with all rotors, and where that serves, with each one failed
     thrust_max: float  # [N] of a rotor
     motor: Motor
     resting_height: float  # world z of the vehicle's origin when it stands [m]
@@ -94,7 +94,9 @@ def collective_demand(
 
 
 @kernel
-def step(p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpoint) -> tuple[State, Command]:
+def step(
+    p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpoint, failed: int
+) -> tuple[State, Command]:
     """The command of one tick, and the state after it.
 
     Args:
@@ -103,12 +105,13 @@ def step(p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpo
         dt: length of the tick [s].
         estimate: Estimate at the tick.
         setpoint: Setpoint at the tick.
+        failed: number of the rotor that is known to have failed, from 1; 0: none.
     """
     roll, pitch, yaw = to_roll_pitch_yaw(estimate.attitude)
     angles = (roll, pitch, yaw)
     stage = advance_stage(s.stage, p.resting_height, estimate, setpoint, dt)
     if stage.name != FLYING:
-        off = (0.0, 0.0, 0.0, 0.0)
+        off = at_rest(p.shares[0])
         rest = State(stage, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
         return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, stage.name == LANDED)
 
@@ -148,17 +151,15 @@ def step(p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpo
         + p.torque_demands[1] * tilt_x.demand_acceleration,
         output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
     )
-    given = saturate(p.signs, wanted, p.thrust_max)
+    shares = shares_in_force(p.shares, failed)
+    given = saturate(shares, wanted, p.thrust_max)
     cut = Demands(
         sign(wanted.collective - given.collective),
         sign(wanted.roll - given.roll),
         sign(wanted.pitch - given.pitch),
         sign(wanted.yaw - given.yaw),
     )
-    t = mix(p.signs, given)
-    top = p.thrust_max
-    thrust = (clamp(t[0], 0.0, top), clamp(t[1], 0.0, top), clamp(t[2], 0.0, top), clamp(t[3], 0.0, top))
-    m = p.motor
-    volts = (voltage(m, thrust[0]), voltage(m, thrust[1]), voltage(m, thrust[2]), voltage(m, thrust[3]))
+    thrust = possible(mix(shares, given), p.thrust_max)
+    volts = voltages(p.motor, thrust)
     state = State(stage, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
     return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw, False)

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from cosim.part import GO_ON, Received
-from dynamics.kernel import leaf
+from dynamics.kernel import leaf, uncompiled
 from services.autopilot import control, interface, motor_failure
 from services.autopilot.attention import battery_warning
 from services.autopilot.stage import FLYING, ON_GROUND
@@ -52,7 +52,9 @@ class ControllerState(NamedTuple):
     charge: float  # of the battery, fraction; NaN: not known
 
 
-START = ControllerState(control.START, motor_failure.START, 0, float("nan"))
+def start(p: Controller) -> ControllerState:
+    """Before the first tick."""
+    return ControllerState(control.START, uncompiled(motor_failure.start)(p.watch), 0, float("nan"))
 
 
 @leaf
@@ -99,14 +101,13 @@ def outcome(
     flying = stage == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and wanted.final) if order.follow else order.finished
+    released = order.released or (order.follow and wanted.release and not flying)
     attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
     warning = battery_warning(p.thresholds.value, battery_charge)
     return watched, (
         MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
         wanted,
-        AutopilotStatus(
-            wanted.phase, order.words, armed, not flying, finished, warning, watched.failed, order.released
-        ),
+        AutopilotStatus(wanted.phase, order.words, armed, not flying, finished, warning, watched.failed, released),
         Flight(stage, still_from, watched.failed),
     )
 
@@ -120,8 +121,9 @@ def step(
     wanted = inputs[3].value if order.follow else order.reference
     controlled, watched, still_from = s.control, s.watch, s.still_from
     if order.restart_at == tick:
-        controlled, watched, still_from = control.START, motor_failure.START, tick + p.bounce
+        controlled, watched, still_from = control.START, motor_failure.start(p.watch), tick + p.bounce
     charge = battery.value.charge if battery.due else s.charge
-    controlled, c = control.step(p.law.value, controlled, p.interval, estimate_of(e), setpoint_of(wanted))
+    failed = watched.failed
+    controlled, c = control.step(p.law.value, controlled, p.interval, estimate_of(e), setpoint_of(wanted), failed)
     watched, outputs = outcome(p, watched, still_from, charge, order, e, wanted, controlled.stage.name, c)
     return ControllerState(controlled, watched, still_from, charge), outputs, GO_ON

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from dynamics.lie.quaternion import Quaternion
 from dynamics.vector import Vec3
 
-Four = tuple[float, float, float, float]
+PerRotor = tuple[float, ...]  # as many as the vehicle has rotors
 
 
 class Estimate(NamedTuple):
@@ -30,8 +30,8 @@ class Setpoint(NamedTuple):
 class Command(NamedTuple):
     """The controller's output."""
 
-    motor_voltage: Four  # [V]
-    thrust: Four  # asked of each rotor [N]
+    motor_voltage: PerRotor  # [V]
+    thrust: PerRotor  # asked of each rotor [N]
     roll_reference: float  # what the inner loop follows [rad]
     pitch_reference: float  # [rad]
     yaw_reference: float  # [rad]

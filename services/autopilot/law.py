@@ -1,12 +1,16 @@
 """A gain set put on an airframe: the parameters of the controller."""
 
-import math
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from dynamics.kernel import uncompiled
 from dynamics.vector import Vec3
+from services.autopilot.allocation import demand_effects, effectiveness, tables, tilted_effectiveness
 from services.autopilot.control import Parameters
-from services.autopilot.interface import Four
-from services.autopilot.mixer import Signs
+from services.autopilot.interface import PerRotor
+from services.autopilot.mixer import Shares
 from services.autopilot.motor import Motor, thrust_at
 from services.autopilot.pid import Pid
 from services.autopilot.reference import Smoothing
@@ -35,30 +39,34 @@ class Airframe(NamedTuple):
 
     mass: float  # [kg]
     inertia_body: Vec3  # principal [kg m^2]
-    rotor_x: Four  # positions of the rotors in body axes [m]
-    rotor_y: Four
-    reaction_sign: Four  # +1 where thrust turns the vehicle to the left
+    rotor_x: PerRotor  # positions of the rotors in body axes [m]
+    rotor_y: PerRotor
+    reaction_sign: PerRotor  # +1 where thrust turns the vehicle to the left about the rotor's axis
     torque_per_thrust: float  # reaction torque of a rotor over its thrust [m]
     motor: Motor
     voltage_max: float  # [V]
     resting_height: float  # world z of the vehicle's origin when it stands [m]
     gravity: float = 9.80665  # [m/s^2]
     spin_up_zero: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
+    rotor_z: PerRotor = ()  # [m] of rotors that have axes
+    rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () where that is body z
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
     """The controller's parameters: the gain set on an airframe; `geometric` takes the attitude error on SO(3).
 
-    Raises ValueError where the airframe cannot hover.
+    Raises ValueError where the airframe cannot hover, or not in balance.
     """
-    thrust_max = thrust_at(airframe.motor, airframe.voltage_max)
-    weight = 0.25 * airframe.mass * airframe.gravity
-    if thrust_max <= weight:
+    thrust_max = uncompiled(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
+    weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
+    share = shares(airframe)
+    needed = weight * max(collective for collective, *_ in share[0])
+    if thrust_max <= needed:
         raise ValueError(
-            f"the rotors give at most {thrust_max:.1f} N each, less than the {weight:.1f} N that hovering needs"
+            f"the rotors give at most {thrust_max:.1f} N each, less than the {needed:.1f} N that hovering needs"
         )
     forward = 1.0 if gains.feed_forward else 0.0
-    x, y, z = (forward * i / (4.0 * arm) for i, arm in zip(airframe.inertia_body, arms(airframe), strict=True))
+    x, y, z = (forward * i / moment for i, moment in zip(airframe.inertia_body, moments(airframe), strict=True))
     return Parameters(
         altitude=Pid(*gains.altitude),
         yaw=Pid(*gains.yaw),
@@ -72,26 +80,45 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         gravity=airframe.gravity,
         torque_demands=(x, y, z),
         geometric=geometric,
-        signs=_signs(airframe),
+        shares=share,
         thrust_max=thrust_max,
         motor=airframe.motor,
         resting_height=airframe.resting_height,
     )
 
 
-def arms(airframe: Airframe) -> Vec3:
-    """Moments about roll, pitch and yaw axis of a rotor over its thrust [m]: the mean of their sizes."""
-    return _mean_size(airframe.rotor_y), _mean_size(airframe.rotor_x), airframe.torque_per_thrust
+def lift(airframe: Airframe) -> float:
+    """Force along body z [N] of a collective demand of 1 N: the number of rotors where none is tilted."""
+    return float(demand_effects(rotor_effectiveness(airframe))[0])
 
 
-def _mean_size(values: Four) -> float:
-    return sum(abs(v) for v in values) / 4.0
+def moments(airframe: Airframe) -> Vec3:
+    """Torques about body x, y, z [N m] of demands of 1 N."""
+    _, x, y, z = map(float, demand_effects(rotor_effectiveness(airframe)))
+    return x, y, z
 
 
-def _signs(airframe: Airframe) -> Signs:
-    # Thrust at (x, y) turns the body by (y, -x) times the thrust: theory.md, eq. (4.20).
-    a, b, c, d = (
-        (math.copysign(1.0, y), -math.copysign(1.0, x), math.copysign(1.0, turn))
-        for x, y, turn in zip(airframe.rotor_x, airframe.rotor_y, airframe.reaction_sign, strict=True)
-    )
-    return a, b, c, d
+def shares(airframe: Airframe) -> tuple[Shares, ...]:
+    """Each rotor's share of the demands, as of `allocation.tables`."""
+    return _tables(*_geometry(airframe))
+
+
+def rotor_effectiveness(a: Airframe) -> np.ndarray:
+    """Force along body z [N] and torques [N m] of 1 N of thrust of every rotor, as of `allocation.effectiveness`."""
+    return _effectiveness(*_geometry(a))
+
+
+def _geometry(a: Airframe) -> tuple:
+    """All that the rotors' effectiveness depends on: the arguments of `_effectiveness`."""
+    return a.rotor_x, a.rotor_y, a.rotor_z, a.rotor_axis, tuple(sign * a.torque_per_thrust for sign in a.reaction_sign)
+
+
+def _effectiveness(x: PerRotor, y: PerRotor, z: PerRotor, axes: tuple, reaction: PerRotor) -> np.ndarray:
+    if axes:
+        return tilted_effectiveness(tuple(zip(x, y, z, strict=True)), axes, reaction)
+    return effectiveness(x, y, reaction)
+
+
+@lru_cache(maxsize=16)  # asked for several times at a start, and by every run of a campaign
+def _tables(*geometry: Any) -> tuple[Shares, ...]:
+    return tables(_effectiveness(*geometry))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from services.autopilot.control import Parameters
-from services.autopilot.law import Airframe
+from services.autopilot.law import Airframe, lift, moments
 from services.autopilot.pid import Pid
 
 FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 250 Hz
@@ -47,20 +47,18 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
     Both may also be transfer functions, s that of a derivative.
     """
     lag = 1.0 / (1.0 + airframe.motor.time_constant * s)
-    arm_x = sum(abs(y) for y in airframe.rotor_y)
-    arm_y = sum(abs(x) for x in airframe.rotor_x)
-    arm_z = 4.0 * airframe.torque_per_thrust
+    moment_x, moment_y, moment_z = moments(airframe)
     i_x, i_y, i_z = airframe.inertia_body
     found = {
-        "altitude": _pid(p.altitude, s) * 4.0 / airframe.mass * lag * late / s**2,
-        "yaw": _pid(p.yaw, s) * arm_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * late / s**2,
+        "altitude": _pid(p.altitude, s) * lift(airframe) / airframe.mass * lag * late / s**2,
+        "yaw": _pid(p.yaw, s) * moment_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * late / s**2,
     }
     smooth = p.smoothing.bandwidth**2 / (
         s**2 + 2.0 * p.smoothing.damping * p.smoothing.bandwidth * s + p.smoothing.bandwidth**2
     )
     for tilt, way, feedback, outer, effect in (
-        ("roll", "y", -_pid(p.roll_inner, s), p.roll_outer, arm_x / i_x),
-        ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, arm_y / i_y),
+        ("roll", "y", -_pid(p.roll_inner, s), p.roll_outer, moment_x / i_x),
+        ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, moment_y / i_y),
     ):
         turn = effect * lag * late / s**2  # tilt over demand
         demand = feedback * smooth  # demand over tilt asked for

@@ -1,16 +1,18 @@
-"""Four force demands to four thrusts and back, with saturation (theory.md, eqs. (4.20)-(4.23))."""
+"""Four force demands to the rotors' thrusts, with saturation by priority (theory.md, eqs. (4.20)-(4.23), (4.28))."""
 
+import math
 from typing import NamedTuple
 
+from dynamics.generate import each
 from dynamics.kernel import leaf
-from dynamics.vector import Vec3
-from services.autopilot.interface import Four
+from services.autopilot.interface import PerRotor
 
-Signs = tuple[Vec3, Vec3, Vec3, Vec3]  # (roll, pitch, yaw) share of every rotor, each +1 or -1
+Share = tuple[float, float, float, float]  # of a rotor in the demands: collective, roll, pitch, yaw
+Shares = tuple[Share, ...]  # of every rotor
 
 
 class Demands(NamedTuple):
-    """What each loop asks of every rotor [N]; the signs of the mixer give each rotor its share."""
+    """What each loop asks of every rotor [N], on the mean over the rotors; shares give each its own."""
 
     collective: float
     roll: float  # positive turns about body x (left side up)
@@ -19,15 +21,31 @@ class Demands(NamedTuple):
 
 
 @leaf
-def mix(signs: Signs, q: Demands) -> Four:
-    """The rotors' thrusts [N] of demands q without saturation; signs are (roll, pitch, yaw) of every rotor."""
-    a, b, c, d = signs
-    return (
-        q.collective + a[0] * q.roll + a[1] * q.pitch + a[2] * q.yaw,
-        q.collective + b[0] * q.roll + b[1] * q.pitch + b[2] * q.yaw,
-        q.collective + c[0] * q.roll + c[1] * q.pitch + c[2] * q.yaw,
-        q.collective + d[0] * q.roll + d[1] * q.pitch + d[2] * q.yaw,
-    )
+def _nothing(_: float, share: Share, other: Share) -> float:
+    return 0.0
+
+
+@leaf
+def at_rest(shares: Shares) -> PerRotor:
+    """No thrust [N] of any rotor."""
+    return each(_nothing, 0.0, shares, shares)
+
+
+@leaf
+def shares_in_force(tables: tuple[Shares, ...], failed: int) -> Shares:
+    """The shares with a rotor failed, by its number from 1; those with all rotors where there are no others."""
+    return tables[failed if failed < len(tables) else 0]
+
+
+@leaf
+def _thrust(q: Demands, share: Share, _: Share) -> float:
+    return share[0] * q.collective + share[1] * q.roll + share[2] * q.pitch + share[3] * q.yaw
+
+
+@leaf
+def mix(shares: Shares, q: Demands) -> PerRotor:
+    """The rotors' thrusts [N] of demands q without saturation."""
+    return each(_thrust, q, shares, shares)
 
 
 @leaf
@@ -37,21 +55,43 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 @leaf
-def saturate(signs: Signs, q: Demands, thrust_max: float) -> Demands:
+def _clamped(highest: float, value: float, _: float) -> float:
+    return clamp(value, 0.0, highest)
+
+
+@leaf
+def possible(values: PerRotor, highest: float) -> PerRotor:
+    """The nearest values within 0..highest, thrusts [N] or voltages [V]."""
+    return each(_clamped, highest, values, values)
+
+
+@leaf
+def saturate(shares: Shares, q: Demands, thrust_max: float) -> Demands:
     """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
-    Attitude comes first, then collective; yaw is given up first: it gets what room the others leave.
+    Attitude comes first, then collective; yaw is given up first: it gets what room the others leave. Rotors without a
+    share of the collective, which have failed, are left out.
     """
-    tilt = abs(q.roll) + abs(q.pitch)
-    share = min(1.0, 0.5 * thrust_max / max(tilt, 1e-9))
-    roll, pitch = share * q.roll, share * q.pitch
-    tilt *= share
-    collective = clamp(q.collective, tilt, thrust_max - tilt)
-    bare = mix(signs, Demands(collective, roll, pitch, 0.0))
-    low, high = -thrust_max, thrust_max
-    for k in range(4):
-        up, down = thrust_max - bare[k], -bare[k]
-        if signs[k][2] < 0.0:
-            up, down = -down, -up
-        low, high = max(low, down), min(high, up)
+    lowest = math.inf  # of what roll and pitch ask of a rotor, over its share of the collective
+    for s in shares:
+        if s[0] > 0.0:
+            lowest = min(lowest, (s[1] * q.roll + s[2] * q.pitch) / s[0])
+    part = 1.0
+    for s in shares:
+        if s[0] > 0.0:
+            span = (s[1] * q.roll + s[2] * q.pitch) / s[0] - lowest
+            part = min(part, thrust_max / s[0] / max(span, 1e-9))
+    roll, pitch = part * q.roll, part * q.pitch
+    low, high = -math.inf, math.inf
+    for s in shares:
+        if s[0] > 0.0:
+            tilt = part * ((s[1] * q.roll + s[2] * q.pitch) / s[0])
+            low, high = max(low, -tilt), min(high, thrust_max / s[0] - tilt)
+    collective = clamp(q.collective, low, high)
+    low, high = -math.inf, math.inf
+    for s in shares:
+        if s[3] != 0.0:
+            bare = s[0] * collective + s[1] * roll + s[2] * pitch
+            up, down = (thrust_max - bare) / s[3], -bare / s[3]
+            low, high = max(low, min(up, down)), min(high, max(up, down))
     return Demands(collective, roll, pitch, clamp(q.yaw, min(low, 0.0), max(high, 0.0)))

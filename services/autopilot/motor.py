@@ -3,7 +3,9 @@
 import math
 from typing import NamedTuple
 
+from dynamics.generate import each
 from dynamics.kernel import leaf
+from services.autopilot.interface import PerRotor
 
 RPM = 30.0 / math.pi  # revolutions per minute of 1 rad/s
 
@@ -22,6 +24,17 @@ def voltage(motor: Motor, thrust: float) -> float:
     """The voltage [V] that holds the speed of a thrust [N] >= 0."""
     propeller = math.sqrt(thrust / motor.thrust_coefficient)
     return RPM * propeller / (motor.gear_ratio * motor.speed_constant)
+
+
+@leaf
+def _voltage(motor: Motor, thrust: float, _: float) -> float:
+    return voltage(motor, thrust)
+
+
+@leaf
+def voltages(motor: Motor, thrust: PerRotor) -> PerRotor:
+    """The voltages [V] that hold the speeds of thrusts [N] >= 0."""
+    return each(_voltage, motor, thrust, thrust)
 
 
 @leaf

@@ -9,15 +9,16 @@ Theory.md, eqs. (4.25)-(4.26).
 import math
 from typing import NamedTuple
 
+from dynamics.generate import each
 from dynamics.kernel import leaf
 from dynamics.vector import Vec3
-from services.autopilot.interface import Four
-from services.autopilot.law import Airframe
+from services.autopilot.interface import PerRotor
+from services.autopilot.law import Airframe, lift, rotor_effectiveness
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
 LOST = 0.3  # share of its thrust that a rotor must lack
 ALIGNED = 0.25  # share of the disturbance, squared, that may point elsewhere than along the rotor's arm
-PATIENCE = 0.1  # [s] for so long
+DETECTION_TIME = 0.1  # [s] for so long
 CLEAR = 0.3  # [m] over the ground, below which the feet may push too
 LEAST = 0.3  # of the hovering thrust: rotors that are asked for less are judged by this
 
@@ -25,8 +26,8 @@ LEAST = 0.3  # of the hovering thrust: rotors that are asked for less are judged
 class Parameters(NamedTuple):
     """The vehicle as the autopilot knows it."""
 
-    rotor_x: Four  # [m]
-    rotor_y: Four  # [m]
+    roll_arm: PerRotor  # [m] torque about body x of 1 N of each rotor's thrust
+    pitch_arm: PerRotor  # [m] about body y
     inertia_body: Vec3  # [kg m^2]
     time_constant: float  # of the rotor speeds [s]
     hovering: float  # thrust of each rotor [N]
@@ -35,8 +36,8 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Memory of the watch."""
 
-    asked: Four  # thrusts of the last tick [N]
-    root: Four  # square root of the thrusts that the rotors should give by now [N^(1/2)]
+    asked: PerRotor  # thrusts of the last tick [N]
+    root: PerRotor  # square root of the thrusts that the rotors should give by now [N^(1/2)]
     rate: tuple[float, float]  # omega x, y as predicted [rad/s]
     disturbance: tuple[float, float]  # angular acceleration that the commands do not explain [rad/s^2]
     suspect: int  # number of the rotor, from 1
@@ -44,14 +45,23 @@ class State(NamedTuple):
     failed: int  # number of the rotor, from 1; 0: none
 
 
-_NONE = (0.0, 0.0, 0.0, 0.0)
-START = State(_NONE, _NONE, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
-
-
 def build(airframe: Airframe) -> Parameters:
     """The watch of an airframe."""
     a = airframe
-    return Parameters(a.rotor_x, a.rotor_y, a.inertia_body, a.motor.time_constant, 0.25 * a.mass * a.gravity)
+    _, roll, pitch, _ = rotor_effectiveness(a).tolist()
+    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, a.mass * a.gravity / lift(a))
+
+
+@leaf
+def _none(_: float, x: float, y: float) -> float:
+    return 0.0
+
+
+@leaf
+def start(p: Parameters) -> State:
+    """Before a flight."""
+    none = each(_none, 0.0, p.roll_arm, p.pitch_arm)
+    return State(none, none, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
 
 
 @leaf
@@ -60,18 +70,18 @@ def _follow(share: float, root: float, asked: float) -> float:
 
 
 @leaf
-def _arm(p: Parameters, k: int, root: Four) -> tuple[float, float]:
+def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
     """Angular acceleration [rad/s^2] about x and y that rotor k should give."""
     thrust = max(root[k] * root[k], LEAST * p.hovering)
-    return p.rotor_y[k] * thrust / p.inertia_body[0], -p.rotor_x[k] * thrust / p.inertia_body[1]
+    return p.roll_arm[k] * thrust / p.inertia_body[0], p.pitch_arm[k] * thrust / p.inertia_body[1]
 
 
 @leaf
-def suspect(p: Parameters, root: Four, disturbance: tuple[float, float]) -> int:
+def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> int:
     """Number of the rotor, from 1, whose lack of thrust explains the disturbance; 0 if none does."""
     x, y = disturbance
     found, most = 0, LOST
-    for k in range(4):
+    for k in range(len(p.roll_arm)):
         ax, ay = _arm(p, k, root)
         lack = -(x * ax + y * ay) / (ax * ax + ay * ay)
         left = (x + lack * ax) * (x + lack * ax) + (y + lack * ay) * (y + lack * ay)
@@ -81,32 +91,26 @@ def suspect(p: Parameters, root: Four, disturbance: tuple[float, float]) -> int:
 
 
 @leaf
-def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: Four) -> State:
+def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: PerRotor) -> State:
     """The watch after a tick of dt [s].
 
     Args:
         p: Parameters.
-        s: State; `START` before a flight.
+        s: State; `start` before a flight.
         dt: [s].
         omega_body: body rates now [rad/s].
         height: over the standing height [m].
         asked: thrusts of the rotors that are asked for from now on [N].
     """
     share = 1.0 - math.exp(-dt / p.time_constant)
-    a, r = s.asked, s.root
-    root = (
-        _follow(share, r[0], a[0]),
-        _follow(share, r[1], a[1]),
-        _follow(share, r[2], a[2]),
-        _follow(share, r[3], a[3]),
-    )
+    root = each(_follow, share, s.root, s.asked)
     ix, iy, iz = p.inertia_body
     wx, wy, wz = omega_body
     ax, ay = (iy - iz) * wy * wz / ix, (iz - ix) * wz * wx / iy
-    for k in range(4):
+    for k in range(len(p.roll_arm)):
         thrust = root[k] * root[k]
-        ax += p.rotor_y[k] * thrust / ix
-        ay -= p.rotor_x[k] * thrust / iy
+        ax += p.roll_arm[k] * thrust / ix
+        ay += p.pitch_arm[k] * thrust / iy
     if height < CLEAR:
         return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, s.failed)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
@@ -119,5 +123,5 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
     disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
     found = suspect(p, root, disturbance)
     lasting = s.lasting + dt if found > 0 and found == s.suspect else 0.0
-    failed = found if lasting > PATIENCE and s.failed == 0 else s.failed
+    failed = found if lasting > DETECTION_TIME and s.failed == 0 else s.failed
     return State(asked, root, rate, disturbance, found, lasting, failed)

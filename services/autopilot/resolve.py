@@ -1,28 +1,28 @@
 """From a scene's `[autopilot]` to what the autopilot is given."""
 
-import math
 from collections.abc import Callable
 
 from cosim.scene import Scene
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup
-from dynamics.vehicles.multirotor import STANDARD_DENSITY
+from dynamics.terrain import Level, surface
 from services.autopilot import estimator
 from services.autopilot.config import ESTIMATORS, Autopilot
 from services.autopilot.custom.build import controller_rate, estimator_rate, vehicle_model
+from services.autopilot.distance import distance_sensor
 from services.autopilot.estimate import EXACT
 from services.autopilot.estimator import Estimator
 from services.autopilot.gains import GainSet
-from services.autopilot.law import Airframe
-from services.autopilot.motor import Motor
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.setup import AutopilotSetup, CustomCode
 from services.common import modules, parameters, ports
+from services.common.environment import environment
 from services.common.exchange import Exchange, Rates, ticks
 from services.common.ports import AutopilotStatus, MotorCommand, Reference
 from services.common.sections import follows_trajectory
-from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height
+from services.common.vehicle import gravity, start_place
 
-FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR)
+FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR, ports.RANGEFINDER, ports.OPTICAL_FLOW)
 
 
 def resolve(scene: Scene) -> ServiceSetup | None:
@@ -34,13 +34,15 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     truth, own = config.estimator == "truth", config.estimator not in ESTIMATORS
     carried = sorted(scene.tables("sensors"))
     sensors = [name for name in FUSED if name in carried and not truth and not own]
+    if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
+        sensors.remove(ports.RANGEFINDER)
     inputs = [Input(ports.TRUTH)] if truth else [Input(name) for name in (carried if own else sensors)]
     inputs += [Input(ports.BATTERY), *([Input(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)
     given = AutopilotSetup(
         None if truth or own else _estimator(scene, imu_every),
-        (0.0, 0.0, start_height(scene)),
+        start_place(scene),
         imu_every,
         _lateness(scene, imu_every) if ports.GPS in sensors else 0,
         scene[GainSet].plain(),
@@ -56,13 +58,14 @@ def resolve(scene: Scene) -> ServiceSetup | None:
         _custom(scene, "controller", controller_rate) if config.controller else None,
         _custom(scene, "estimator", estimator_rate) if own else None,
         vehicle_model(known_airframe(scene), exchange.interval) if config.controller or own else None,
+        distance_sensor(scene),
     )
-    four = (0.0,) * 4
+    none = (0.0,) * len(given.airframe.rotor_x)
     return ServiceSetup(
         given,
         tuple(inputs),
         (
-            Port(ports.ACTUATORS, MotorCommand(four, False, four, (0.0, 0.0, 0.0))),
+            Port(ports.ACTUATORS, MotorCommand(none, False, none, (0.0, 0.0, 0.0))),
             Port(ports.ESTIMATE, EXACT),
             Port(ports.SETPOINT, Reference()),
             Port(ports.STATUS, AutopilotStatus(), given.status_every),
@@ -84,8 +87,20 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
 
 def _estimator(scene: Scene, imu_every: int) -> Estimator:
     receiver = scene.tables("sensors")["gps"].get("preset", "rtk")
-    return estimator.PRESETS.get(receiver, Estimator())._replace(
-        interval=scene[Exchange].interval * imu_every, gravity=gravity(scene)
+    around, found = environment(scene), estimator.PRESETS.get(receiver, Estimator())
+    level = isinstance(around.terrain, Level)
+    ground = surface(around.terrain, *start_place(scene)[:2])[0]
+    if distance_sensor(scene) == ports.RANGEFINDER:
+        found = found._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
+        ground -= scene.lookup("sensors.rangefinder.position")[2]  # the distance counts from its place
+    return found._replace(
+        interval=scene[Exchange].interval * imu_every,
+        home=around.home,
+        gravity=gravity(scene),
+        atmosphere=around.atmosphere,
+        magnetic_field_world=around.magnetic_field_world,
+        ground_height=ground,
+        sonar_height_max=found.sonar_height_max if level else 0.0,  # the filter knows no other ground than level
     )
 
 
@@ -93,30 +108,3 @@ def _lateness(scene: Scene, imu_every: int) -> int:
     """Readings of the IMU by which the receiver is late."""
     late = scene.lookup("sensors.gps.latency_samples") / scene.lookup("sensors.gps.rate")
     return round(round(late * 1e9) / scene[Exchange].interval_ns / imu_every)
-
-
-def known_airframe(scene: Scene) -> Airframe:
-    """What the autopilot is told of the vehicle: nominal numbers, at standard density."""
-    frame = airframe(scene)
-    rotor = rotor_constants(scene)
-    torque_per_thrust = rotor.torque / rotor.thrust
-    thrust_coefficient = (STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
-    weight = 0.25 * frame.mass.total * gravity(scene)
-    slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
-    spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0
-    x, y, _ = zip(*frame.rotors.position, strict=True)
-    a, b, c, d = frame.rotors.reaction_sign
-    engine = frame.motor
-    return Airframe(
-        frame.mass.total,
-        frame.mass.inertia,
-        x,
-        y,
-        (a, b, c, d),
-        torque_per_thrust,
-        Motor(thrust_coefficient, engine.gear_ratio, engine.speed_constant, engine.time_constant),
-        engine.max_voltage,
-        start_height(scene),
-        gravity(scene),
-        frame.rotors.inertia / (slope * torque_per_thrust) if spins_up else 0.0,
-    )

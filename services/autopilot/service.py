@@ -1,5 +1,6 @@
 """The autopilot as a service: sensors (or the truth) and references in, motor voltages out."""
 
+import math
 from typing import Any
 
 from cosim.graph import Service
@@ -19,16 +20,18 @@ from services.autopilot.injection.parts import Injection
 from services.autopilot.navigation.correction import Correction
 from services.autopilot.navigation.estimate import FilterEstimate
 from services.autopilot.navigation.gps import GpsFusion
+from services.autopilot.navigation.ground import GroundReference
 from services.autopilot.navigation.inertial import STANDSTILL_EVERY, InertialNavigation
 from services.autopilot.navigation.state import blank
 from services.autopilot.navigation.truth import TrueEstimate
 from services.autopilot.setup import AutopilotSetup
 from services.autopilot.wire import wires
 from services.common import ports
-from services.common.failures import Faults
+from services.common.failures import SOUND, Faults
+from services.common.parameters import GPS_HEIGHT, SONAR_HEIGHT
 
 NAME = "autopilot"
-GPS_HEIGHT, NO_HEIGHT = 1, 1e8  # of EKF2_HGT_REF; variance [m^2] of a height that tells nothing
+NO_HEIGHT = 1e8  # [m^2] variance of a height that tells nothing
 BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
 
 
@@ -44,8 +47,8 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     def speak(tick: int) -> list[Any]:
         return [*(given.plan if tick == 0 else ()), *operator(tick)]
 
-    faults = Cell(Faults()) if given.operator and values["SYS_FAILURE_EN"] else None
-    injection = Injection(faults, setup.ports, given.estimator is not None)
+    faults = Cell(Faults(motors=(SOUND,) * len(given.airframe.rotor_x))) if given.operator else None
+    injection = Injection(faults, setup, given.estimator is not None, given.airframe.motor)
     commanding = Commanding(given, law, thresholds, service, speak, injection)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
@@ -55,7 +58,7 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(battery), Input(reference))
     gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
     if given.controller is None:
-        control = [Part(f"{NAME}.control", common, Cell(core.START), inputs, gives)]
+        control = [Part(f"{NAME}.control", common, Cell(core.start(common)), inputs, gives)]
     else:
         control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
     navigation = _navigation(setup, given, attention, outputs[ports.ESTIMATE], injection)
@@ -83,6 +86,7 @@ def _navigation(
         return [Part(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
     height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
+    over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
     known = setup.ports
     begin = InertialNavigation(p, given.start_world, STANDSTILL_EVERY * given.imu_every)
     inputs = (Input(injection.received(ports.IMU)), Input(injection.received(ports.MAGNETOMETER)), flight)
@@ -91,7 +95,8 @@ def _navigation(
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),
         (ports.GPS, GpsFusion(p, given.gps_age, 0.0 if height_reference == GPS_HEIGHT else NO_HEIGHT)),
-        (ports.SONAR, Correction(p)),
+        (given.distance_sensor or ports.SONAR, over_ground if height_reference == SONAR_HEIGHT else Correction(p)),
+        (ports.OPTICAL_FLOW, Correction(p)),
     ):
         if port in known:
             parts.append(

@@ -37,3 +37,4 @@ class AutopilotSetup(NamedTuple):
     controller: CustomCode | None = None  # None: the cascaded PID
     own_estimator: CustomCode | None = None
     vehicle: VehicleModel | None = None  # what the user's own code is told of it
+    distance_sensor: str | None = None  # port of the sensor that tells how far the ground is

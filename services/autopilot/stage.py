@@ -9,9 +9,9 @@ ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, fly
 CUT_HEIGHT = (
     0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
 )
-PATIENCE = 2.0  # [s] asked to stand and still: the motors stop although the estimated height says otherwise
-DOUBT = 0.5  # [m] how wrong the estimated height may be for that
-STILL = 0.1  # [m/s] vertical speed of a vehicle that stands, as estimated
+LANDED_TIME = 2.0  # [s] asked to stand and not moving: the motors stop although the estimated height says otherwise
+LANDED_HEIGHT_ERROR = 0.5  # [m] how wrong the estimated height may be for that
+LANDED_SPEED = 0.1  # [m/s] greatest estimated vertical speed of a vehicle that stands
 
 
 class Stage(NamedTuple):
@@ -35,5 +35,5 @@ def advance_stage(stage: Stage, resting_height: float, estimate: Estimate, setpo
         return Stage(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
     if stage.name == LANDED:
         return stage
-    waiting = stage.waiting + dt if abs(speed) < STILL and height < DOUBT else 0.0
-    return Stage(LANDED if height < CUT_HEIGHT or waiting > PATIENCE else FLYING, waiting)
+    waiting = stage.waiting + dt if abs(speed) < LANDED_SPEED and height < LANDED_HEIGHT_ERROR else 0.0
+    return Stage(LANDED if height < CUT_HEIGHT or waiting > LANDED_TIME else FLYING, waiting)

@@ -5,12 +5,12 @@ import math
 from cosim.scene import Scene
 from services.autopilot.config import Autopilot
 from services.autopilot.gains import GainSet
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
 from services.autopilot.margins import excess, open_loops
-from services.autopilot.resolve import known_airframe
 from services.common.exchange import Exchange
 
-MODELS = ("reduced", "multibody")  # of vehicles whose hover the margins are for
+MODELS = ("reduced", "multibody", "slung_load")  # of vehicles whose hover the margins are for
 
 
 def unstable_loops(scene: Scene) -> list[str]:

@@ -37,13 +37,11 @@ from services.common.ports import Reference, StateEstimate
 
 __all__ = ["MotorVoltages", "Reference", "StateEstimate", "ThrustAndMoments", "VehicleModel"]
 
-Four = tuple[float, float, float, float]
-
 
 class MotorVoltages(NamedTuple):
     """A command to the motors themselves; clipped to 0 to `voltage_max`."""
 
-    volts: Four  # [V]
+    volts: tuple[float, ...]  # [V] of each motor, in the order of the airframe
     roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] that it steers to, for the log
 
 
@@ -72,3 +70,4 @@ class VehicleModel(NamedTuple):
     motor_time_constant: float  # [s] of the rotor speed
     resting_height: float  # [m] world z of the vehicle's origin when it stands
     interval: float  # [s] a tick
+    rotor_axes_body: tuple[Vec3, ...]  # unit vector of each rotor's thrust

@@ -13,6 +13,7 @@ class Exchange(Section):
     """The communication step: how often services exchange messages, and whether the command closes the loop at once."""
 
     TABLE: ClassVar[str] = "exchange"
+    SHARED: ClassVar[bool] = True
     rate: int = Field(default=250, gt=0, le=10_000)  # [Hz] one tick is 1/rate
     coupling: Literal["sequential", "parallel"] = "sequential"  # Gauss-Seidel, or Jacobi: services overlap
 
@@ -42,6 +43,7 @@ class Rates(Section):
     """How often derived messages are published [Hz], at the most once a tick; each divides exchange.rate."""
 
     TABLE: ClassVar[str] = "rates"
+    SHARED: ClassVar[bool] = True
     pose: int = Field(default=50, gt=0)  # [Hz] pose, odometry, transform and clock
     estimate: int = Field(default=50, gt=0)  # [Hz] what the autopilot takes for the state
     status: int = Field(default=10, gt=0)  # [Hz] phase, armed, landed, failures

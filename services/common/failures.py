@@ -2,9 +2,13 @@
 
 from typing import NamedTuple
 
-SOUND, OFF, STUCK, WRONG, SLOW = range(5)  # what is wrong with a unit
+KINDS = ("sound", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
+"""What may be wrong with a unit; numbered as MAVLink's FAILURE_TYPE."""
+SOUND, OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT = range(len(KINDS))
 UNITS = ("gyro", "accelerometer", "magnetometer", "barometer", "gps", "sonar", "battery", "motor")
 """In the order in which an operator's command counts them."""
+OF_SYSTEMS = {"battery": (SOUND, OFF, STUCK, WRONG), "motor": (SOUND, OFF, STUCK, WRONG, SLOW)}
+"""What may be wrong with a unit that is no sensor; with a sensor, everything."""
 
 
 class Faults(NamedTuple):
@@ -17,4 +21,15 @@ class Faults(NamedTuple):
     gps: int = SOUND
     sonar: int = SOUND
     battery: int = SOUND
-    motors: int = 0  # bit k: motor k + 1 is off
+    battery_charge: float = 0.0  # fraction that a wrong battery reports
+    motors: tuple[int, ...] = ()  # one for each
+
+
+def possible(unit: str) -> tuple[int, ...]:
+    """What may be wrong with a unit."""
+    return OF_SYSTEMS.get(unit, tuple(range(len(KINDS))))
+
+
+def refusal(unit: str) -> str:
+    """What to tell somebody who asks for a failure that a unit does not know."""
+    return f"a {unit} can be {', '.join(KINDS[kind] for kind in possible(unit))}"

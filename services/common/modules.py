@@ -14,6 +14,7 @@ class Modules(Section):
     TABLE: ClassVar[str] = "modules"
     OPTIONAL: ClassVar[bool] = True
     FROM_FILE: ClassVar[bool] = True
+    SHARED: ClassVar[bool] = True
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, str]
 

@@ -20,6 +20,11 @@ _RETURNS = (
     "0 home or the nearest rally point, 1 to the mission's landing, 2 there along the mission, else back along it, "
     "3 to the nearest of these"
 )
+BAROMETER_HEIGHT, GPS_HEIGHT, SONAR_HEIGHT = 0, 1, 2  # EKF2_HGT_REF
+HEIGHT_SENSORS = ("barometer", "gps", "sonar")
+"""The sensor that each value of EKF2_HGT_REF stands for."""
+_LEVELS = "1 a low charge, 2 a critical one, 3 an almost empty pack"
+_HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
 NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # what a failsafe does
 _ACTION = "0 a warning, 1 hold, 2 return, 3 land, 4 descend, which needs no position"
 
@@ -34,6 +39,7 @@ class Parameter(NamedTuple):
     most: float
     meaning: str
     whole: bool = False  # only whole numbers
+    at_start: bool = False  # a change acts from the next start on
 
     def allows(self, value: float) -> bool:
         """Whether it can have this value."""
@@ -88,8 +94,11 @@ _FAILSAFES = (
     Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"when a motor gives less than it is asked for: {_ACTION}", True),
     Parameter("COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position for so long it is lost"),
     Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"when it is: {_ACTION}", True),
-    Parameter("EKF2_HGT_REF", "", 1, 0, 1, "where the height comes from, from the start on: 0 barometer, 1 GPS", True),
-    Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "whether failures may be injected; 1 from the start of the run on", True),
+    Parameter(
+        "EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"what the height comes from, from the start on: {_HEIGHTS}", True, True
+    ),
+    Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "whether failures may be injected", True),
+    Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"what a battery that is wrong reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"outside of the fence: {_ACTION}", True),
 )
 _LOOPS = {

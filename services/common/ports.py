@@ -4,6 +4,7 @@ Each is a port of the graph; a message of the same topic is made from it (the se
 for each rotor or body are as long as the vehicle has them.
 """
 
+import math
 from typing import NamedTuple
 
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion
@@ -11,6 +12,7 @@ from dynamics.vector import ZERO, Vec3
 
 TRUTH, BATTERY, BODIES = "truth", "battery", "bodies"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
+OPTICAL_FLOW, RANGEFINDER = "optical_flow", "rangefinder"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 LIFT = "lift"
 
@@ -34,6 +36,7 @@ class TrueState(NamedTuple):
     wind_world: Vec3 = ZERO  # [m/s] velocity of the air
     air_density: float = 0.0  # [kg/m^3]
     ground_contact: bool = False  # any foot touches the ground
+    angular_acceleration_body: Vec3 = ZERO  # [rad/s^2] of a multirotor
 
 
 class BatteryGauge(NamedTuple):
@@ -42,6 +45,7 @@ class BatteryGauge(NamedTuple):
     charge: float = 0.0  # fraction; NaN where no effect counts it
     voltage: float = 0.0  # [V]
     current: float = 0.0  # [A] drawn
+    temperature: float = math.nan  # [K]; NaN where no effect computes it
 
 
 class BodyMotions(NamedTuple):
@@ -102,6 +106,24 @@ class SonarReading(NamedTuple):
     valid: bool = False
 
 
+class OpticalFlowReading(NamedTuple):
+    """One reading of a camera that looks down."""
+
+    flow: tuple[float, float] = (0.0, 0.0)  # [rad/s] about body x and y
+    rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same
+    distance: float = 0.0  # [m] along the camera's axis
+    variance: float = 0.0  # [(rad/s)^2] of the flow's white noise, per axis
+    valid: bool = False
+
+
+class RangefinderReading(NamedTuple):
+    """One reading of a laser rangefinder, as sensor_msgs/Range has it."""
+
+    range: float = 0.0  # [m]; +inf: nothing in range, -inf: nearer than range_min
+    variance: float = 0.0  # [m^2], of the white noise
+    valid: bool = False
+
+
 class Reference(NamedTuple):
     """Where the vehicle ought to be."""
 
@@ -112,6 +134,7 @@ class Reference(NamedTuple):
     yaw_rate: float = 0.0  # [rad/s]
     phase: int = 0  # number of the text that names the present part of the mission
     final: bool = False  # no later part of the mission ends in the air: the next landing is the last
+    release: bool = False  # the gripper is to be open while the vehicle stands
 
 
 class MotorCommand(NamedTuple):

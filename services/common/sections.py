@@ -7,24 +7,35 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 import scenes
-from cosim.scene import Scene, Section
+from cosim.scene import Files, Scene, Section
 
 SHIPPED = Path(str(importlib.resources.files(scenes)))  # folder of the scenes that ship
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
+
+Pair = Annotated[tuple[float, float], Field(strict=False)]  # along x and y
 
 
 class Run(Section):
     """What ends a run, and the seed of all its randomness."""
 
     TABLE: ClassVar[str] = "run"
+    SHARED: ClassVar[bool] = True
     title: str = ""  # one line for `lapwing scenes`
     seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
     duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
     settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
-    failed: tuple[Literal["crashed", "timed out", "diverged"], ...] = Field(
-        default=("crashed", "diverged"), strict=False
-    )  # verdicts with which a run has failed: exit code 4
+    restart: tuple[str, ...] = Field(default=(), strict=False)  # services that are started again where they are killed
     speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
+
+
+def title(scene: Path) -> str:
+    """What a scene's file calls it; no other of its keys is looked at.
+
+    Raises:
+        SceneError: it is not a TOML file.
+    """
+    run = Files(scene.parent).toml("scene", "scene", scene).get(Run.TABLE, {})
+    return str(run.get("title", "")) if isinstance(run, dict) else ""
 
 
 class CooperativeLoad(Section):

@@ -17,11 +17,13 @@ from services.mavlink.mission_store import MissionStore
 from services.mavlink.parameter_store import ParameterStore
 from services.mavlink.protocols import handlers
 from services.mavlink.session import Session
+from services.mavlink.telemetry.state import heartbeat
 from services.mavlink.vehicle import VehicleDescription
 from services.mavlink.view import VehicleView
 
 SECOND = 1_000_000_000
 LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as gone
+HEARTBEAT_INTERVAL = 1.0  # [s]
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for everybody
 _EMPTY = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
@@ -61,6 +63,7 @@ class Adapter:
         self._insecure, self._log = insecure, log
         self._announcements = Announcements(self.vehicle, self.broadcast)
         self._next_link = 0
+        self._next_heartbeat = 0.0  # [s] of wall time, before the vehicle speaks
 
     def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None]) -> Endpoint:
         """A new endpoint; `local`: on this machine, `datagrams`: no frame spans two pieces of its bytes."""
@@ -133,6 +136,7 @@ class Adapter:
             return
         self.vehicle.put(topic, payload)
         if topic is ESTIMATE:
+            self.commands.started = True
             self.vehicle.time_ns = time_ns
             self.clock.now = Instant(time_ns, wall)
             self._step()
@@ -146,8 +150,13 @@ class Adapter:
             self._announcements.step()
 
     def tick(self, wall: float) -> None:
-        """Wall time goes on, also while the vehicle is silent."""
+        """Wall time goes on, also while the vehicle is silent; until it speaks, heartbeats say that it starts."""
         self.clock.now = Instant(self.clock.now.time_ns, wall)
+        if not self.commands.started:
+            self.parameters.step()
+            if wall >= self._next_heartbeat:
+                self._next_heartbeat = wall + HEARTBEAT_INTERVAL
+                self.broadcast(heartbeat(self.vehicle))
 
     def broadcast(self, message: Any) -> None:
         """Send a message to every endpoint."""
@@ -155,7 +164,7 @@ class Adapter:
             endpoint.send(message)
 
     def _step(self) -> None:
-        built: dict[int, Any] = {}
+        built: dict[int, list[Any]] = {}
         for endpoint, session in self.sessions.items():
             session.schedule.send_due(endpoint.send, built)
             for message in session.log.step():

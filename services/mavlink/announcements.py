@@ -58,5 +58,5 @@ class Announcements:
 
     def _send(self, name: str) -> None:
         number = id_of(name)
-        if number is not None and (message := streams()[number].build(self._vehicle)) is not None:
+        for message in streams()[number].messages(self._vehicle) if number is not None else ():
             self._broadcast(message)

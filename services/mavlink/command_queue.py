@@ -19,8 +19,9 @@ class CommandQueue:
     def __init__(self, clock: Clock, put: Callable[[OperatorCommand], None] | None):
         """`put` hands a command to the autopilot; None: there is none, this is a recorded flight."""
         self._clock, self._put = clock, put
+        self.started = False  # the autopilot has spoken
         self._last = 0
-        self._waiting: dict[int, tuple[OnAcknowledgement, Instant]] = {}
+        self._waiting: dict[int, tuple[OnAcknowledgement, Instant, str]] = {}
 
     @property
     def connected(self) -> bool:
@@ -46,34 +47,38 @@ class CommandQueue:
             text: of OperatorCommand.
             items: of OperatorCommand.
         """
-        if self._put is None or len(self._waiting) >= MAX_WAITING:
+        if self._put is None or not self.started or len(self._waiting) >= MAX_WAITING:
             if on_acknowledgement:
-                on_acknowledgement(
-                    _rejection("a recorded flight takes no commands" if self._put is None else "too many at once")
-                )
+                on_acknowledgement(_rejection(self._refusal()))
             return
         self._last = self._last % 0xFFFFFFFF + 1
         if on_acknowledgement:
-            self._waiting[self._last] = on_acknowledgement, self._clock.now
+            self._waiting[self._last] = on_acknowledgement, self._clock.now, source
         self._put(OperatorCommand(kind, source, self._last, tuple(float(v) for v in values), text, tuple(items)))
+
+    def _refusal(self) -> str:
+        """Why no command is taken now."""
+        if self._put is None:
+            return "a recorded flight takes no commands"
+        return "too many at once" if self.started else "the vehicle is still starting"
 
     def acknowledge(self, acknowledgements: Sequence[Any]) -> None:
         """The autopilot has acknowledged commands."""
         for acknowledgement in acknowledgements:
             waiting = self._waiting.get(acknowledgement.id)
-            if waiting is None:
+            if waiting is None or waiting[2] != acknowledgement.source:  # of nobody here: others number theirs, too
                 continue
             if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
-                self._waiting[acknowledgement.id] = waiting[0], self._clock.now
+                self._waiting[acknowledgement.id] = waiting[0], self._clock.now, waiting[2]
             else:
                 del self._waiting[acknowledgement.id]
             waiting[0](acknowledgement)
 
     def step(self) -> None:
         """Reject what the autopilot leaves without an acknowledgement."""
-        late = [n for n, (_, given) in self._waiting.items() if self._clock.since(given) > TIMEOUT]
+        late = [n for n, (_, given, _) in self._waiting.items() if self._clock.since(given) > TIMEOUT]
         for number in late:
-            on_acknowledgement, _ = self._waiting.pop(number)
+            on_acknowledgement, *_ = self._waiting.pop(number)
             on_acknowledgement(_rejection("the autopilot does not acknowledge"))
 
 

@@ -7,13 +7,14 @@ from typing import Any
 
 from services.common.parameters import Parameter
 from services.mavlink import flavours
+from services.mavlink.actuator_metadata import actuators
 from services.mavlink.file_server import crc32
-from services.mavlink.px4_facts import Fact
+from services.mavlink.px4_facts import Fact, output_function
 from services.mavlink.vehicle import VehicleDescription
 
 GENERAL, PARAMETERS = "etc/extras/component_general.json", "etc/extras/parameters.json"
-EVENTS = "etc/extras/all_events.json"
-PARAMETER_TYPE, EVENTS_TYPE = 1, 4  # COMP_METADATA_TYPE
+EVENTS, ACTUATORS = "etc/extras/all_events.json", "etc/extras/actuators.json"
+PARAMETER_TYPE, EVENTS_TYPE, ACTUATORS_TYPE = 1, 4, 5  # COMP_METADATA_TYPE
 _NO_EVENTS = {
     "version": 2,
     "components": {"1": {"namespace": "lapwing", "event_groups": {}}},
@@ -33,13 +34,12 @@ def files(description: VehicleDescription) -> Mapping[str, bytes]:
     for fact in flavours.get(description.flavour).facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})
-    events = _json(_NO_EVENTS)
-    types = [
-        {"type": PARAMETER_TYPE, "uri": uri(PARAMETERS), "fileCrc": crc32(parameters)},
-        {"type": EVENTS_TYPE, "uri": uri(EVENTS), "fileCrc": crc32(events)},
-    ]
+    described = {PARAMETERS: (PARAMETER_TYPE, parameters), EVENTS: (EVENTS_TYPE, _json(_NO_EVENTS))}
+    if output_function(1) in table:  # with ArduPilot's parameters there is no such page
+        described[ACTUATORS] = ACTUATORS_TYPE, _json(actuators(description.rotors))
+    types = [{"type": kind, "uri": uri(path), "fileCrc": crc32(content)} for path, (kind, content) in described.items()]
     general = {"version": 1, "vendorName": "Lapwing", "modelName": description.name, "metadataTypes": types}
-    return {GENERAL: _json(general), PARAMETERS: parameters, EVENTS: events}
+    return {GENERAL: _json(general)} | {path: content for path, (_, content) in described.items()}
 
 
 def _json(value: Any) -> bytes:
@@ -48,11 +48,13 @@ def _json(value: Any) -> bytes:
 
 def _parameter(p: Parameter) -> dict[str, Any]:
     found = _described(p.name, p.whole, p.unit, p.meaning[:1].upper() + p.meaning[1:], p.default)
-    return found | {"min": _number(p.least, p.whole), "max": _number(p.most, p.whole)}
+    limits = {"min": _number(p.least, p.whole), "max": _number(p.most, p.whole)}
+    return found | limits | ({"rebootRequired": True} if p.at_start else {})
 
 
 def _fact(fact: Fact, value: float) -> dict[str, Any]:
-    return _described(fact.name, fact.whole, fact.unit, "A fact of the vehicle; cannot be changed", value)
+    text = "A fact of the vehicle; cannot be changed"
+    return _described(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
 
 
 def _described(name: str, whole: bool, unit: str, text: str, default: float) -> dict[str, Any]:

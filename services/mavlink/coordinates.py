@@ -3,9 +3,14 @@
 import math
 from typing import NamedTuple
 
-from dynamics.geodesy import Home, enu_to_geodetic, geodetic_to_enu
+from dynamics import geodesy
+from dynamics.geodesy import Home
+from dynamics.kernel import uncompiled
 from dynamics.vector import Vec3
 from services.mavlink.dialect import mavlink
+
+enu_to_geodetic = uncompiled(geodesy.enu_to_geodetic)  # the link's process runs nothing compiled
+geodetic_to_enu = uncompiled(geodesy.geodetic_to_enu)
 
 NOT_GIVEN = 0x7FFFFFFF  # a coordinate that is not given, in messages of whole numbers
 
@@ -19,6 +24,23 @@ class Datum(NamedTuple):
     home: Home = Home()  # origin of the world frame
     home_z: float = 0.0  # [m] world z from which relative altitudes count
     standing_height: float = 0.0  # [m] of the body frame's origin above the ground
+
+
+def to_local(standing_height: float, position_world: Vec3) -> Vec3:
+    """North, east, down [m] of the local origin: the body frame's origin of a vehicle that stands where it starts.
+
+    Args:
+        standing_height: [m] of the body frame's origin above the ground there.
+        position_world: [m].
+    """
+    x, y, z = position_world
+    return y, x, standing_height - z
+
+
+def from_local(standing_height: float, position_ned: Vec3) -> Vec3:
+    """The way back: world-frame position [m]."""
+    north, east, down = position_ned
+    return east, north, standing_height - down
 
 
 def degrees(coordinate: int) -> float:
@@ -57,8 +79,3 @@ def from_world(datum: Datum, position_world: Vec3) -> Vec3:
     """Latitude [deg], longitude [deg] and altitude above home [m] of a world-frame position [m]."""
     latitude, longitude, height = enu_to_geodetic(datum.home, position_world)
     return latitude, longitude, height - datum.home.height - datum.home_z
-
-
-def load_kernels() -> None:
-    """Load the compiled conversions, so that the first message does not wait for them."""
-    enu_to_geodetic(Home(), geodetic_to_enu(Home(), *Home()))

@@ -6,10 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from messages import OperatorInput
+from messages import OperatorInput, header
 from messages.topics import ESTIMATE, TOPICS, Topic
 from services.mavlink.adapter import Adapter
-from services.mavlink.coordinates import load_kernels
 from services.mavlink.links import Link, open_link
 from services.mavlink.options import Options
 from services.mavlink.pacing import Pacing
@@ -19,13 +18,18 @@ WAIT = 0.05  # [s] at most until something else is looked at
 
 
 class Hub:
-    """Links of one vehicle; a context manager."""
+    """Links of one vehicle; a context manager. Those of several vehicles wait together.
+
+    Attributes:
+        selector: of the sockets of all that wait together.
+    """
 
     def __init__(
         self,
         description: VehicleDescription,
         options: Options,
         operate: Callable[[bytes], None] | None,
+        beside: "Hub | None" = None,
     ):
         """Open every link.
 
@@ -33,6 +37,7 @@ class Hub:
             description: what flies.
             options: the links, and who may command.
             operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
+            beside: that of another vehicle, whose `wait` serves the sockets of this one, too.
 
         Raises:
             ValueError: a link cannot be opened.
@@ -40,22 +45,23 @@ class Hub:
 
         def put(command: Any) -> None:
             assert operate
-            operate(OperatorInput(commands=(command,)).encode())
+            operate(OperatorInput(header(0, description.name), (command,)).encode())
 
         operator = put if operate else None
         self.adapter = Adapter(description, operator, options.key, options.insecure, options.log)
         self._pacing = Pacing(options.speed)
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
-        self._selector = selectors.DefaultSelector()
+        self.selector: selectors.BaseSelector = beside.selector if beside else selectors.DefaultSelector()
+        self._owns = beside is None
         self._woken, self._wake = socket.socketpair()
         self._woken.setblocking(False)
         self._wake.setblocking(False)
-        self._selector.register(self._woken, selectors.EVENT_READ, self._drain)
+        if self._owns:
+            self.selector.register(self._woken, selectors.EVENT_READ, self._drain)
         self._links: list[Link] = []
-        load_kernels()
         try:
             for url in options.urls:
-                self._links.append(open_link(url, self.adapter, self._selector))
+                self._links.append(open_link(url, self.adapter, self.selector))
         except ValueError:
             self.close()
             raise
@@ -72,7 +78,7 @@ class Hub:
 
     def wait(self, seconds: float = WAIT) -> None:
         """Serve the endpoints once, as soon as there is something; or until woken, or for so long."""
-        ready = self._selector.select(seconds)
+        ready = self.selector.select(seconds)
         self.adapter.tick(time.monotonic())
         for key, _ in ready:
             key.data()
@@ -104,7 +110,8 @@ class Hub:
         """Close every link."""
         for link in self._links:
             link.close()
-        self._selector.close()
+        if self._owns:
+            self.selector.close()
         self._woken.close()
         self._wake.close()
 

@@ -5,7 +5,10 @@ from typing import Any
 from services.mavlink.clock import Clock
 from services.mavlink.endpoint import Endpoint
 
-RETRY, PATIENCE = 0.25, 2.25  # [s] before an item is asked for again at the latest, and before an upload is given up
+RETRY, UPLOAD_TIMEOUT = (
+    0.25,
+    2.25,
+)  # [s] before an item is asked for again at the latest, and before an upload is given up
 SOONEST = 0.06  # [s] before an item is asked for again at the soonest; twice the round trip comes to it
 REPEAT, REPEATS, REPEATS_LOSSY = 0.3, 2, 8  # [s] between two acknowledgements, and how many come after the first
 
@@ -31,7 +34,7 @@ class Upload:
     @property
     def given_up(self) -> bool:
         """Whether the next item has been waited for too long."""
-        return self._clock.since(self._begun) >= PATIENCE
+        return self._clock.since(self._begun) >= UPLOAD_TIMEOUT
 
     def ask(self) -> int:
         """The next item is asked for; its number."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from services.mavlink.dialect import mavlink
 from services.mavlink.vehicle import Battery, VehicleDescription
+from services.mavlink.vehicle_type import vehicle_type
 
 Values = Mapping[str, float]
 
@@ -23,7 +24,7 @@ class Fact(NamedTuple):
 
 
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
-GENERIC_QUADROTOR = 4001  # SYS_AUTOSTART
+GENERIC_FRAMES = {4: 4001, 6: 6001, 8: 8001}  # SYS_AUTOSTART of 4, 6 and 8 rotors in X
 JOYSTICK_ONLY = 1  # COM_RC_IN_MODE: there is no receiver
 NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
 NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # what a failsafe of the autopilot does
@@ -31,6 +32,13 @@ _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
 _GEOFENCE = {NOTHING: 1, HOLD: 2, RETURN: 3, LAND: 5, DESCEND: 5}  # GF_ACTION
 _LINK_LOSS = {NOTHING: 0, HOLD: 1, RETURN: 2, LAND: 3, DESCEND: 3}  # NAV_RCL_ACT
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
+MULTIROTOR = 0  # CA_AIRFRAME
+FIRST_MOTOR = 101  # function of an output that drives motor 1
+
+
+def output_function(number: int | str) -> str:
+    """The parameter that says what an output, counted from 1, drives."""
+    return f"PWM_MAIN_FUNC{number}"
 
 
 def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
@@ -42,14 +50,14 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
     whole = {
         "MAV_SYS_ID": d.system,
         "MAV_COMP_ID": mavlink.MAV_COMP_ID_AUTOPILOT1,
-        "MAV_TYPE": mavlink.MAV_TYPE_QUADROTOR,
-        "SYS_AUTOSTART": GENERIC_QUADROTOR,
+        "MAV_TYPE": vehicle_type(len(d.rotors)),
+        "SYS_AUTOSTART": GENERIC_FRAMES.get(len(d.rotors), GENERIC_FRAMES[4]),
         "SYS_HITL": 0,
         "SYS_HAS_MAG": fitted("magnetometer"),
         "SYS_HAS_BARO": fitted("barometer"),
         "SYS_HAS_GPS": fitted("gps"),
-        "SYS_HAS_NUM_ASPD": 0,
-        "SYS_HAS_NUM_DIST": int("sonar" in d.sensors),
+        "SYS_HAS_NUM_ASPD": int("airspeed" in d.sensors),
+        "SYS_HAS_NUM_DIST": len({"sonar", "rangefinder"} & set(d.sensors)),
         "CAL_GYRO0_ID": SIM_IMU * fitted("imu"),
         "CAL_ACC0_ID": SIM_IMU * fitted("imu"),
         "CAL_MAG0_ID": SIM_MAG * fitted("magnetometer"),
@@ -60,11 +68,15 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "RC_CHAN_CNT": 0,
         "GF_MAX_HOR_DIST": 0,
         "GF_MAX_VER_DIST": 0,
+        "PD_GRIPPER_EN": int(d.gripper),
+        "CA_AIRFRAME": MULTIROTOR,
+        "CA_ROTOR_COUNT": len(d.rotors),
         "BAT1_SOURCE": _POWER_MODULE if d.battery else _NO_SOURCE,
         "BAT1_N_CELLS": d.battery.cells if d.battery else 0,
     }
     whole |= {f"RC_MAP_{axis}": 0 for axis in ("ROLL", "PITCH", "YAW", "THROTTLE", "AUX1", "AUX2", *NO_SWITCHES)}
     whole |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
+    whole |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
     return [
         *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],

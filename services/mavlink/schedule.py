@@ -44,7 +44,7 @@ class Schedule:
         """Interval of a message [us], -1 for never."""
         return self._intervals.get(number, 0) // 1000 or -1
 
-    def send_due(self, send: Callable[[Any], None], built: dict[int, Any]) -> None:
+    def send_due(self, send: Callable[[Any], None], built: dict[int, list[Any]]) -> None:
         """Send what is due; `built` holds the messages of this moment, which all endpoints share."""
         now = self._vehicle.time_ns
         for number, interval in self._intervals.items():
@@ -52,9 +52,9 @@ class Schedule:
             if interval and now >= due:
                 self._due[number] = max(due + interval, now - interval)  # keeps the mean rate, catches up no more
                 if number not in built:
-                    built[number] = streams()[number].build(self._vehicle)
-                if built[number] is not None:
-                    send(built[number])
+                    built[number] = streams()[number].messages(self._vehicle)
+                for message in built[number]:
+                    send(message)
 
     def _plan(self) -> None:
         """Set all intervals anew."""

@@ -4,16 +4,21 @@ It takes no part in the lock step: nobody waits for it, and when it dies the fli
 to what it shows at once; all else it reads from the services' batches, which wakes nobody up for a message.
 """
 
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from cosim.bundle import unpack_batch
+from cosim.fleet import members
 from cosim.keys import BATCH_KEY
 from cosim.process import Process
-from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS
+from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, of_all
 from services.common.operator import OPERATOR_KEY
 from services.mavlink.channel import read_key
 from services.mavlink.hub import Hub
+from services.mavlink.links import numbered
 from services.mavlink.options import Options
 
 AT_ONCE = (ESTIMATE, STATUS, COMMAND_ACKS)
@@ -26,43 +31,63 @@ def run(process: Process, given: Any) -> None:
         ValueError: a link cannot be opened.
     """
     setup = process.setup
-    description = setup.beside.get("mavlink")
-    if description is None:
+    flown = [member for member in members(setup) if "mavlink" in member.beside]
+    if not flown:
         raise ValueError("--mavlink: nobody steers in this scene; expected one with [autopilot]")
     key = read_key(given.mavlink_key) if given.mavlink_key else None
-    options = Options(given.mavlink, key, given.insecure, Path(given.log) if given.log else None, process.speed)
+    log = Path(given.log) if given.log else None
     # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
     at_once = AT_ONCE if process.speed else ()
-    topics = {process.key(topic): topic for topic in at_once}
-    put = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}")
-    with Hub(description, options, lambda payload: put(payload, 0)) as hub:
-        for command in setup.services["autopilot"].parameters.plan:  # the autopilot begins with it
-            hub.adapter.missions.hold(command)
-        arrived = process.bus.subscribe(*topics, f"{process.key_prefix}/{BATCH_KEY}/*", notify=hub.wake)
-        process.join()
+    put = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
+    with ExitStack() as stack:
+        hubs: dict[str, Hub] = {}
+        for i, member in enumerate(flown):
+            urls = tuple(numbered(url, i) for url in given.mavlink)
+            options = Options(urls, key, given.insecure, log, process.speed)
+            first = next(iter(hubs.values()), None)
+            hub = Hub(member.beside["mavlink"], options, lambda payload: put(payload, 0), first)
+            hubs[member.vehicle] = stack.enter_context(hub)
+            for command in member.services["autopilot"].parameters.plan:  # the autopilot begins with it
+                hub.adapter.missions.hold(command)
+        topics = {topic.zenoh_key(name, process.key_prefix): (hubs[name], topic) for name in hubs for topic in at_once}
+        leading, *others = hubs.values()
+
+        def wait() -> None:
+            leading.wait()
+            for other in others:
+                other.adapter.tick(time.monotonic())
+
+        senders = process.participants.senders(BATCH_KEY, setup.services)
+        senders |= dict.fromkeys(topics, process.participants.author("autopilot"))
+        arrived = process.bus.receive(senders, notify=leading.wake)
+        process.join(wait)  # endpoints may connect while the others still load or compile
         flying = True
         while flying and not process.stopping:
-            hub.wait()
+            wait()
             while flying and (news := arrived.get_with_key(timeout=0.0)) is not None:
                 name, time_ns, payload = news
                 flying = bool(payload)
                 if flying and name in topics:
-                    hub.take(topics[name], time_ns, payload)
+                    hub, topic = topics[name]
+                    hub.take(topic, time_ns, payload)
                 elif flying:
-                    _take_batch(hub, payload, at_once, setup.interval_ns)
-        for line in hub.report():
-            print(line, flush=True)
+                    _take_batch(hubs, payload, at_once, setup.interval_ns)
+        for name, hub in hubs.items():
+            for line in hub.report():
+                print(f"{name}: {line}" if others else line, flush=True)
 
 
-def _take_batch(hub: Hub, payload: bytes, at_once: tuple, interval_ns: int) -> None:
+def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: tuple, interval_ns: int) -> None:
     """Every command and, where they do not come at once, every status and answer; of all else the newest."""
     _, pages = unpack_batch(payload)
     for page in pages:
-        if page.topic is OPERATOR or (page.topic in AT_ONCE and not at_once):
+        topic = of_all(page.topic)
+        if topic is OPERATOR or (topic in AT_ONCE and not at_once):
             chosen = range(len(page.ticks))
-        elif page.topic not in AT_ONCE:
+        elif topic not in AT_ONCE:
             chosen = range(len(page.ticks) - 1, len(page.ticks))
         else:
             continue
-        for i in chosen:
-            hub.take(page.topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())
+        for hub in [hubs[page.topic.vehicle]] if page.topic.vehicle else hubs.values():
+            for i in chosen:
+                hub.take(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())

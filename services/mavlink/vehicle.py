@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from dynamics.geodesy import Home
+from dynamics.vector import Vec3
 from services.common.parameters import Parameter
 
 
@@ -16,6 +17,13 @@ class Battery(NamedTuple):
     empty_voltage: float  # [V] of one cell, below which the motors stop
 
 
+class Rotor(NamedTuple):
+    """A rotor, as the autopilot numbers them."""
+
+    position_body: Vec3  # [m]
+    counterclockwise: bool  # seen from above
+
+
 class VehicleDescription(NamedTuple):
     """A vehicle as its ground stations are told of it."""
 
@@ -23,11 +31,14 @@ class VehicleDescription(NamedTuple):
     system: int = 1  # MAVLink system id
     flavour: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/flavours
     home: Home = Home()  # origin of the world frame on the Earth
+    air_temperature: float = 15.0  # [deg C] at home
     standing_height: float = 0.0  # [m] of the body frame's origin above the ground when it stands
-    rotors: int = 4
+    rotors: tuple[Rotor, ...] = ()
     max_voltage: float | None = None  # [V] of its motors, None where they are not modelled
     battery: Battery | None = None  # None where none is modelled: the motors get what they ask for
     sensors: tuple[str, ...] = ()  # fitted; none: the vehicle flies on its true state
+    ray_deg: tuple[float, float] = (0.0, -90.0)  # azimuth and elevation of the rangefinder's
+    flow_interval: float = 0.0  # [s] between two readings of the optical flow
     parameters: tuple[Parameter, ...] = ()  # the autopilot's, with the values that it starts with
     gripper: bool = False  # a payload that can be let go
     accepts_commands: bool = False  # an operator is listened to

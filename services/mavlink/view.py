@@ -3,12 +3,12 @@
 from functools import cached_property
 from typing import Any
 
-from dynamics.geodesy import Home, enu_to_geodetic
+from dynamics.geodesy import Home
 from dynamics.vector import Vec3
 from messages import Status, nanoseconds
 from messages.topics import ESTIMATE, STATUS, TRUTH, Topic
 from services.mavlink import flavours
-from services.mavlink.coordinates import Datum
+from services.mavlink.coordinates import Datum, enu_to_geodetic, to_local
 from services.mavlink.flight_times import FlightTimes
 from services.mavlink.frames import Quaternion, euler, saturated, swap_attitude, swap_body, swap_world
 from services.mavlink.vehicle import VehicleDescription
@@ -19,12 +19,12 @@ ON_GROUND = Status(landed=True)  # before the vehicle has published a status
 class NedMotion:
     """Where the vehicle is and how it moves, in MAVLink's frames: NED, FRD, degrees."""
 
-    def __init__(self, message: Any, home: Home):
+    def __init__(self, message: Any, home: Home, standing_height: float):
         """From a message with pose, velocity and angular velocity: the estimate or the truth."""
         self._stamp, self._home = message.header.stamp, home
         p, q, v, w = message.pose.position, message.pose.orientation, message.velocity, message.angular_velocity
         self.position_world: Vec3 = (p.x, p.y, p.z)
-        self.position_ned = swap_world(self.position_world)
+        self.position_ned = to_local(standing_height, self.position_world)
         self.velocity_ned = swap_world(tuple(v))
         self.omega_frd = swap_body(tuple(w))
         self.attitude: Quaternion = swap_attitude((q.w, q.x, q.y, q.z))
@@ -56,7 +56,8 @@ class VehicleView:
         self.flight = FlightTimes()
         latitude, longitude, height = description.home
         # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
-        self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(height * 1e3, 32)
+        altitude = height + description.standing_height
+        self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
         self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}
@@ -85,7 +86,7 @@ class VehicleView:
             message = self.get(topic)
             if message is None:
                 return None
-            self._motions[topic] = NedMotion(message, self.description.home)
+            self._motions[topic] = NedMotion(message, self.description.home, self.description.standing_height)
         return self._motions[topic]
 
     @property

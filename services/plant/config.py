@@ -7,7 +7,10 @@ from pydantic import Field, field_validator
 from cosim.scene import Scene, SceneError, Section, Source
 from dynamics import integrators
 from dynamics.errors import KeyedError
+from dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from services.common.exchange import Exchange
+
+CONTACT_SHARE = 0.1  # of solver.accuracy, for one part of a step in contact: errors of many parts add up
 
 
 class Solver(Section):
@@ -33,6 +36,11 @@ class Solver(Section):
     def undecided(self) -> bool:
         """Whether the step, and the integrator unless it is given, are still to be chosen for the accuracy."""
         return self.accuracy is not None and "step" not in self.model_fields_set
+
+    @property
+    def contact_tolerance(self) -> float:
+        """Error of a part of a step in contact that leaves the accuracy to a whole flight; the usual one without."""
+        return CONTACT_TOLERANCE if self.accuracy is None else CONTACT_SHARE * self.accuracy
 
     def steps(self, exchange: Exchange) -> int:
         """Steps in one exchange interval."""

@@ -6,9 +6,9 @@ from typing import Any
 
 from numba import types
 
+from cosim.errors import DivergedError
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
-from cosim.schedule import DivergedError
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks

@@ -7,6 +7,7 @@ import numpy as np
 
 from cosim.setup import Setup
 from cosim.wire import Fields, Wire
+from dynamics.atmosphere import FREEZING
 from dynamics.kernel import uncompiled
 from dynamics.lie.quaternion import conjugate, rotate
 from messages import (
@@ -154,6 +155,7 @@ def _battery(wiring: PlantWiring) -> Any:
             "current": -np.asarray(x.current),
             "charge": np.asarray(x.charge) * capacity,
             "percentage": x.charge,
+            "temperature": np.asarray(x.temperature) - FREEZING,
         }
         if cells:
             found["cell_voltage"] = np.repeat((voltage / cells)[:, None], cells, axis=1)

@@ -5,37 +5,66 @@ from typing import Any
 
 import numpy as np
 
+from cosim.backlog import Teller
 from cosim.bundle import unpack_batch
-from cosim.keys import BATCH_KEY, DIVERGED_KEY
+from cosim.deadlines import Lateness, entries, lateness
+from cosim.keys import BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, HANDED_KEY, RESTARTED_KEY
 from cosim.log import LogWriter
 from cosim.process import Process, Stopped
-from cosim.provenance import attachments, failure, metadata
+from cosim.provenance import RESTARTS, WAITED, attachments, failure, metadata
 from cosim.recording import Recording
-from cosim.wire import Page
+from cosim.restart import Progress
+from cosim.watch import WATCHER
+from cosim.wire import Page, later
+
+TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
 
 
 def run(process: Process, given: Any) -> None:
     """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
-    setup, prefix = process.setup, f"{process.key_prefix}/{BATCH_KEY}"
-    diverged = f"{process.key_prefix}/{DIVERGED_KEY}"
-    news = process.bus.subscribe(f"{prefix}/*", f"{diverged}/*")
+    setup = process.setup
+    senders: dict[str, bytes | None] = {}
+    late: dict[str, Lateness] = {}
+    for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY):
+        senders |= process.participants.senders(key, setup.services)
     pending = Pending(setup.services)
+    if process.restarts:
+        senders |= process.participants.senders(RESTARTED_KEY, [WATCHER])
+        process.bus.answer(f"{process.key_prefix}/{HANDED_KEY}/{process.name}", pending.progress)
+    news = process.bus.receive(senders)
     about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
-    with LogWriter(Path(given.log), about, attachments(setup, given.sources or {})) as writer:
+    progress = Teller(process.bus, process.key_prefix, process.name)
+    with LogWriter(Path(given.log), about, attachments(setup, given.sources or {}), progress.waiting) as writer:
         recording = Recording(writer, setup)
         try:
             process.join()
             while not pending.ended:
                 key, _, payload = process.patient(news.get_with_key, pending.waits_for)
-                if key.startswith(diverged):
-                    writer.metadata |= failure(payload.decode(), diverged=True)
+                head, name = key.split("/")[-2:]
+                if head == DEADLINES_KEY:
+                    late[name] = lateness(payload.decode(errors="replace"))
                     continue
-                pending.add(key.rsplit("/", 1)[1], payload)
+                if head == RESTARTED_KEY:
+                    writer.metadata[RESTARTS] = payload.decode(errors="replace")
+                    continue
+                if head != BATCH_KEY:
+                    if payload:  # an end without a reason is that of the run
+                        writer.metadata |= failure(payload.decode(errors="replace"), head == DIVERGED_KEY)
+                    continue
+                pending.add(name, payload)
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)
+                    progress.recorded(pending.written)
+                    process.tell_of_refused()
         except Stopped:
             writer.metadata = failure("the run was ended") | writer.metadata
+            raise
+        finally:
+            recording.finish()
+            writer.metadata |= entries(late)
+            if writer.waited >= TOLD:
+                writer.metadata[WAITED] = f"{writer.waited:.1f} s"
 
 
 class Pending:
@@ -58,8 +87,13 @@ class Pending:
         if not payload:
             self._left.discard(name)
             return
-        self._stop[name], pages = unpack_batch(payload)
-        self._pages += pages
+        stop, pages = unpack_batch(payload)
+        self._pages += later(pages, self._stop[name])  # who was started again may give some a second time
+        self._stop[name] = max(stop, self._stop[name])
+
+    def progress(self, name: str) -> bytes:
+        """How far a service is, as it asks after it was started again."""
+        return Progress(self._stop[name], self.written).pack()
 
     def complete(self) -> list[Page]:
         """The pages of the ticks that are complete now."""

@@ -1,11 +1,12 @@
 """Plays a log on the bus: the same keys, payloads and time stamps as the live run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from cosim.bus import ZenohBus
 from cosim.log import LogReader, LogWriter
+from services.replay.pace import Pace
 from services.replay.schedule import Cut, schedule
 
 AUDIENCE = 1.0  # [s] the first subscriber gets to appear
@@ -20,8 +21,9 @@ def play(
     loop: bool,
     record: Path | None,
     stopping: Callable[[], bool],
-    heard: Callable[[str, int, bytes], None] = lambda topic, time_ns, payload: None,
-    wait: Callable[[float], None] = time.sleep,
+    heard: Callable[[str, int, bytes], object] = lambda topic, time_ns, payload: None,
+    pace: Pace | None = None,
+    topics: Collection[str] | None = None,
 ) -> int:
     """Publish a log; how many messages were published.
 
@@ -35,31 +37,35 @@ def play(
         record: a log to write what is published to, None for none.
         stopping: says whether to end.
         heard: called with each message, for those who are no subscribers.
-        wait: waits so many seconds, or less.
+        pace: lets messages go; None: by the clock.
+        topics: only these; None: all.
 
     Raises:
-        ValueError: the log cannot be read, or has no message in the cut.
+        ValueError: the log cannot be read, has no such topic, or has no message in the cut.
         BusError: the endpoint cannot be listened on.
     """
     with LogReader(log) as source, ZenohBus([listen]) as bus:
-        types, deterministic = source.topics(), source.deterministic_topics()
+        chosen = source.check_topics(topics)
+        source.check_versions(chosen)
+        types = {topic: kind for topic, kind in source.topics().items() if topic in chosen}
+        deterministic = source.deterministic_topics()
         puts = {topic: bus.publisher(f"{key_prefix}{topic}") for topic in types}
         _await_audience(bus, [f"{key_prefix}{topic}" for topic in types], stopping)
         writer = LogWriter(record, _own(source.metadata), dict(source.attachments)) if record else None
-        count = 0
+        count, pace = 0, pace or Pace()
         try:
-            while not stopping():
-                started = time.perf_counter()
-                for due in schedule(source.messages(None, cut.start_ns, cut.end_ns), speed):
-                    _wait(started + due.wait, stopping, wait)
-                    if stopping():
+            while not (stopping() or pace.quit):
+                pace.begin()
+                for due in schedule(source.messages(chosen, cut.start_ns, cut.end_ns), speed):
+                    pace.wait(due.wait, due.time_ns, stopping)
+                    if stopping() or pace.quit:
                         break
                     puts[due.topic](due.payload, due.time_ns)
                     heard(due.topic, due.time_ns, due.payload)
                     count += 1
                     if writer:
                         writer.write(due.topic, types[due.topic], due.payload, due.time_ns, due.topic in deterministic)
-                if count == 0 and not stopping():
+                if count == 0 and not (stopping() or pace.quit):
                     raise ValueError(f"{log}: no message in the part that is to be replayed")
                 if not loop or writer:
                     break
@@ -78,8 +84,3 @@ def _await_audience(bus: ZenohBus, keys: list[str], stopping: Callable[[], bool]
     deadline = time.monotonic() + AUDIENCE
     while time.monotonic() < deadline and not stopping() and not bus.has_audience(keys):
         time.sleep(0.02)
-
-
-def _wait(when: float, stopping: Callable[[], bool], wait: Callable[[float], None]) -> None:
-    while (left := when - time.perf_counter()) > 0.0 and not stopping():
-        wait(min(left, 0.1))

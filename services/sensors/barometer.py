@@ -3,10 +3,10 @@
 import math
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
-from dynamics.geodesy import air_pressure
-from dynamics.kernel import kernel
+from dynamics.atmosphere import pressure
+from dynamics.kernel import kernel, leaf
 from dynamics.noise import TURN_ON, Key, normal, normal3
 from dynamics.vector import ZERO, Vec3
 from services.common.ports import BarometerReading
@@ -29,6 +29,8 @@ class Barometer(NamedTuple):
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    airspeed_error: Annotated[float, Ge(-1), Le(1)] = 0.0  # of the dynamic pressure, added to the static one
+    wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] of the rotors' thrust, added to the pressure
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -46,11 +48,17 @@ def blank() -> BarometerState:
     return BarometerState(0.0, 0.0, ZERO, BLANK)
 
 
+@leaf
+def _true_pressure(p: Barometer, truth: Truth) -> float:
+    static = pressure(truth.atmosphere, truth.home.height + truth.position_world[2])
+    return static + p.airspeed_error * truth.dynamic_pressure + p.wash_pa_per_n * truth.thrust
+
+
 @kernel
 def initial(p: Barometer, key: Key, truth: Truth) -> BarometerState:
     """State before the first sample."""
     draw = normal3(key, TURN_ON, 0)
-    true = air_pressure(truth.home.height + truth.position_world[2], truth.temperature_celsius)
+    true = _true_pressure(p, truth)
     scale = 1.0 + p.scale_error * draw[0]
     turn_on = p.turn_on_pa * draw[1]
     walk = errors.walk_deviation(p.bias_instability_pa) * draw[2]
@@ -65,7 +73,7 @@ def sample(
     deviation = errors.walk_deviation(p.bias_instability_pa)
     walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
     noise = errors.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
-    true = air_pressure(truth.home.height + truth.position_world[2], truth.temperature_celsius)
+    true = _true_pressure(p, truth)
     measured = s.scale * true + s.turn_on + walk[0] + noise
     measured = errors.quantise(errors.limit(measured, p.range_pa), p.resolution_pa)
     line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))

@@ -7,21 +7,13 @@ from typing import Any, NamedTuple
 from numba import types
 
 from cosim.part import GO_ON, Received
+from dynamics.environment import Environment
 from dynamics.generate import implements
-from dynamics.geodesy import Home
 from dynamics.kernel import leaf
 from dynamics.noise import Key
-from dynamics.vector import Vec3
+from dynamics.terrain import surface
+from dynamics.vector import dot, subtract
 from services.sensors.truth import Truth
-
-
-class Surroundings(NamedTuple):
-    """What instruments measure apart from the motion."""
-
-    gravity: float  # [m/s^2]
-    home: Home
-    temperature_celsius: float  # [deg C] of the air at the ground
-    magnetic_field_world: Vec3  # [T]
 
 
 class Instrument(NamedTuple):
@@ -29,7 +21,8 @@ class Instrument(NamedTuple):
 
     sensor: Any  # parameters: Imu, Gps, ...
     key: Key  # of its random numbers
-    around: Surroundings
+    gravity: float  # [m/s^2] at home, 0 where no effect gives any
+    around: Environment
 
 
 def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
@@ -58,17 +51,34 @@ def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Callable:
 def step(p: Instrument, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
     """The reading at `tick`; the instrument is switched on at tick 0."""
     x, around = inputs[0].value, p.around
+    ground, _ = surface(around.terrain, x.position_world[0], x.position_world[1])
+    air = subtract(x.velocity_world, x.wind_world)
+    current, thrust, speed = 0.0, 0.0, 0.0
+    for of_one in x.motor_current:
+        current += of_one
+    for of_one in x.rotor_thrust:
+        thrust += of_one
+    for of_one in x.rotor_speed:
+        speed += of_one
     truth = Truth(
         x.position_world,
         x.attitude,
         x.velocity_world,
         x.omega_body,
         x.acceleration_world,
-        x.position_world[2],
-        around.gravity,
+        x.position_world[2] - ground,
+        p.gravity,
         around.home,
-        around.temperature_celsius,
+        around.atmosphere,
         around.magnetic_field_world,
+        around.terrain,
+        x.angular_acceleration_body,
+        0.5 * x.air_density * dot(air, air),
+        current,
+        air,
+        x.air_density,
+        thrust,
+        speed / len(x.rotor_speed),
     )
     if tick == 0:
         s = _initial(p.sensor, p.key, truth)

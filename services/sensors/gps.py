@@ -1,19 +1,44 @@
 """Satellite receiver: position on WGS 84 and velocity, late (theory.md, section 3.2)."""
 
+import math
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
+from dynamics.errors import KeyedError
 from dynamics.geodesy import enu_to_geodetic
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import kernel, leaf, uncompiled
+from dynamics.lie.quaternion import rotate
 from dynamics.noise import TURN_ON, Key, normal3
-from dynamics.vector import ZERO, Vec3, add, multiply
+from dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
 from services.common.ports import GpsReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.truth import Truth
+from services.sensors.truth import Place, Truth
 
 CHANNELS = ("position", "velocity")
+FEWEST = 4  # satellites of a fix
+WORST = 50.0  # dilution of precision of a fix
+FLATTEST = 1e-9  # determinant of the directions' spread from which a position is computed
+NO_POSITION: Mat3 = (math.nan,) * 9  # type: ignore[assignment]
+
+
+Distance = Annotated[float, Ge(-1e6), Le(1e6)]
+
+
+class Outage(NamedTuple):
+    """A circle of the ground over which there is no fix."""
+
+    x: Distance  # [m] world, of its centre
+    y: Distance  # [m]
+    radius: Annotated[float, Gt(0), Le(1e6)]  # [m]
+
+
+class Satellite(NamedTuple):
+    """Where a satellite stands in the sky, as seen from home."""
+
+    azimuth_deg: Annotated[float, Ge(-360), Le(360)]  # [deg] from north towards east
+    elevation_deg: Annotated[float, Ge(0), Le(90)]  # [deg] over the horizon
 
 
 class Gps(NamedTuple):
@@ -25,8 +50,14 @@ class Gps(NamedTuple):
     wander_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of the error that is correlated in time
     wander_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
     wander_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
+    sky: tuple[Satellite, ...] | None = None  # satellites in view: position errors are theirs, not those above
+    range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite of `sky`
+    range_wander: Annotated[float, Ge(0)] = 0.0  # [m] of the same, correlated in time
+    fix_status: Annotated[int, Ge(0), Le(2)] = 0  # of NavSatStatus: 0 alone, 1 SBAS, 2 with a ground station (RTK)
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    antenna: Place | None = None  # [m] body; the centre of mass if left out
+    outages: tuple[Outage, ...] | None = None  # [m] circles without a fix: { x, y, radius }
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -34,13 +65,14 @@ class GpsState(NamedTuple):
     """State of a receiver."""
 
     wander: Vec3  # in standard deviations
+    geometry: Mat3  # factor L of the covariance L L^T of a position, east, north, up, by distances of unit deviation
     position_line: Line
     velocity_line: Line
 
 
 def blank() -> GpsState:
     """A state without meaning, to be overwritten at the first tick."""
-    return GpsState(ZERO, BLANK, BLANK)
+    return GpsState(ZERO, IDENTITY, BLANK, BLANK)
 
 
 @leaf
@@ -50,11 +82,89 @@ def _deviations(p: Gps) -> Vec3:
 
 
 @kernel
+def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
+    """The factor L of `GpsState`; NaN where the satellites do not give a position (theory.md, eq. (3.42))."""
+    if sky is None:
+        return IDENTITY
+    x = y = z = xx = xy = xz = yy = yz = zz = 0.0
+    for satellite in sky:
+        azimuth, elevation = math.radians(satellite.azimuth_deg), math.radians(satellite.elevation_deg)
+        e, n = math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth)
+        u = math.sin(elevation)
+        x, y, z = x + e, y + n, z + u
+        xx, xy, xz, yy, yz, zz = xx + e * e, xy + e * n, xz + e * u, yy + n * n, yz + n * u, zz + u * u
+    # what is common to all distances is the receiver's clock
+    k = 1.0 / len(sky)
+    xx, xy, xz = xx - k * x * x, xy - k * x * y, xz - k * x * z
+    yy, yz, zz = yy - k * y * y, yz - k * y * z, zz - k * z * z
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    determinant = xx * a + xy * b + xz * c
+    if determinant < FLATTEST:
+        return NO_POSITION
+    over = 1.0 / determinant
+    l11 = math.sqrt(a * over)
+    l21, l31 = b * over / l11, c * over / l11
+    l22 = math.sqrt((xx * zz - xz * xz) * over - l21 * l21)
+    l32 = ((xy * xz - xx * yz) * over - l31 * l21) / l22
+    return (l11, 0.0, 0.0, l21, l22, 0.0, l31, l32, math.sqrt((xx * yy - xy * xy) * over - l31 * l31 - l32 * l32))
+
+
+def check(p: Gps) -> None:
+    """KeyedError where the satellites in view do not give a position."""
+    if p.sky is None:
+        return
+    dilution = math.sqrt(sum(x * x for x in uncompiled(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
+    if not dilution < WORST:
+        said = f"got {len(p.sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
+        raise KeyedError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
+
+
+@leaf
+def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec3, Vec3]:
+    """(error [m], variance [m^2]) east, north, up."""
+    if p.sky is None:
+        w = _deviations(p)
+        across = errors.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
+        up = errors.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
+        horizontal = across * across + w[0] * w[0]
+        error = add(multiply(w, wander), multiply((across, across, up), white))
+        return error, (horizontal, horizontal, up * up + w[2] * w[2])
+    noise, L = errors.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate), s.geometry
+    square = noise * noise + p.range_wander * p.range_wander
+    east, north = L[0] * L[0], L[3] * L[3] + L[4] * L[4]
+    variance = (square * east, square * north, square * (L[6] * L[6] + L[7] * L[7] + L[8] * L[8]))
+    return apply(L, add(scale(p.range_wander, wander), scale(noise, white))), variance
+
+
+@kernel
+def _seen(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
+    """(position [m], velocity [m/s]) of the antenna in the world (theory.md, eq. (3.38))."""
+    if antenna is None:
+        return truth.position_world, truth.velocity_world
+    arm = rotate(truth.attitude, antenna)
+    swing = rotate(truth.attitude, cross(truth.omega_body, antenna))
+    return add(truth.position_world, arm), add(truth.velocity_world, swing)
+
+
+@kernel
+def _under_sky(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
+    """Whether there is a fix at that place."""
+    if outages is None:
+        return True
+    free = True
+    for circle in outages:
+        free = free and math.hypot(position[0] - circle.x, position[1] - circle.y) >= circle.radius
+    return free
+
+
+@kernel
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
     """State before the first sample: the receiver has run at this place for as long as its latency."""
     wander = normal3(key, TURN_ON, 0)
-    position = add(truth.position_world, multiply(_deviations(p), wander))
-    s = GpsState(wander, new_line(position), new_line(truth.velocity_world))
+    position, velocity = _seen(p.antenna, truth)
+    s = GpsState(wander, geometry(p.sky), BLANK, BLANK)
+    error, _ = _position_error(p, s, wander, ZERO)
+    s = GpsState(wander, s.geometry, new_line(add(position, error)), new_line(velocity))
     for k in range(p.latency_samples):
         s, _ = sample(p, s, key, TURN_ON - 1 - k, truth)
     return s
@@ -63,29 +173,26 @@ def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
 @kernel
 def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsState, GpsReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    w = _deviations(p)
-    across = errors.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
-    up = errors.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
     v = errors.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
     wander = errors.walk(s.wander, 1.0, p.wander_time, p.rate, normal3(key, tick, 0))
-    error = add(multiply(w, wander), multiply((across, across, up), normal3(key, tick, 1)))
-    position = add(truth.position_world, error)
-    velocity = add(truth.velocity_world, multiply((v, v, v), normal3(key, tick, 2)))
+    error, variance = _position_error(p, s, wander, normal3(key, tick, 1))
+    position, velocity = _seen(p.antenna, truth)
+    position = add(position, error)
+    velocity = add(velocity, multiply((v, v, v), normal3(key, tick, 2)))
     position_line, position, seen = carry(p.faults, s.position_line, p.latency_samples, 0, key, tick, position)
     velocity_line, velocity, moving = carry(p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity)
     latitude, longitude, height = enu_to_geodetic(truth.home, position)
-    horizontal = across * across + w[0] * w[0]
     reading = GpsReading(
         latitude,
         longitude,
         height,
-        (horizontal, horizontal, up * up + w[2] * w[2]),
+        variance,
         velocity,
         v * v,
         p.latency_samples / p.rate,
-        seen and moving,
+        seen and moving and _under_sky(p.outages, truth.position_world),
     )
-    return GpsState(wander, position_line, velocity_line), reading
+    return GpsState(wander, s.geometry, position_line, velocity_line), reading
 
 
 # u-blox ZED-F9P data sheet: 0.01 m + 1 ppm, 0.05 m/s; about 2 cm on a moving multirotor, of which part wanders with the
@@ -97,6 +204,7 @@ RTK = Gps(
     wander_horizontal=0.010,
     wander_vertical=0.013,
     wander_time=60.0,
+    fix_status=2,
     latency_samples=1,
 )
 

@@ -3,9 +3,9 @@
 import math
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
-from dynamics.kernel import kernel
+from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotate_back
 from dynamics.noise import TURN_ON, Key, normal3
 from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
@@ -16,6 +16,7 @@ from services.sensors.truth import Truth
 
 CHANNELS = ("field",)
 _NANO = 1e-9
+Disturbance = Annotated[float, Ge(-1e5), Le(1e5)]
 
 
 class Magnetometer(NamedTuple):
@@ -31,6 +32,7 @@ class Magnetometer(NamedTuple):
     resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, field of all motors' current
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -48,6 +50,13 @@ def blank() -> MagnetometerState:
     return MagnetometerState((0.0,) * 9, ZERO, ZERO, BLANK)
 
 
+@leaf
+def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
+    """The Earth's and that of the motors' leads [T], body."""
+    earth = rotate_back(truth.attitude, truth.magnetic_field_world)
+    return add(earth, scale(truth.motor_current * _NANO, p.current_nt_per_a))
+
+
 @kernel
 def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
     """State before the first sample."""
@@ -56,7 +65,7 @@ def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
     )
     hard_iron = scale(p.hard_iron_nt * _NANO, normal3(key, TURN_ON, 2))
     walk = scale(errors.walk_deviation(p.bias_instability_nt * _NANO), normal3(key, TURN_ON, 3))
-    true = rotate_back(truth.attitude, truth.magnetic_field_world)
+    true = _true_field(p, truth)
     return MagnetometerState(matrix, hard_iron, walk, new_line(add(apply(matrix, true), add(hard_iron, walk))))
 
 
@@ -68,7 +77,7 @@ def sample(
     deviation = errors.walk_deviation(p.bias_instability_nt * _NANO)
     walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, normal3(key, tick, 0))
     noise = scale(errors.white_deviation(p.noise_nt_per_sqrt_hz * _NANO, p.rate), normal3(key, tick, 1))
-    true = rotate_back(truth.attitude, truth.magnetic_field_world)
+    true = _true_field(p, truth)
     measured = add(add(apply(s.matrix, true), add(s.hard_iron, walk)), noise)
     measured = errors.digitise(measured, p.range_ut * 1e-6, p.resolution_nt * _NANO)
     line, field, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)

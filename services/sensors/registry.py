@@ -62,9 +62,11 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
         raise KeyedError.unknown(f"{sensor}.preset", "preset", name, module.PRESETS)
     preset = module.PRESETS[name]
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())
-    adapter = TypeAdapter(type(preset), config={"extra": "forbid", "allow_inf_nan": True})
+    kind: Any = type(preset)
     try:
-        p = adapter.validate_python(_merged(preset, values))
+        p = _adapter(kind).validate_python(_merged(preset, values))
+        if hasattr(module, "check"):
+            module.check(p)
         if not hasattr(p, "faults"):
             if faults:
                 raise KeyedError("faults", f"{sensor} knows none; leave them out")
@@ -74,6 +76,11 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
         raise fault(error, type(preset)).under(sensor) from None
     except KeyedError as error:
         raise error.under(sensor) from None
+
+
+@cache
+def _adapter(cls: Any) -> TypeAdapter:
+    return TypeAdapter(cls, config={"extra": "forbid", "allow_inf_nan": True})
 
 
 def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,20 +10,20 @@ from cosim.scene import Scene
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup
 from dynamics.errors import KeyedError
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
 from dynamics.noise import stream_key
+from messages import NavSatStatus
 from services.common import ports
+from services.common.environment import environment
 from services.common.exchange import Exchange, ticks
 from services.common.sections import Run
 from services.common.vehicle import Vehicle, gravity
 from services.sensors.config import Sensors
-from services.sensors.core import Instrument, Surroundings
+from services.sensors.core import Instrument
 from services.sensors.registry import module_of, parameters
 from services.sensors.service import SensorsSetup
 from services.sensors.truth import Truth
 from services.sensors.wire import SonarWiring
 
-TEMPERATURE = 15.0  # [deg C] of the air at the ground
 READINGS = {
     ports.IMU: ports.ImuReading(),
     ports.MAGNETOMETER: ports.MagnetometerReading(),
@@ -38,17 +38,19 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     tables = scene[Sensors].tables
     if not tables:
         return None
-    around = Surroundings(gravity(scene), Home(), TEMPERATURE, MAGNETIC_FIELD_WORLD)
-    instruments, given, sonar = [], [], None
+    instruments, given = [], []
+    sonar, fix = None, NavSatStatus.STATUS_FIX
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Exchange].interval)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
-        instruments.append(Instrument(p, key, around))
-        reading = READINGS[name] if name in READINGS else tried(name, table, p)
+        instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
+        reading = READINGS[name] if name in READINGS else _reading(name, table, p)
         given.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         if name == ports.SONAR:
             sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
-    return ServiceSetup(SensorsSetup(tuple(instruments), sonar), (Input(ports.TRUTH),), tuple(given))
+        elif name == ports.GPS:
+            fix = p.fix_status
+    return ServiceSetup(SensorsSetup(tuple(instruments), sonar, fix), (Input(ports.TRUTH),), tuple(given))
 
 
 def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:
@@ -59,6 +61,10 @@ def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:
         for instrument, port in zip(setup.instruments, given.ports, strict=True)
     )
     return given._replace(parameters=setup._replace(instruments=instruments))
+
+
+def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
+    return tried(name, table, p) if "module" in table else module_of(name, table).READING
 
 
 def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:

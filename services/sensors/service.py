@@ -6,9 +6,10 @@ from typing import NamedTuple
 from cosim.graph import Service
 from cosim.part import Part
 from cosim.setup import Setup
+from cosim.wire import Wire
 from dynamics.cell import Cell
 from services.sensors.core import Instrument
-from services.sensors.wire import SonarWiring, wires
+from services.sensors.wire import PORTS, SonarWiring, own_wire, wires
 
 NAME = "sensors"
 
@@ -18,6 +19,7 @@ class SensorsSetup(NamedTuple):
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
     sonar: SonarWiring | None  # None where no sonar is carried
+    fix: int  # NavSatStatus of a satellite receiver's fixes
 
 
 def create(setup: Setup) -> Service:
@@ -28,7 +30,19 @@ def create(setup: Setup) -> Service:
         Part(f"{NAME}.{port.name}", p, Cell(_blank(p)), given.inputs, (port,), port.period)
         for p, port in zip(s.instruments, given.ports, strict=True)
     ]
-    return Service(NAME, parts, wires(setup, s.sonar))
+    return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.fix))
+
+
+def _other_wires(setup: Setup, s: SensorsSetup) -> list[Wire]:
+    """The topics of sensors whose modules make them, and of the user's own."""
+    found: list[Wire] = []
+    for p, port in zip(s.instruments, setup.services[NAME].ports, strict=True):
+        module = sys.modules[type(p.sensor).__module__]
+        if port.name in PORTS:
+            continue
+        ships = module.__package__ == __package__
+        found += module.wires(setup.vehicle, port, p.sensor) if ships else [own_wire(setup.vehicle, port)]
+    return found
 
 
 def _blank(p: Instrument) -> tuple:

@@ -1,14 +1,19 @@
 """Sonar: an ultrasonic rangefinder that looks down (theory.md, section 3.2)."""
 
 import math
+from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Lt
+from numba import types
 
+from dynamics.generate import implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.noise import TURN_ON, Key, normal
+from dynamics.terrain import Level, ray, surface
+from dynamics.vector import add, apply, dot, scale
 from services.common.ports import SonarReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
@@ -44,14 +49,51 @@ def blank() -> SonarState:
     return SonarState(0.0, BLANK)
 
 
-@leaf
+RAYS = 8  # along the edge of the beam, for bodies that stand beside its axis
+FARTHEST = 1000.0  # [m] that an echo is looked for
+
+
 def _distance(p: Sonar, truth: Truth) -> float:
-    """Distance to level ground along the ray of the beam nearest to the vertical; +inf without an echo (eq. (3.16))."""
+    """Distance to the ground that is nearest within the beam; +inf without an echo (theory.md, eq. (3.16))."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_distance, inline=True)
+def _distance_over(p: types.Type, truth: types.Type) -> Callable:
+    over = _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
+    return lambda p, truth: over(p, truth)
+
+
+@leaf
+def _over_level(p: Sonar, truth: Truth) -> float:
     cosine = rotation_matrix(truth.attitude)[8]
     tilt = math.acos(min(max(cosine, -1.0), 1.0))
     if tilt > math.radians(p.tilt_max_deg):
         return math.inf
     return truth.height_above_ground / math.cos(max(0.0, tilt - math.radians(p.half_beam_deg)))
+
+
+@kernel
+def _over_relief(p: Sonar, truth: Truth) -> float:
+    """By the plane that the axis meets, as over level ground, or what a ray along the beam's edge meets before that."""
+    R, origin, beam = rotation_matrix(truth.attitude), truth.position_world, math.radians(p.half_beam_deg)
+    axis = (-R[2], -R[5], -R[8])
+    farthest = min(1.5 * p.range_max, FARTHEST)
+    along = ray(truth.terrain, origin, axis, farthest)
+    if along == math.inf:
+        return math.inf
+    place = add(origin, scale(along, axis))
+    _, normal = surface(truth.terrain, place[0], place[1])
+    cosine = -dot(normal, axis)
+    angle = math.acos(min(max(cosine, -1.0), 1.0))
+    if angle > math.radians(p.tilt_max_deg):
+        return math.inf
+    found = along * cosine / math.cos(max(0.0, angle - beam))
+    for i in range(RAYS):
+        turn = 2.0 * math.pi * i / RAYS
+        edge = (math.sin(beam) * math.cos(turn), math.sin(beam) * math.sin(turn), -math.cos(beam))
+        found = min(found, ray(truth.terrain, origin, apply(R, edge), farthest))
+    return found
 
 
 @kernel

@@ -1,14 +1,21 @@
 """What the sensors measure: the true motion at one instant, and the surroundings."""
 
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
+from annotated_types import Ge, Le
+
+from dynamics.atmosphere import Atmosphere
+from dynamics.environment import STANDARD
+from dynamics.geodesy import Home
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from dynamics.vector import ZERO, Vec3
 
+Arm = Annotated[float, Ge(-10.0), Le(10.0)]
+Place = tuple[Arm, Arm, Arm]  # [m] of an instrument, body coordinates
+
 
 class Truth(NamedTuple):
-    """True state of a vehicle and of the air around it."""
+    """True state of a vehicle and what is around it."""
 
     position_world: Vec3 = ZERO  # [m]
     attitude: Quaternion = NO_ROTATION  # wxyz, body to world
@@ -17,6 +24,14 @@ class Truth(NamedTuple):
     acceleration_world: Vec3 = ZERO  # [m/s^2], dv/dt
     height_above_ground: float = 0.0  # [m], of the body's origin, straight down
     gravity: float = 9.81  # [m/s^2], positive, along -z of the world
-    home: Home = Home()
-    temperature_celsius: float = 15.0  # [deg C], of the air
-    magnetic_field_world: Vec3 = MAGNETIC_FIELD_WORLD  # [T]
+    home: Home = STANDARD.home
+    atmosphere: Atmosphere = STANDARD.atmosphere
+    magnetic_field_world: Vec3 = STANDARD.magnetic_field_world  # [T]
+    terrain: Any = STANDARD.terrain  # Level or Relief
+    angular_acceleration_body: Vec3 = ZERO  # [rad/s^2]
+    dynamic_pressure: float = 0.0  # [Pa] of the air that the vehicle flies through
+    motor_current: float = 0.0  # [A] of all motors
+    air_velocity_world: Vec3 = ZERO  # [m/s] of the vehicle through the air
+    air_density: float = 1.225  # [kg/m^3]
+    thrust: float = 0.0  # [N] of all rotors
+    rotor_speed: float = 0.0  # [rad/s] mean of the rotors

@@ -30,6 +30,9 @@ from services.common.ports import BarometerReading, GpsReading, ImuReading, Magn
 UNKNOWN = -1.0  # first element of a covariance: there is no such measurement
 
 
+PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)  # others make their own topics
+
+
 class SonarWiring(NamedTuple):
     """What a sonar's messages say of the instrument."""
 
@@ -38,27 +41,27 @@ class SonarWiring(NamedTuple):
     range_max: float  # [m]
 
 
-def wires(setup: Setup, sonar: SonarWiring | None) -> list[Wire]:
-    """The topics of the sensors that the vehicle carries."""
+def wires(setup: Setup, sonar: SonarWiring | None, fix: int) -> list[Wire]:
+    """The topics of the sensors of `PORTS` that the vehicle carries; `fix` is the NavSatStatus of what GPS finds."""
     frame, given = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
         (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),
-        (topic.GPS, ports.GPS, _gps, _gps_sample(frame)),
+        (topic.GPS, ports.GPS, partial(_gps, fix), _gps_sample(frame)),
         (topic.GPS_VELOCITY, ports.GPS, _gps_velocity, TwistWithCovarianceStamped(header(0, "world"))),
         (topic.BARO, ports.BAROMETER, _barometer, FluidPressure(header(0, frame))),
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
-    own = [
-        Wire(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
-        for port in setup.services["sensors"].ports
-        if port.name not in {name for _, name, _, _ in known}
-    ]
-    return own + [
+    return [
         Wire(which, port, given[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
         for which, port, fields, sample in known
         if port in given
     ]
+
+
+def own_wire(frame: str, port: Port) -> Wire:
+    """The topic of a sensor of the user's own."""
+    return Wire(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
@@ -124,12 +127,12 @@ def _gps_sample(frame: str) -> Any:
     )
 
 
-def _gps(r: GpsReading, time_ns: np.ndarray) -> Fields:
+def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
     """A fix, stamped with the time that it is valid for; no reading: no fix."""
     valid = np.asarray(r.valid) != 0.0
     return {
         **stamp_columns(_late(r, time_ns)),
-        "status.status": np.where(valid, NavSatStatus.STATUS_GBAS_FIX, NavSatStatus.STATUS_NO_FIX),
+        "status.status": np.where(valid, fix, NavSatStatus.STATUS_NO_FIX),
         "latitude": r.latitude_deg,
         "longitude": r.longitude_deg,
         "altitude": r.height,

@@ -22,6 +22,7 @@ def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> 
     r = piece.evaluate(p.path, tick * p.interval)
     return s, (
         Reference(
-            r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate, r.phase, r.phase >= p.final
+            r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate, r.phase, r.phase >= p.final,
+            p.path.phase_release[r.phase] > 0.0,
         ),
     ), GO_ON  # fmt: skip

@@ -49,6 +49,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
     parameters = Parameters(
         **{channel: _channel(joined[channel]) for channel in CHANNELS},
         phase_start=np.array(starts),
+        phase_release=np.array([float(phase.release) for phase in trajectory.phase]),
         origin_world=origin_world,
         origin_yaw=float(origin_yaw),
     )

@@ -35,6 +35,7 @@ class Phase(BaseModel):
     y: Segments = ()  # [m]
     z: Segments = ()  # [m]
     yaw: Segments = ()  # [rad]
+    release: bool = False  # whether the payload is let go of in this phase, as soon as the vehicle stands
 
 
 class Phases(BaseModel):

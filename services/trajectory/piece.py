@@ -41,6 +41,7 @@ class Parameters(NamedTuple):
     z: Channel
     yaw: Channel
     phase_start: np.ndarray  # (phases,) [s]
+    phase_release: np.ndarray  # (phases,) 1 where the payload is let go of
     origin_world: Vec3  # [m]
     origin_yaw: float  # [rad]
 

@@ -7,7 +7,7 @@ from services.common import ports
 from services.common.exchange import Exchange
 from services.common.ports import Reference
 from services.common.sections import follows_trajectory
-from services.common.vehicle import start_height
+from services.common.vehicle import start_place
 from services.trajectory.config import Trajectory
 from services.trajectory.core import TrajectoryPath
 from services.trajectory.mission import compile
@@ -21,7 +21,7 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     if not follows_trajectory(scene):
         return None
     exchange = scene[Exchange]
-    compiled = compile(scene[Trajectory], (0.0, 0.0, start_height(scene)))
+    compiled = compile(scene[Trajectory], start_place(scene))
     core = TrajectoryPath(compiled.parameters, compiled.final, exchange.interval)
     ahead = max(1, round(LEAD * exchange.rate))
     return ServiceSetup(

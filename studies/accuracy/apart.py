@@ -1,6 +1,6 @@
-"""What distribution costs a flight: the errors of the plant's step, of the exchange interval, and of the coupling.
+"""What a flight loses to the plant's step, to its contact with the ground, to the exchange interval, to the coupling.
 
-The scene is flown in memory, closed loop, each time with one of the three changed. Sensors and random winds would hide
+The scene is flown in memory, closed loop, each time with one of the four changed. Sensors and random winds would hide
 what is looked for: the autopilot gets the true state, and winds their mean.
 """
 
@@ -18,9 +18,12 @@ from studies.accuracy.plant import longest_step
 from studies.flight import Flight
 from studies.fly import fly
 
-LONGEST = 20.0  # [s] of a flight that is flown so often
-MOST_TICKS = 5000  # of it, at the scene's own rate
-SOURCES = ("plant step", "exchange interval", "coupling delay")
+LONGEST = 20.0  # [s] of a motion that has no end of its own
+WHOLE = 200.0  # [s] of a mission, from take-off to rest
+MOST_TICKS = 5000  # of the former, at the scene's own rate
+SOURCES = ("plant step", "contact", "exchange interval", "coupling delay")
+ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6)  # asked of the contact
+FINEST_ACCURACY = 1e-9  # of the contact, in whatever else is compared
 STEPS = (1, 2, 4, 8)  # in an exchange interval, of the scene's integrator
 FINEST_STEPS = 32  # in the scene's exchange interval, of rkmk4
 FINER = (1, 2, 4)  # times the scene's exchange rate
@@ -35,7 +38,7 @@ class Part(NamedTuple):
     """
 
     source: str
-    setting: float  # [s] step, or exchange interval
+    setting: float  # [s] step, or exchange interval; of the contact the accuracy
     label: str
     position: float  # [m]
     attitude: float  # [rad]
@@ -43,7 +46,7 @@ class Part(NamedTuple):
 
 
 def errors(scene: Scene) -> list[Part]:
-    """The three errors of a scene whose integrator and step are given, each at a few settings.
+    """The errors of a scene whose integrator and step are given, each at a few settings.
 
     Raises:
         ValueError: a flight comes to no end.
@@ -58,23 +61,27 @@ def errors(scene: Scene) -> list[Part]:
             raise ValueError(f"{scene.path}: {flight.failure}")
         return flight
 
-    def fine(factor: int) -> list[str]:
-        return ["solver.integrator=rkmk4", f"solver.step={interval / max(FINEST_STEPS, factor)!r}"]
+    def fine(factor: int, accuracy: float = FINEST_ACCURACY) -> list[str]:
+        step = interval / max(FINEST_STEPS, factor)
+        return ["solver.integrator=rkmk4", f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]
 
     coupling = scene[Exchange].coupling
     parts = []
     exact = flown(1, coupling, fine(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
-        flight = flown(1, coupling, [f"solver.step={step!r}"])
+        flight = flown(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={FINEST_ACCURACY!r}"])
         parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact))
+    for accuracy in ACCURACIES if touches(scene) else ():
+        flight = flown(1, coupling, fine(1, accuracy))
+        parts.append(_part(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
     sequential = {factor: flown(factor, "sequential", fine(factor)) for factor in (*FINER, FINEST_RATE)}
     for factor in FINER:
         label = f"{rate * factor} Hz"
-        parts.append(_part(SOURCES[1], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
+        parts.append(_part(SOURCES[2], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
     for factor in FINER:
         label = f"parallel at {rate * factor} Hz"
         parallel = flown(factor, "parallel", fine(factor))
-        parts.append(_part(SOURCES[2], interval / factor, label, parallel, sequential[factor]))
+        parts.append(_part(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     return parts
 
 
@@ -83,7 +90,14 @@ def scene_integrator(scene: Scene) -> str:
     return str(scene.lookup("solver.integrator"))
 
 
+def touches(scene: Scene) -> bool:
+    """Whether the scene's vehicle can touch the ground."""
+    return "ground_contact" in scene.tables("effects")
+
+
 def _duration(scene: Scene) -> float:
+    if touches(scene):
+        return min(scene[Run].duration, WHOLE)
     interval = scene[Exchange].interval
     return min(scene[Run].duration, max(min(LONGEST, MOST_TICKS * interval), 1000 * interval))
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from rich.console import Console
 
 from dynamics.kernel import statistics
+from services.common.vehicle import Effects
 from studies import terminal
 from studies.accuracy import apart, scenes, table
 from studies.accuracy import plot as picture
@@ -15,6 +16,7 @@ from studies.accuracy.apart import Part
 from studies.accuracy.measure import Point, cheapest, check_target, measure
 from studies.accuracy.problem import Problem
 from studies.accuracy.targets import find, scene_of
+from studies.effects.cost import costs
 
 WIDTH = 120  # letters of a table that goes to no terminal
 SLOW = 3.0  # [s] after which the user is told why
@@ -27,7 +29,8 @@ class Study(NamedTuple):
     problem: Problem
     points: list[Point]
     chosen: Point | None  # the cheapest that meets the goal
-    parts: list[Part]  # the three errors of a scene
+    parts: list[Part]  # the errors of a scene's flight
+    cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, standing
 
 
 def console() -> Console:
@@ -61,21 +64,23 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     try:
         points = measure(problem)
         chosen = None if goal is None else cheapest(points, goal)
-        return Study(target, problem, points, chosen, apart.errors(scene) if scene else [])
+        parts = apart.errors(scene) if scene else []
+        cost = costs(scene, [scene[Effects].tables])[0] if scene and apart.touches(scene) else None
+        return Study(target, problem, points, chosen, parts, cost)
     finally:
         notice.cancel()
 
 
 def show(screen: Console, found: Study) -> None:
-    """Print the table, and that of the three errors of a scene."""
+    """Print the table, and that of the errors of a scene's flight."""
     table.show(screen, found.problem, found.points, found.chosen)
     if found.parts:
-        table.show_parts(screen, found.parts)
+        table.show_parts(screen, found.parts, found.cost)
 
 
 def write_json(path: Path, found: Study) -> None:
     """Write all points for other programs."""
-    table.write_json(path, found.target, found.problem, found.points, found.chosen, found.parts)
+    table.write_json(path, found.target, found.problem, found.points, found.chosen, found.parts, found.cost)
 
 
 def plot(path: Path, found: Study) -> None:

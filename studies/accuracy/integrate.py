@@ -46,12 +46,6 @@ def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray
     return adapt(p, x, times, tolerance, out)
 
 
-def applicable(x: Any) -> list[str]:
-    """Names of the integrators that take a state like x."""
-    fields = getattr(x, "_fields", ())
-    return [n for n in integrators.names() if getattr(integrators.get(n), "REQUIRES", fields) == fields]
-
-
 def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
     """A way for each integrator, the adaptive one by tolerances.
 
@@ -67,7 +61,7 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
 
 def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
     """A way for each integrator, all by steps."""
-    return [_fixed(name, p, x, duration, coarsest) for name in applicable(x)]
+    return [_fixed(name, p, x, duration, coarsest) for name in integrators.fitting(p, x)]
 
 
 def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:

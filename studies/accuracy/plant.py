@@ -21,7 +21,7 @@ from services.common.sections import Run
 from services.common.vehicle import Vehicle
 from services.plant import models
 from studies.accuracy.coordinates import coordinates, defect
-from studies.accuracy.integrate import SAMPLES, applicable
+from studies.accuracy.integrate import SAMPLES
 from studies.accuracy.problem import Outcome, Problem, Way
 
 DURATION = 2.0  # [s], about
@@ -115,7 +115,7 @@ def problem(scene: Scene) -> Problem:
         f"{scene.name}: its multirotor in the air under prescribed voltages",
         "s",
         duration,
-        [way(name) for name in applicable(state.motion)],
+        [way(name) for name in integrators.fitting(p, state.motion)],
         lambda: coordinates(motion, flown(rkmk54, FINEST)())[-1],
         f"rkmk54 with {FINEST} steps in an exchange interval",
         {},

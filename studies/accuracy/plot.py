@@ -31,6 +31,7 @@ def draw(path: Path, title: str, points: list[Point], parts: Sequence[Part] = ()
 
 def three_errors(axes: Axes, parts: Sequence[Part]) -> None:
     """Draw what the flight loses to step, exchange interval and coupling: position, or attitude if it only turns."""
+    parts = [p for p in parts if p.source != "contact"]  # its setting is no time
     moves = any(p.position > 0.0 for p in parts)
     for index, source in enumerate(dict.fromkeys(p.source for p in parts)):
         own = [p for p in parts if p.source == source]

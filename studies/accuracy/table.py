@@ -54,8 +54,8 @@ def _drifts(points: list[Point]) -> list[str]:
     return list(points[0].drift) if points else []
 
 
-def show_parts(console: Console, parts: list[Part]) -> None:
-    """Print the three errors of a flight."""
+def show_parts(console: Console, parts: list[Part], cost: tuple[float, float] | None) -> None:
+    """Print the errors of a flight, and what a step of the plant costs [ns]: hovering, and standing."""
     console.print("What the flight loses to each, in closed loop without noise; nine ticks in ten are below:")
     table = Table(box=SIMPLE, pad_edge=False)
     table.add_column("source", no_wrap=True)
@@ -70,12 +70,21 @@ def show_parts(console: Console, parts: list[Part]) -> None:
         table.add_row(source, part.label, *(f"{error:.1e}" for error in errors))
         before = part.source
     console.print(table)
+    if cost:
+        air, ground = cost
+        console.print(f"A plant step takes {air:.0f} ns hovering, {ground:.0f} ns in contact.", highlight=False)
 
 
 def write_json(
-    path: Path, target: str, problem: Problem, points: list[Point], chosen: Point | None, parts: list[Part]
+    path: Path,
+    target: str,
+    problem: Problem,
+    points: list[Point],
+    chosen: Point | None,
+    parts: list[Part],
+    cost: tuple[float, float] | None = None,
 ) -> None:
-    """Write all points, and the three errors of a scene, for other programs."""
+    """Write all points, and of a scene its errors and what a step of its plant costs, for other programs."""
     data = {
         "target": target,
         "title": problem.title,
@@ -85,5 +94,6 @@ def write_json(
         "points": [p._asdict() for p in points],
         "cheapest": chosen._asdict() if chosen else None,
         "apart": [p._asdict() for p in parts],
+        "step_ns": dict(zip(("hovering", "in contact"), cost, strict=True)) if cost else None,
     }
     path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")

@@ -1,104 +1,84 @@
-"""A campaign as a table, as JSON and as a plot."""
+"""A campaign in the terminal, and as JSON."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, PercentFormatter
 from rich.console import Console
 from rich.table import Table
 
-from studies.campaign.study import Campaign, Spread
-from studies.report.paper import styled
-from studies.report.style import AXIS_COLOURS, DPI, FLOWN, REFERENCE, WIDTH
+from studies.campaign.results import Results
 from studies.tracking import AXES, shown
 
-LISTED = 10  # flights that did not land, in the terminal
-THIRD = 1.0 / 3.0  # of the published error: what a well-tuned flight is to stay below
+LISTED = 10  # failures, refusals
 
 
-def show(console: Console, found: Campaign) -> None:
+def show(console: Console, found: Results) -> None:
     """Print the campaign for people."""
-    seeds = [f.seed for f in found.flights]
-    console.print(f"{found.scene}: {len(seeds)} flights, seeds {min(seeds)} to {max(seeds)}", highlight=False)
-    _table(console, "Root-mean-square error of the reference against the truth", found.rmse, found)
-    if found.rmse != found.rmse_estimate:
-        _table(console, "The same against the vehicle's own estimate", found.rmse_estimate, found)
-        shares = ", ".join(
-            f"{axis} {np.mean([f.inside[i] for f in found.flights]):.2%}" for i, axis in enumerate("xyz")
-        )
+    if len(found) == 0:
+        console.print(f"{found.scene}: the scene has refused every run", highlight=False)
+        _list(console, "refused", found.refused["run"], found.refused["told"])
+        return
+    _table(console, "Root-mean-square error of the reference against the truth", "rmse", found)
+    if found.on_estimate:
+        _table(console, "The same against the vehicle's own estimate", "rmse_estimate", found)
+        shares = ", ".join(f"{axis} {found[f'inside.{axis}'].mean():.2%}" for axis in "xyz")
         console.print(f"Truth within 3 sigma of the estimate: {shares} of the time", highlight=False)
-        least = ", ".join(f"{axis} {s.worst:.1%} (seed {s.seed})" for axis, s in found.inside.items())
-        console.print(f"Least of a flight: {least}", highlight=False)
-    if len(seeds) > 1 and all(s.low == s.worst for s in found.rmse.values()):
-        console.print("Every seed gives the same flight: nothing in this scene is random", highlight=False)
-    console.print(f"{len(seeds)} flights: {found.counts}", highlight=False)
-    for f in found.failed[:LISTED]:
-        console.print(f"  seed {f.seed}: {f.verdict}", highlight=False)
-    if len(found.failed) > LISTED:
-        console.print(f"  and {len(found.failed) - LISTED} more: --json has all of them", highlight=False)
+        least = {axis: found.spread(f"inside.{axis}") for axis in "xyz"}
+        text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
+        console.print(f"Least of a flight: {text}", highlight=False)
+    if len(found) > 1 and not found.figures:
+        console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
+    console.print(f"{found.scene}: {len(found) + len(found.refused['run'])} runs: {found.told}", highlight=False)
+    p = found.failure
+    share = f"{p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
+    console.print(f"Failures: {share} (success: {' and '.join(found.folder.about['success']) or 'always'})")
+    failed = ~found["success"].astype(bool)
+    if late := int((found["verdict"][~failed] == "timed out").sum()):
+        console.print(
+            f"{late} of the successes timed out: [success] require = [\"verdict == 'landed'\"] lets them fail"
+        )
+    _list(console, "run", found["run"][failed], found["told"][failed])
+    _list(console, "refused: run", found.refused["run"], found.refused["told"])
 
 
-def _table(console: Console, title: str, spreads: dict[str, Spread], found: Campaign) -> None:
+def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str]) -> None:
+    for run, text in list(zip(runs, told, strict=True))[:LISTED]:
+        console.print(f"  {what} {run}: {text}", highlight=False)
+    if len(runs) > LISTED:
+        console.print(f"  and {len(runs) - LISTED} more: the table has all of them", highlight=False)
+
+
+def _table(console: Console, title: str, kind: str, found: Results) -> None:
     table = Table(title=title, title_justify="left")
     table.add_column("axis", no_wrap=True)
-    for column in ("5 %", "median", "95 %", "worst", "of seed"):
+    for column in ("5 %", "median", "95 %", "worst", "of run"):
         table.add_column(column, justify="right", no_wrap=True)
     if found.published:
         table.add_column(found.source, justify="right")
         table.add_column("worst / that", justify="right")
     for axis in AXES:
-        s, (unit, scale) = spreads[axis], shown(axis)
-        row = [f"{axis} [{unit}]", *(f"{scale * v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.seed)]
-        if axis in found.published:
-            row += [f"{scale * found.published[axis]:.4f}", f"{s.worst / found.published[axis]:.3f}"]
+        s, (unit, scale) = found.spread(f"{kind}.{axis}"), shown(axis)
+        if s is None:
+            continue
+        row = [f"{axis} [{unit}]", *(f"{scale * v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.run)]
+        if published := found.published.get(f"rmse.{axis}"):
+            row += [f"{scale * published:.4f}", f"{s.worst / published:.3f}"]
         table.add_row(*row)
     console.print(table)
 
 
-def write_json(path: Path, found: Campaign) -> None:
-    """Write the campaign, flight by flight, for other programs."""
-
-    def plain(spreads: dict[str, Spread]) -> dict:
-        return {axis: s._asdict() for axis, s in spreads.items()}
-
+def write_json(path: Path, found: Results, digest: str) -> None:
+    """Write what the campaign came to for other programs; the table has the single runs."""
+    spreads = {name: found.spread(name) for name in found.figures}
     data = {
-        **found._asdict(),
-        "flights": [{**f._asdict(), "verdict": f.verdict._asdict()} for f in found.flights],
-        "rmse": plain(found.rmse),
-        "rmse_estimate": plain(found.rmse_estimate),
-        "inside": plain(found.inside),
-        "failed": [f.seed for f in found.failed],
+        "scene": found.scene,
+        "runs": len(found) + len(found.refused["run"]),
+        "told": found.told,
+        "failure": found.failure._asdict(),
+        "figures": {name: s._asdict() for name, s in spreads.items() if s},
+        "failed": found["run"][~found["success"].astype(bool)].tolist(),
+        "refused": found.refused["run"].tolist(),
+        "digest": digest,
     }
     path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
-
-
-def plot(path: Path, found: Campaign) -> None:
-    """How many flights stay below which error, an axis a panel, beside what is published."""
-    with styled():
-        figure = Figure(figsize=(WIDTH, 5.6), dpi=DPI, layout="constrained")
-        panels = figure.subplots(2, 3, sharey=True)
-        for (axis, unit), panel in zip(AXES.items(), panels.flat, strict=True):
-            panel.ecdf([f.rmse[axis] for f in found.flights], color=FLOWN, label="against the truth")
-            if found.rmse != found.rmse_estimate:
-                values = [f.rmse_estimate[axis] for f in found.flights]
-                panel.ecdf(values, color=AXIS_COLOURS[1], label="against the estimate")
-            if axis in found.published:
-                panel.axvline(found.published[axis], color=REFERENCE, linewidth=1.1, label=found.source)
-                third = THIRD * found.published[axis]
-                panel.axvline(third, color=REFERENCE, linestyle=(0, (4, 3)), linewidth=1.1, label="a third of it")
-            if min(f.rmse[axis] for f in found.flights) > 0.0:
-                panel.set_xscale("log")
-                panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                panel.xaxis.set_minor_formatter(NullFormatter())
-            panel.xaxis.set_major_formatter("{x:g}")
-            panel.set_xlabel(f"RMSE of {axis} [{unit}]")
-            panel.set_ylim(0.0, 1.0)
-            panel.yaxis.set_major_formatter(PercentFormatter(1.0))
-        for row in panels:
-            row[0].set_ylabel("share of flights with a smaller error")
-        lines, names = panels[0, 0].get_legend_handles_labels()
-        figure.legend(lines, names, loc="outside lower center", ncols=len(names))
-        figure.suptitle(f"{found.scene}: {found.counts}", fontsize=10)
-        figure.savefig(path)

@@ -1,102 +1,104 @@
-"""Many flights of one scene, each with another seed."""
+"""Flies a campaign, shard by shard, and counts."""
 
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from cosim.scene import Scene
-from services.common.sections import Published
-from services.table import reseed
-from studies.campaign.figures import Figures, figures
-from studies.campaign.setup import TOPICS, campaign_setup
-from studies.fly import fly
-from studies.tracking import AXES
+from studies.campaign.folder import Folder
+from studies.campaign.runs import REFUSED, Reference, Row, fly_runs
+from studies.campaign.statistics import Interval, interval
 from studies.verdict import KINDS
 
-
-class Spread(NamedTuple):
-    """How a figure is distributed over the seeds."""
-
-    median: float
-    low: float  # 5 % of the flights are below
-    high: float  # 5 % are above
-    worst: float
-    seed: int  # of the worst
+Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]
+"""(call, tasks) -> (place of a task, call(*task)), as soon as they are there."""
 
 
-class Campaign(NamedTuple):
-    """What has been flown, and what it came to."""
+class Count(NamedTuple):
+    """What some runs came to."""
 
-    scene: str
-    source: str  # of the published figures
-    published: dict[str, float]
-    flights: list[Figures]
-    rmse: dict[str, Spread]
-    rmse_estimate: dict[str, Spread]
-    inside: dict[str, Spread]  # x, y, z; the worst is the least
-    failed: list[Figures]  # that did not land
+    runs: int = 0
+    successes: int = 0
+    kinds: tuple[tuple[str, int], ...] = ()  # how many ended how
 
     @property
-    def counts(self) -> str:
-        """How many flights ended how: "97 landed, 3 crashed"."""
-        kinds = [f.verdict.kind for f in self.flights]
-        return ", ".join(f"{kinds.count(kind)} {kind}" for kind in KINDS if kind in kinds)
+    def flown(self) -> int:
+        """Runs that the scene took."""
+        return self.runs - dict(self.kinds).get(REFUSED, 0)
+
+    @property
+    def failures(self) -> int:
+        """Runs that were flown without success."""
+        return self.flown - self.successes
+
+    @property
+    def failure(self) -> Interval:
+        """Probability of a failure."""
+        return interval(self.failures, self.flown)
+
+    def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
+        kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REFUSED)}
+        seen = tuple((kind, n) for kind, n in kinds.items() if n)
+        return Count(self.runs + other.runs, self.successes + other.successes, seen)
+
+    def __str__(self) -> str:
+        return ", ".join(f"{n} {kind}" for kind, n in self.kinds)
 
 
-def campaign(scene: Scene, seeds: Iterable[int], progress: Callable[[], None]) -> Campaign:
-    """Fly the scene with each of the seeds, as many at once as there are processors.
+def count(rows: Iterable[Row]) -> Count:
+    """Of some rows."""
+    found = Count()
+    for row in rows:
+        found += Count(1, int(row["success"]), ((row["verdict"], 1),))
+    return found
+
+
+def campaign(
+    folder: Folder,
+    reference: Reference,
+    workers: Workers,
+    progress: Callable[[Count], None] = lambda count: None,
+    until: float | None = None,
+    part: Iterable[int] | None = None,
+) -> Count:
+    """Fly what is missing.
 
     Args:
-        scene: what to fly; its own seed is not used.
-        seeds: one flight for each.
-        progress: called after every flight.
+        folder: of the campaign.
+        reference: what each worker has to agree on.
+        workers: who flies.
+        progress: is told what the runs so far came to, those of before among them.
+        until: end as soon as the probability of a failure is known to this on either side; which run is the last does
+            not depend on the workers.
+        part: the shards to fly, None for all.
 
-    Raises:
-        ValueError: nobody flies along a trajectory in this scene.
+    Returns:
+        What all runs of the table came to.
     """
-    setup = campaign_setup(scene)
-
-    def one(seed: int) -> Figures:
-        found = figures(seed, fly(reseed(setup, seed), TOPICS))
-        progress()
-        return found
-
-    first, *others = seeds
-    flights = [one(first)]  # alone: it compiles
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            flights += pool.map(one, others)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)  # Ctrl-C ends with the flights that are in the air
-            raise
-    return summary(scene, flights)
-
-
-def summary(scene: Scene, flights: list[Figures]) -> Campaign:
-    """The distribution of every figure over the flights."""
-    published = scene[Published]
-
-    def over(name: str) -> dict[str, Spread]:
-        return {axis: spread([(getattr(f, name)[axis], f.seed) for f in flights]) for axis in AXES}
-
-    return Campaign(
-        scene.name,
-        published.source,
-        {str(axis): value for axis, value in published.rmse.items()},
-        flights,
-        over("rmse"),
-        over("rmse_estimate"),
-        {axis: spread([(f.inside[i], f.seed) for f in flights], least=True) for i, axis in enumerate("xyz")},
-        [f for f in flights if f.failed],
-    )
+    absent = set(folder.missing())
+    missing = sorted(absent if part is None else absent.intersection(part))
+    done = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in absent}
+    if (last := _last(done, until)) is None:
+        progress(sum(done.values(), Count()))
+        tasks = [(folder.plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
+        results = workers(fly_runs, tasks)
+        for place, rows in results:
+            folder.write(missing[place], rows)
+            done[missing[place]] = count(rows)
+            progress(sum(done.values(), Count()))
+            if (last := _last(done, until)) is not None:
+                break
+        results.close()  # type: ignore[attr-defined]
+    if last is not None:
+        folder.end_after(last)
+        done = {k: n for k, n in done.items() if k <= last}
+    return sum(done.values(), Count())
 
 
-def spread(values: list[tuple[float, int]], least: bool = False) -> Spread:
-    """Distribution of (value, seed); the worst is the greatest, or the `least`."""
-    numbers = np.array([value for value, _ in values])
-    median, low, high = np.quantile(numbers, [0.5, 0.05, 0.95])
-    worst, seed = (min if least else max)(values)
-    return Spread(float(median), float(low), float(high), worst, seed)
+def _last(done: dict[int, Count], until: float | None) -> int | None:
+    """The first shard up to which, all before it being done, the probability of a failure is known well enough."""
+    total, shard = Count(), 0
+    while until is not None and shard in done:
+        total += done[shard]
+        if total.flown and total.failure.half_width <= until:
+            return shard
+        shard += 1
+    return None

@@ -12,7 +12,7 @@ from dynamics.kernel import kernel
 from dynamics.noise import Key, stream_key
 from dynamics.vehicles import multirotor
 from services.common.vehicle import active, airframe, rotor_constants, start_height
-from services.plant.config import method
+from services.plant.config import Solver, method
 from studies.effects.variants import Tables, variant
 
 STEPS = 2000  # in one timed call
@@ -42,7 +42,7 @@ def costs(scene: Scene, variants: list[Tables]) -> list[tuple[float, float]]:
 
 def _calls(scene: Scene) -> tuple[Any, Any]:
     frame = airframe(scene)
-    p = multirotor.parameters(frame, active(scene))
+    p = multirotor.parameters(frame, active(scene))._replace(tolerance=scene[Solver].contact_tolerance)
     rotor = rotor_constants(scene)
     lift = (multirotor.STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
     speed = math.sqrt(frame.mass.total * STANDARD_GRAVITY / (len(frame.rotors.position) * lift))

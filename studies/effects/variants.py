@@ -1,21 +1,19 @@
 """The same scene with other effects, flown on as many cores as there are."""
 
-import multiprocessing
 import os
-import signal
-import threading
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing.connection import Connection
 from typing import Any
 
 from cosim.scene import Scene
 from dynamics import effects
 from messages.topics import TRUTH
+from services.common.environment import environment
 from services.common.vehicle import Effects, airframe
 from studies.flight import Flight
 from studies.fly import fly
+from studies.workers import workers
 
 Tables = Mapping[str, Any]  # the table of each effect that a variant has
 
@@ -28,7 +26,7 @@ def variant(scene: Scene, tables: Tables) -> Scene:
 def refusal(scene: Scene, tables: Tables) -> str:
     """Why a scene cannot have these effects, "" if it can."""
     try:
-        effects.from_scene(tables, airframe(scene))
+        effects.from_scene(tables, airframe(scene), environment(scene))
     except ValueError as error:
         return str(error)
     return ""
@@ -53,25 +51,5 @@ class Hangar:
 @contextmanager
 def hangar(scene: Scene) -> Iterator[Hangar]:
     """A hangar whose processes end with the block, at once where it ends with an error, and with this process."""
-    # spawned: a fork of a process with threads may hang, and would hold the other end of the pipe
-    context = multiprocessing.get_context("spawn")
-    theirs, ours = context.Pipe(duplex=False)
-    with ours, ProcessPoolExecutor(os.cpu_count(), context, _end_with, (theirs,)) as pool:
-        try:
-            yield Hangar(scene, pool)
-        except BaseException:
-            ours.close()  # nobody waits for the flights that are in the air
-            raise
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _end_with(parent: Connection) -> None:
-    """Let this process end as soon as the other end of the pipe is closed, by whom or by what death ever."""
-
-    def watch() -> None:
-        parent.poll(None)
-        os._exit(1)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, who closes the pipe
-    threading.Thread(target=watch, daemon=True).start()
+    with workers(os.cpu_count() or 1) as pool:
+        yield Hangar(scene, pool)

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
+from cosim.deadlines import MISSED, WORST
 from studies.flight import Flight
 
-LONG = 60  # letters of an effect's keys that are still listed
+LONG = 60  # letters of a value or of an effect's keys that are still listed
 MANY = 12  # keys in which two scenes differ that are listed
 
 
@@ -31,6 +32,7 @@ def facts(flight: Flight) -> dict[str, str]:
         "mode": said.get("mode", ""),
         "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
         "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
+        "deadlines missed": f"{said[MISSED]} ticks; at most {said[WORST]} late" if MISSED in said else "",
         "version": said.get("version", ""),
         "commit": said.get("commit", ""),
         "digest": flight.digest or "none: the log has no end",
@@ -42,7 +44,7 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[s
     """The keys of two scenes whose values differ, and both values; of many the first, and how many more."""
     first, second = dict(_leaves(one)), dict(_leaves(other))
     keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
-    found = {key: (_short(first.get(key, "")), _short(second.get(key, ""))) for key in keys[:MANY]}
+    found = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
     if len(keys) > MANY:
         found[f"{len(keys) - MANY} more"] = ("", "")
     return found
@@ -65,6 +67,12 @@ def _gains(scene: dict[str, Any]) -> str:
 def _with_keys(name: str, keys: dict[str, Any]) -> str:
     told = ", ".join(f"{key} {_short(value)}" for key, value in keys.items())
     return f"{name} ({told if len(told) <= LONG else f'{len(keys)} keys'})" if told else name
+
+
+def _cut(value: Any) -> str:
+    """A value in at most so many letters: a module's text or a mesh has thousands."""
+    text = _short(value)
+    return text if len(text) <= LONG else f"{text[:LONG]}…"
 
 
 def _short(value: Any) -> str:

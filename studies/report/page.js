@@ -2,6 +2,7 @@
 (() => {
   const config = { responsive: true, displaylogo: false, scrollZoom: false, toImageButtonOptions: { format: "svg" } };
   const linked = []; // plots over time that have been drawn: {box, axis}
+  const unit = Number(document.body.dataset.seconds || 1); // in a unit of the plots' time
   let range = null; // of time, as somebody has chosen it
 
   function follow(plot, changed) {
@@ -22,10 +23,19 @@
     if (range) for (const axis of timed) layout[axis].range = range.slice();
     await Plotly.newPlot(box, data, layout, config);
     if (!timed.length) return;
-    const plot = { box, timed, axis: timed[0] };
+    const plot = { box, timed, axis: timed[0], panels: timed.map((axis) => `${axis}${axis.replace("x", "y")}`.replaceAll("axis", "")) };
     linked.push(plot);
     box.on("plotly_relayout", (changed) => follow(plot, changed));
+    box.on("plotly_hover", ({ xvals }) => document.dispatchEvent(new CustomEvent("plot-time", { detail: xvals[0] * unit })));
   }
+
+  // The cursor of the plots that can be seen, at a time that somebody else has chosen.
+  document.addEventListener("motion-time", ({ detail }) => {
+    for (const { box, panels } of linked) {
+      const place = box.getBoundingClientRect();
+      if (place.bottom > 0 && place.top < innerHeight) Plotly.Fx.hover(box, { xval: detail / unit }, panels, true);
+    }
+  });
 
   const figures = [...document.querySelectorAll("figure.plot")];
   const near = new IntersectionObserver(

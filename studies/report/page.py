@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 
+from cosim.setup import Setup
 from studies.flight import AXES, Flight
 from studies.report.browser import script
 from studies.report.facts import differences, facts
-from studies.report.sections import Section, labels, sections
+from studies.report.motion import to_json
+from studies.report.sections import Section, labels, long, sections
 from studies.tracking import shown
 
 LOOKS = {"landed": "good", "flown": ""}  # of a verdict; "bad" for all others
@@ -44,7 +46,19 @@ def flight_page(flights: Sequence[Flight]) -> str:
         accuracy=accuracy(flights, published.get("rmse", {})),
         heads=heads + ([published.get("source", "published")] if published.get("rmse") else []),
         sections=sections(flights),
+        seconds=3600 if long(flights) else 1,
+        motion=to_json(flights),
+        moving=_moving(),
     )
+
+
+def live_page(setup: Setup, stream: str) -> str:
+    """The page of a flight that goes on; the address `stream` gives what is new of it."""
+    return render("live.html", [], name=setup.scene, title=setup.title, stream=stream, moving=_moving())
+
+
+def _moving() -> str:
+    return (_HERE / "motion.js").read_text(encoding="utf-8")
 
 
 def render(template: str, sections: Sequence[Section], **values: Any) -> str:

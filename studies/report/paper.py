@@ -109,6 +109,8 @@ def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_xlim(panel.x_range)
     if panel.y_range:
         axes.set_ylim(panel.y_range)
+    if panel.x_ticks:
+        axes.set_xticks(range(len(panel.x_ticks)), panel.x_ticks)
     if lanes:
         axes.set_yticks(range(len(lanes)), lanes)
         axes.set_ylim(len(lanes) - 0.5, -0.5)

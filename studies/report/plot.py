@@ -77,6 +77,7 @@ class Panel(NamedTuple):
     equal: bool = False  # one scale for x and y
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None  # what is cut off by it the caption says
+    x_ticks: tuple[str, ...] = ()  # what stands at x = 0, 1, 2, ... in the place of numbers
 
 
 class Plot(NamedTuple):

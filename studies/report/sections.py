@@ -32,6 +32,8 @@ def sections(flights: Sequence[Flight]) -> list[Section]:
     """Every plot of the vehicles' models, of one flight or of two laid over each other."""
     models = {flight.origin.scene.get("vehicle", {}).get("model", "reduced") for flight in flights}
     wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
+    if all(len(flight.fleet) < 2 for flight in flights):
+        wanted = [module for module in wanted if not getattr(module, "FLEET", False)]
     return [_section(module, flights) for module in wanted]
 
 
@@ -65,5 +67,9 @@ def _section(module: ModuleType, flights: Sequence[Flight]) -> Section:
         plot = overlay(plot, drawn[1][1], (drawn[0][0], drawn[1][0]))
     elif missing:
         plot = plot._replace(caption=f"{plot.caption} Of {drawn[0][0]} alone ({'; '.join(missing)}).")
-    longest = max(flight.truth.times[-1] for flight in flights)
-    return Section(name, module.TITLE, in_hours(plot) if longest > LONG else plot)
+    return Section(name, module.TITLE, in_hours(plot) if long(flights) else plot)
+
+
+def long(flights: Sequence[Flight]) -> bool:
+    """Whether time is told in hours."""
+    return bool(max(flight.truth.times[-1] for flight in flights) > LONG)

@@ -1,6 +1,7 @@
 """Writes a report in the format of the file's ending."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from studies.flight import Flight
@@ -30,6 +31,8 @@ def write(flights: Flight | Sequence[Flight], target: Path) -> Path:
             draw = write_pdf if target.suffix == ".pdf" else write_png
             draw(target, [section.plot for section in sections(flown) if section.plot])
     except OSError as fault:
+        with suppress(OSError):
+            target.unlink(missing_ok=True)  # no half of one
         raise ValueError(f"{target}: cannot write the report: {fault.strerror or fault}") from None
     return target
 

@@ -1,16 +1,16 @@
 """Runs cases in worker processes, as many at once as there are processors."""
 
-import multiprocessing
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from typing import NamedTuple
 
 import numpy as np
 
-from studies.stability import cases
+from studies.stability import cases, other_simulators
 from studies.stability.case import Found, Plot, Row, Sweep
+from studies.workers import workers
 
 
 class Result(NamedTuple):
@@ -51,18 +51,12 @@ def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) 
         sweep: walk their difficulty as well.
         progress: told the name of each case that is done.
     """
-    workers = min(len(names), os.cpu_count() or 1)
-    if workers == 1:
+    number = min(len(names), os.cpu_count() or 1)
+    if number == 1:
         return [_told(one(name, sweep), progress) for name in names]
-    # fresh interpreters: a fork would share locks that the compiler's threads hold
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context) as pool:
+    with workers(number) as pool:
         jobs = {pool.submit(one, name, sweep): name for name in names}
-        try:
-            done = {jobs[job]: _told(job.result(), progress) for job in as_completed(jobs)}
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+        done = {jobs[job]: _told(job.result(), progress) for job in as_completed(jobs)}
     return [done[name] for name in names]
 
 
@@ -76,8 +70,10 @@ def one(name: str, sweep: bool) -> Result:
         why = f"ended in an error: {error}"
         found = Found([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
     with np.errstate(all="ignore"):
+        others = other_simulators.figures(name)
         walked = module.sweep() if sweep else None
-    return Result(name, module.HARD, found, walked, time.perf_counter() - started)
+    beside = [row._replace(other_simulators=tuple(others.get(row.name, {}).items())) for row in found.rows]
+    return Result(name, module.HARD, found._replace(rows=beside), walked, time.perf_counter() - started)
 
 
 def _told(result: Result, progress: Callable[[str], None]) -> Result:

@@ -11,10 +11,11 @@ from dynamics import effects
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.standing import at_rest
 from services.autopilot.gains import GainSet
+from services.common.environment import environment
 from services.common.parameters import of_gains
 from services.common.vehicle import Effects, airframe, gravity, start_pose
-from studies.campaign.figures import Figures, figures
 from studies.campaign.setup import TOPICS
+from studies.figures import figures
 from studies.fly import fly
 
 WRONG = 0.2  # of the nominal value
@@ -34,9 +35,9 @@ class Corner(NamedTuple):
 CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repeat=3)]
 
 
-def flown(setup: Setup) -> Figures:
+def flown(setup: Setup) -> dict[str, Any]:
     """Figures of a flight of which all that a campaign looks at is told at every tick."""
-    return figures(setup.seed, fly(setup, TOPICS))
+    return figures(fly(setup, TOPICS))
 
 
 def with_gains(setup: Setup, gains: GainSet) -> Setup:
@@ -53,10 +54,12 @@ def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
         update={
             "total": corner.mass * frame.mass.total,
             "inertia": tuple(float(i) for i in corner.inertia * np.array(frame.mass.inertia)),
+            "products": tuple(float(i) for i in corner.inertia * np.array(frame.mass.products)),
         }
     )
     frame = frame.model_copy(update={"mass": mass})
-    acting = tuple(_stronger(e, corner.thrust) for e in effects.from_scene(scene[Effects].tables, frame))
+    active = effects.from_scene(scene[Effects].tables, frame, environment(scene))
+    acting = tuple(_stronger(e, corner.thrust) for e in active)
     p = multirotor.parameters(frame, acting)
     plant = setup.services["plant"].parameters
     start = plant.start._replace(vehicle=at_rest(multirotor, p, start_pose(scene), gravity(scene)))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from services.autopilot.gains import GainSet
-from services.autopilot.law import Airframe, build
+from services.autopilot.law import Airframe, build, lift, moments
 from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.linearise import Hover
@@ -20,15 +20,11 @@ ATTEMPTS = 60
 
 def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
     """The airframe with the mass, inertia and lag that the linear model shows."""
-    arms = (
-        sum(abs(y) for y in airframe.rotor_y),
-        sum(abs(x) for x in airframe.rotor_x),
-        4.0 * airframe.torque_per_thrust,
-    )
-    x, y, z = (arm / k for arm, k in zip(arms, (model.roll, model.pitch, model.yaw), strict=True))
+    effects = model.roll, model.pitch, model.yaw
+    x, y, z = (moment / k for moment, k in zip(moments(airframe), effects, strict=True))
     return airframe._replace(
         spin_up_zero=model.spin_up_zero,
-        mass=4.0 / model.altitude,
+        mass=lift(airframe) / model.altitude,
         inertia_body=(x, y, z),
         motor=airframe.motor._replace(time_constant=model.lag),
     )

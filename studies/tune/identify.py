@@ -41,7 +41,7 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
 
     Args:
         flight: the flight; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
-        p: a controller of the vehicle, for the signs and the hovering thrust.
+        p: a controller of the vehicle, for the rotors' shares and the hovering thrust.
         guess: the linear model, for what the log cannot tell.
 
     Raises:
@@ -96,8 +96,8 @@ def _signals(flight: Flight, p: Parameters, tick: float) -> _Signals:
     armed = flight.actuators.armed
     n = min(len(thrust), len(rates), len(height))
     delay = 1 if flight.metadata.get("coupling", "sequential") == "sequential" else 2
-    signs = np.column_stack([np.ones(4), np.array(p.signs)])
-    demand = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ signs / 4.0])
+    demands = np.linalg.pinv(np.array(p.shares[0])).T  # what thrusts come to
+    demand = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ demands])
     smooth, differ = _filters(tick)
     response = np.column_stack([lfilter(*smooth, vertical[:n]), lfilter(*differ, rates[:n], axis=0)])
     flying = armed[:n] & (height[:n] > height[0] + CLEAR)

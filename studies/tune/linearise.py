@@ -10,6 +10,9 @@ from cosim.scene import Scene
 from dynamics import effects
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion, from_roll_pitch_yaw
 from dynamics.vehicles.multirotor import initial_state, observe, parameters
+from services.autopilot.known_airframe import known_airframe
+from services.autopilot.law import shares
+from services.common.environment import environment
 from services.common.vehicle import Effects, airframe
 
 HEIGHT = 50.0  # [m] clear of the ground and of its effect
@@ -40,18 +43,18 @@ def hover(scene: Scene) -> Hover:
     """
     frame = airframe(scene)
     still = {name: table for name, table in scene[Effects].tables.items() if not name.startswith("wind")}
-    p = parameters(frame, effects.from_scene(still, frame))
-    signs = np.sign(np.array([[y, -x, 0.0] for x, y, _ in frame.rotors.position]))
-    signs[:, 2] = frame.rotors.reaction_sign
+    p = parameters(frame, effects.from_scene(still, frame, environment(scene)))
+    lift, *turns = np.array(shares(known_airframe(scene))[0]).T  # shares of the rotors
+    count, evenly = len(lift), np.sqrt(lift)  # speeds in hover, over the speed of a rotor that carries the mean
 
-    def seen(speeds: np.ndarray, voltage: float | np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
+    def seen(speeds: np.ndarray, voltage: np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
         state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)
         motion = state.motion._replace(rotor_speed=tuple(float(v) for v in speeds))
-        volts = tuple(float(v) for v in np.broadcast_to(voltage, len(signs)))
+        volts = tuple(float(v) for v in voltage)
         return observe(p, 0, INTERVAL, state._replace(motion=motion), volts)
 
     def unbalance(x: np.ndarray) -> tuple[float, float]:
-        o = seen(np.full(len(signs), x[0]), x[1])
+        o = seen(x[0] * evenly, x[1] * evenly)
         return o.acceleration_world[2], o.rotor_acceleration[0]
 
     top = frame.motor.max_voltage
@@ -60,27 +63,28 @@ def hover(scene: Scene) -> Hover:
     if solved != 1 or not 0.0 < voltage < top:
         raise ValueError(f"{scene.path}: no hover found within {top:g} V; expected a vehicle that carries its weight")
 
-    rotors = np.full(len(signs), speed)
+    rotors, volts = speed * evenly, voltage * evenly
     d = STEP * speed
 
     def slope(direction: np.ndarray, value: Callable[[Any], float]) -> float:
-        return (value(seen(rotors + d * direction, voltage)) - value(seen(rotors - d * direction, voltage))) / (2.0 * d)
+        return (value(seen(rotors + d * direction, volts)) - value(seen(rotors - d * direction, volts))) / (2.0 * d)
 
-    one = np.ones(len(signs))
+    one = np.ones(count)
     thrust = slope(one, lambda o: o.thrust[0])
     ahead = [
-        seen(rotors, voltage, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
+        seen(rotors, volts, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
     ]
 
     def turning(k: int) -> float:
-        return slope(signs[:, k], lambda o: o.angular_acceleration_body[k]) / thrust
+        return slope(turns[k], lambda o: o.angular_acceleration_body[k]) / thrust
 
     roll, pitch, turn = map(turning, range(3))
     lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
     # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
-    more, less = (seen(rotors, voltage + sign * STEP * voltage * signs[:, 2]) for sign in (1.0, -1.0))
+    yawing, most = turns[2], int(np.argmax(np.abs(turns[2])))
+    more, less = (seen(rotors, volts + sign * STEP * voltage * yawing) for sign in (1.0, -1.0))
     per_acceleration = (more.angular_acceleration_body[2] - less.angular_acceleration_body[2]) / float(
-        signs[0, 2] * (more.rotor_acceleration[0] - less.rotor_acceleration[0])
+        (more.rotor_acceleration[most] - less.rotor_acceleration[most]) / yawing[most]
     )
     yaw = turn + per_acceleration / (lag * thrust)  # a speed perturbed at constant voltage falls back by 1 / lag
     return Hover(

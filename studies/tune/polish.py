@@ -1,7 +1,7 @@
 """Bandwidths polished on the non-linear closed loop: the least error of the scene's flight that keeps the margins."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -11,13 +11,14 @@ from services.autopilot.gains import GainSet
 from services.autopilot.law import Airframe, build
 from services.autopilot.margins import open_loops
 from services.table import reseed
-from studies.campaign.figures import Figures
 from studies.campaign.setup import campaign_setup
 from studies.tracking import AXES
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.corners import flown, with_gains
 from studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from studies.tune.linearise import Hover
+
+Figures = dict[str, Any]  # by name, of `studies.figures`
 
 CANDIDATES = 60  # at most
 FIRST_STEP = 0.1  # of the logarithm of every bandwidth
@@ -75,7 +76,7 @@ def polish(
         if lacking:
             return 10.0 + len(lacking)
         found = fly(gains)
-        if any(f.failed for f in found):
+        if any(f["verdict"] != "landed" for f in found):
             return 10.0
         ratio = float(np.mean([rmse(found, axis) / rmse(before, axis) for axis in judged]))
         seen[ratio] = bandwidths, gains, found
@@ -88,7 +89,9 @@ def polish(
     options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
     minimize(cost, at, method="Nelder-Mead", options=options)
     if not seen:
-        what = next((str(f.verdict) for f in before if f.failed), "none of those near it holds its margins and lands")
+        what = next(
+            (f["told"] for f in before if f["verdict"] != "landed"), "none of those near it holds its margins and lands"
+        )
         raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
     bandwidths, gains, after = seen[min(seen)]
     return Polished(gains, bandwidths, before, after, len(seen))
@@ -96,4 +99,4 @@ def polish(
 
 def rmse(flights: list[Figures], axis: str) -> float:
     """Root-mean-square error of an axis over several flights [m] or [rad]."""
-    return float(np.sqrt(np.mean([f.rmse[axis] ** 2 for f in flights])))
+    return float(np.sqrt(np.mean([f[f"rmse.{axis}"] ** 2 for f in flights])))

@@ -83,9 +83,11 @@ def _errors(found: Tuned) -> Rows:
 
 
 def _corners(found: Tuned) -> Rows:
-    rows = Rows("The flight with a vehicle that is not as the controller believes", "vehicle", "furthest off, m", "end")
+    rows = Rows(
+        "The flight with a vehicle that differs from the controller's model", "vehicle", "max. position error, m", "end"
+    )
     for corner, f in found.corners.items():
-        rows.add(str(corner), f"{f.worst:.3f}", f.verdict.kind)
+        rows.add(str(corner), f"{f['max_distance']:.3f}", f["verdict"])
     return rows
 
 

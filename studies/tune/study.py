@@ -8,13 +8,12 @@ from cosim.scene import Scene
 from services.autopilot.config import Autopilot
 from services.autopilot.control import Parameters
 from services.autopilot.gains import GainSet
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import Airframe, build
 from services.autopilot.margins import Margins, margins, open_loops
-from services.autopilot.resolve import known_airframe
 from services.common.exchange import Exchange
 from services.common.sections import follows_trajectory
 from services.common.vehicle import Vehicle
-from studies.campaign.figures import Figures
 from studies.campaign.setup import campaign_setup
 from studies.flight import Flight
 from studies.tune import corners, polish
@@ -45,7 +44,7 @@ class Tuned(NamedTuple):
     after: Judged
     gains: GainSet
     polished: polish.Polished | None  # None where nothing is flown along
-    corners: dict[corners.Corner, Figures]
+    corners: dict[corners.Corner, polish.Figures]
 
     @property
     def model(self) -> Hover:

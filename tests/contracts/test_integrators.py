@@ -3,7 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -20,6 +19,8 @@ from dynamics.lie.ts2 import Swing, tangent
 from dynamics.tree import embed, flatten, unflatten
 from dynamics.vector import Vec3, add, cross, divide, multiply, scale
 from dynamics.vehicles.rigid_body import RigidBody
+
+pytestmark = pytest.mark.long
 
 EPS = 2.2e-16
 
@@ -112,7 +113,7 @@ def exact():
 
 
 def problem(method):
-    return BODY if hasattr(method, "REQUIRES") else SPACES
+    return BODY if hasattr(method, "unfit") else SPACES
 
 
 def defect(x):
@@ -150,38 +151,41 @@ def test_order_and_manifold(name, exact):
         assert declared - 0.2 < order < declared + 0.7, f"{space}: measured {measured}"
 
 
-class CountingParameters(NamedTuple):
-    """A rate that counts how often it is asked."""
+class CountingNumberParameters(NamedTuple):
+    """x' = x, which counts how often it is asked."""
+
+    count: np.ndarray
+
+
+@kernel
+def counting_number_rate(p, t, x):
+    p.count[0] += 1
+    return x
+
+
+class CountingBodyParameters(NamedTuple):
+    """The twisted body, which counts how often it is asked."""
 
     inertia: Vec3
     count: np.ndarray
 
 
+@kernel
+def counting_body_rate(p, t, x):
+    p.count[0] += 1
+    return twisted_body_rate(p, t, x)
+
+
+RATES.update({CountingNumberParameters: counting_number_rate, CountingBodyParameters: counting_body_rate})
+
+
 @pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
 def test_evaluations_are_as_declared(name):
-    method, (body, start) = integrators.get(name), BODY
-    one_step, inside = method.step, RATES[type(body)]
-    x0 = start if hasattr(method, "REQUIRES") else (0.3,)
-
-    @numba.njit
-    def counting_body(p, t, x):
-        p.count[0] += 1
-        return inside(p, t, x)
-
-    @numba.njit
-    def counting_number(p, t, x):
-        p.count[0] += 1
-        return x
-
-    counting = counting_body if hasattr(method, "REQUIRES") else counting_number
-
-    @numba.njit
-    def once(p, x):
-        return one_step(counting, p, 0.0, x, 0.1)
-
-    p = CountingParameters(body.inertia, np.zeros(1, dtype=np.int64))
-    once(p, x0)
-    assert p.count[0] == method.EVALUATIONS
+    method, (body, start), count = integrators.get(name), BODY, np.zeros(1, dtype=np.int64)
+    on_body = hasattr(method, "unfit")
+    p = CountingBodyParameters(body.inertia, count) if on_body else CountingNumberParameters(count)
+    march(method.Method(), p, 0.0, start if on_body else (0.3,), 0.1, 1)
+    assert count[0] == method.EVALUATIONS
 
 
 def test_an_unknown_name_lists_the_choices():

@@ -11,6 +11,8 @@ from cosim.log import LogReader
 from services.common.sections import Published, Run
 from services.table import load
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
 

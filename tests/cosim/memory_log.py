@@ -36,6 +36,9 @@ class MemoryLog:
             self._pages.setdefault(name, []).append(page)
         self._decoded.clear()
 
+    def finish(self) -> None:
+        """Nothing is left; called as `cosim.recording.Recording.finish`."""
+
     @property
     def topics(self) -> dict[str, Topic]:
         """The topics that were spoken on, by name."""

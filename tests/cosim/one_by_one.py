@@ -94,7 +94,7 @@ def battery(given, time_ns, x):
     return BatteryState(
         header(time_ns, given.vehicle),
         voltage=x.voltage,
-        temperature=math.nan,
+        temperature=x.temperature - 273.15,
         current=-x.current,
         charge=x.charge * capacity,
         capacity=math.nan,

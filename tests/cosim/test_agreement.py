@@ -10,6 +10,8 @@ from services.processes import TIME_OWNER, create_all
 from services.table import load, resolve
 from tests.cosim.memory_log import MemoryLog, fly
 
+pytestmark = pytest.mark.long
+
 SENSORS = [
     "autopilot.estimator=sensors", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
     "sensors.barometer={}", "sensors.sonar={}",

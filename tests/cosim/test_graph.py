@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from cosim.errors import LockStepError
 from cosim.graph import NEVER
 from cosim.part import Part
-from cosim.schedule import KEPT, Input, LockStepError, Port
+from cosim.schedule import KEPT, Input, Port
 from cosim.wire import Wire
 from dynamics.cell import Cell
 from messages import Clock, Setpoint, header

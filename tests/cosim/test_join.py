@@ -3,12 +3,21 @@
 import subprocess
 import sys
 
-from cosim.launcher import loopback_endpoints
+from cosim.access import by_certificate
+from cosim.bus import ZenohBus
+from cosim.certificates import make, tls
+from cosim.keys import ALIVE_KEY, STEP_KEY
+from cosim.log import LogReader
+from cosim.participants import Participants
+from lapwing.runs.single import fly_single
+from services.security import says
+from services.table import load, resolve
+from tests.endpoints import loopback_endpoints
 
 SCENE = "scenes/gyrostat_blocked.toml"
 
 
-def participant(name, peers, tmp_path, *more):
+def participant(name, peers, tmp_path, *more, insecure=True):
     table = ",".join(f"{key}={endpoint}" for key, endpoint in peers.items())
     command = [
         sys.executable,
@@ -22,6 +31,7 @@ def participant(name, peers, tmp_path, *more):
         "--key-prefix",
         "test-join",
         *more,
+        *(["--insecure"] if insecure and "--keys" not in more else []),
     ]
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
@@ -41,12 +51,58 @@ def test_a_participant_with_another_set_up_is_refused_and_the_first_difference_n
         assert len(said.splitlines()) == 1
 
 
-def test_the_same_set_up_flies(tmp_path):
-    peers = loopback_endpoints(["plant", "recorder"])
-    log = tmp_path / "log.mcap"
-    plant = participant("plant", peers, tmp_path, "--set", "run.duration=50.0")
-    recorder = participant("recorder", peers, tmp_path, "--set", "run.duration=50.0", "--log", str(log))
+def test_the_same_set_up_flies_over_certified_links_to_the_same_digest(tmp_path):
+    keys, log, alone = tmp_path / "keys", tmp_path / "log.mcap", tmp_path / "alone.mcap"
+    make(keys, ["plant", "recorder"], 1)
+    peers = {name: end.replace("tcp/", "tls/") for name, end in loopback_endpoints(["plant", "recorder"]).items()}
+    more = ("--set", "run.duration=50.0", "--keys", str(keys))
+    plant = participant("plant", peers, tmp_path, *more)
+    recorder = participant("recorder", peers, tmp_path, *more, "--log", str(log))
     for process in (plant, recorder):
         _, said = process.communicate(timeout=120)
         assert process.returncode == 0, said
-    assert log.stat().st_size > 1000
+    fly_single(resolve(load(SCENE, ["run.duration=50.0"])), alone)
+    with LogReader(log) as read, LogReader(alone) as expected:
+        assert read.digest() == expected.digest()
+
+
+def test_who_has_no_certificate_starts_only_where_that_is_asked_for(tmp_path):
+    peers = loopback_endpoints(["plant", "recorder"])
+    plant = participant("plant", peers, tmp_path, insecure=False)
+    _, said = plant.communicate(timeout=60)
+    assert plant.returncode == 2
+    assert "anybody could join there: expected tls/HOST:PORT with --keys FOLDER, or --insecure" in said
+
+
+def test_a_participant_speaks_for_itself_alone(tmp_path):
+    """Also where it knows the marks of the others: access control refuses it on both ends of a link."""
+    keys, run = tmp_path / "keys", Participants("test-access")
+    make(keys, ["plant", "sensors"], 1)
+    setup = resolve(load("delivery_mission"))
+    rules = by_certificate("test-access", says(setup, "test-access"))
+    (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["plant"]).values())
+    with (
+        ZenohBus([end], mark=run.mark("plant"), security={**tls(keys, "plant"), **rules}) as plant,
+        ZenohBus(connect=[end], mark=run.mark("sensors"), security={**tls(keys, "sensors"), **rules}) as sensors,
+    ):
+        pairs = (("plant", plant, "sensors"), ("sensors", sensors, "plant"))
+        heard = {name: bus.receive(run.senders(STEP_KEY, [other, "autopilot"])) for name, bus, other in pairs}
+        for name, bus, _ in pairs:
+            bus.declare_alive(f"test-access/{ALIVE_KEY}/{name}")
+        for _, bus, other in pairs:
+            assert not bus.wait_alive([f"test-access/{ALIVE_KEY}/{other}"], 10.0)
+        for name, bus, _ in pairs:
+            own, bus._mark = bus._mark, run.mark("autopilot")
+            bus.publisher(f"test-access/{STEP_KEY}/autopilot")(b"forged", 0)
+            bus._mark = own
+            bus.publisher(f"test-access/{STEP_KEY}/{name}")(b"own", 0)
+        for name, bus, other in pairs:
+            messages = []
+            while (message := heard[name].get_with_key(timeout=1.0)) is not None:
+                messages.append(message)
+            # what a session publishes itself comes back to it unfiltered
+            assert sorted(messages) == [
+                (f"test-access/{STEP_KEY}/autopilot", 0, b"forged"),
+                (f"test-access/{STEP_KEY}/{other}", 0, b"own"),
+            ]
+            assert bus.refused == 0

@@ -126,7 +126,7 @@ def test_opens_in_mcaps_own_reader_with_matching_summary(path):
         assert statistics.channel_count == statistics.schema_count == 3
         assert sum(statistics.channel_message_counts.values()) == len(entries)
         assert statistics.chunk_count == len(summary.chunk_indexes) > 10
-        assert {record.name: record.metadata for record in reader.iter_metadata()}["lapwing"]["digest"] == digest
+        assert {record.name: record.metadata for record in reader.iter_metadata()}["lapwing_end"]["digest"] == digest
         raw = [(c.topic, s.name, m.log_time, m.data) for s, c, m in reader.iter_messages()]
         assert raw == expected(entries)
         assert all(m.publish_time == m.log_time for _, _, m in reader.iter_messages())

@@ -230,7 +230,7 @@ def test_history_of_a_topic(tmp_path):
 def test_history_reads_only_the_chunks_of_its_topic(tmp_path):
     path = tmp_path / "log"
     with LogWriter(path, {}, {}) as log:
-        log.write_page([("/a", Vector3, np.zeros(1, int), Record.of(Vector3()).encode(1, {}), np.zeros(1, int))])
+        log.write_page([("/a", Vector3, np.zeros(50, int), Record.of(Vector3()).encode(50, {}), np.zeros(50, int))])
         log.write_page(page(0))
     data = bytearray(path.read_bytes())
     at = data.index(b"\x28\xb5\x2f\xfd")  # of the first compressed chunk

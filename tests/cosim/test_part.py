@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from cosim.errors import LockStepError
 from cosim.part import Part
-from cosim.schedule import KEPT, Input, LockStepError, Port
+from cosim.schedule import KEPT, Input, Port
 from dynamics.cell import Cell, read
 from tests.cosim.parts.echo import Echo, Heard
 from tests.cosim.parts.readings import LIKE, Readings, expected

@@ -1,18 +1,27 @@
 """Replay: timing is pure; what is published and recorded again has the log's digest."""
 
+import os
+import pty
+import random
+import select
 import subprocess
 import sys
+import termios
 import time
 
+import numpy as np
 import pytest
 
 from cosim.bus import ZenohBus
-from cosim.launcher import loopback_endpoints
 from cosim.log import LogReader, LogWriter
+from lapwing.cli.keyboard import Keyboard
 from messages import Clock, stamp
 from messages.digest import Digest
 from messages.topics import CLOCK
+from services.replay import player
+from services.replay.pace import Pace
 from services.replay.schedule import Cut, schedule
+from tests.endpoints import loopback_endpoints
 
 TICK = 4_000_000
 
@@ -98,6 +107,7 @@ def test_a_signal_ends_a_loop_at_once(log):
         (["LOG", "--from", "-1"], "--from -1"),
         (["LOG", "--from", "2", "--to", "1"], "--to 1"),
         (["LOG", "--from", "99", "--speed", "max"], "no message"),
+        (["LOG", "--topics", "/imu"], "the log has no topic /imu; it has /clock, /other"),
         (["LOG", "--speed", "0"], "--speed 0"),
         (["LOG", "--record", "/proc/none/x.mcap"], "/proc/none/x.mcap"),
         (["LOG", "--record", "LOG"], "the log that is replayed"),
@@ -119,3 +129,98 @@ def test_what_cannot_be_replayed_is_said_in_one_line(log, arguments, said):
     assert result.stderr.startswith("lapwing: ")
     assert result.stderr.count("\n") == 1
     assert said in result.stderr
+
+
+def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkeypatch):
+    monkeypatch.setattr(player, "AUDIENCE", 0.0)
+    path, rng = tmp_path / "0.mcap", random.Random(1)
+    with LogWriter(path, {}, {}) as writer:
+        for tick in range(60):
+            for topic in rng.choices("dbac", k=6):  # also one topic several times at an instant
+                writer.write(f"/{topic}", Clock, Clock(stamp(rng.randrange(1000))).encode(), tick * TICK)
+            if tick % 7 == 0:
+                writer.flush()
+    with LogReader(path) as log:
+        first = list(log.messages())
+    assert [m[2] for m in first] == sorted(m[2] for m in first)
+    for k in (1, 2, 3):
+        (endpoint,) = loopback_endpoints(["a"]).values()
+        again = tmp_path / f"{k}.mcap"
+        player.play(path, f"test-generations{k}", endpoint, Cut(0, None), None, False, again, lambda: False)
+        path = again
+        with LogReader(path) as log:
+            assert list(log.messages()) == first
+
+
+def test_only_the_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
+    monkeypatch.setattr(player, "AUDIENCE", 0.0)
+    (endpoint,) = loopback_endpoints(["a"]).values()
+    heard, record = [], tmp_path / "a.mcap"
+    say = lambda topic, time_ns, payload: heard.append((topic, time_ns))  # noqa: E731
+    count = player.play(
+        log, "test-topics", endpoint, Cut(0, None), None, False, record, lambda: False, say, topics=["/other"]
+    )
+    assert (count, heard) == (1, [("/other", 200 * TICK)])
+    with LogReader(record) as read:
+        assert list(read.topics()) == ["/other"]
+
+
+class Terminal:
+    """A clock that runs while it is waited, and keys that are typed at certain times."""
+
+    def __init__(self, typed):
+        self.now, self.typed, self.said = 0.0, dict(typed), []
+
+    def keys(self):
+        due = [at for at in self.typed if at <= self.now]
+        return "".join(self.typed.pop(at) for at in sorted(due))
+
+    def wait(self, seconds):
+        self.now += seconds
+
+    def went(self, messages):
+        """When each of the messages (due [s], time [ns]) went."""
+        pace, found = Pace(self.keys, self.said.append, self.wait, lambda: self.now), []
+        for due, time_ns in messages:
+            pace.wait(due, time_ns, lambda: self.now > 100.0)
+            if pace.quit or self.now > 100.0:
+                break
+            found.append(self.now)
+        return found
+
+
+def test_a_pause_holds_and_the_rest_follows_at_its_distance():
+    terminal = Terminal({1.5: " ", 6.0: " "})
+    went = terminal.went([(float(k), k) for k in range(5)])
+    assert went[:2] == pytest.approx([0.0, 1.0], abs=0.03)
+    assert went[2] == pytest.approx(6.0, abs=0.03)
+    assert np.diff(went[2:]) == pytest.approx([1.0, 1.0], abs=0.03)
+    assert [line.split()[0] for line in terminal.said] == ["paused", "goes"]
+
+
+def test_a_step_lets_all_messages_of_one_instant_go():
+    terminal = Terminal({0.5: " ", 10.0: ".", 20.0: ".", 30.0: "q"})
+    went = terminal.went([(0.0, 0), (1.0, 7), (1.0, 7), (2.0, 9), (3.0, 11)])
+    assert went == pytest.approx([0.0, 10.0, 10.0, 20.0], abs=0.05)
+    assert terminal.now == pytest.approx(30.0, abs=0.05)
+
+
+def test_a_full_stop_without_a_pause_does_nothing():
+    assert Terminal({0.5: "."}).went([(0.0, 0), (1.0, 1)]) == pytest.approx([0.0, 1.0], abs=0.03)
+
+
+def test_keys_come_from_a_terminal_one_by_one_and_it_is_as_before_afterwards():
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    with Keyboard(theirs) as keyboard:
+        assert keyboard.keys() == ""
+        os.write(ours, b" .")
+        assert select.select([theirs], [], [], 10.0)[0]
+        assert keyboard.keys() == " ."
+    assert termios.tcgetattr(theirs) == before
+    reading, writing = os.pipe()
+    os.write(writing, b"q")
+    with Keyboard(reading) as keyboard:  # no terminal: what comes there is somebody else's
+        assert keyboard.keys() == ""
+    for descriptor in (ours, theirs, reading, writing):
+        os.close(descriptor)

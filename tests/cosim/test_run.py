@@ -11,11 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from cosim.launcher import PARTICIPANT
+from cosim.bus import ZenohBus
+from cosim.child import PARTICIPANT
 from cosim.log import LogReader
+from cosim.log.recover import recover
 from lapwing.runs.single import fly_single
 from messages import BodyStates, VehicleState
 from services.table import load, resolve
+from tests.endpoints import loopback_endpoints
+
+pytestmark = pytest.mark.long
 
 SCENE = Path("scenes/hover.toml")
 SHORT = ["run.duration=2"]
@@ -51,10 +56,10 @@ def processes(tmp_path, key_prefix, *overrides):
 class Running:
     """A run in processes at real-time speed that has begun to fly; `children`: process ids by service."""
 
-    def __init__(self, tmp_path, key_prefix):
+    def __init__(self, tmp_path, key_prefix, *more):
         self.log = tmp_path / f"{key_prefix}.mcap"
         self.launcher = subprocess.Popen(
-            arguments(tmp_path, key_prefix, "--speed", "1"),
+            arguments(tmp_path, key_prefix, "--speed", "1", *more),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -68,7 +73,7 @@ class Running:
         commands = {int(child): Path(f"/proc/{child}/cmdline").read_text().split("\0") for child in found}
         participants = {child: c for child, c in commands.items() if PARTICIPANT in c}
         self.children = {c[c.index(PARTICIPANT) + 1]: child for child, c in participants.items()}
-        assert set(self.children) == SERVICES
+        assert set(self.children) >= SERVICES
 
     def _recorded(self):
         """How many messages the log holds; it is read while it grows."""
@@ -119,8 +124,8 @@ def started(tmp_path):
         pytest.skip("finds processes in /proc")
     runs = []
 
-    def start(key_prefix):
-        runs.append(Running(tmp_path, key_prefix))
+    def start(key_prefix, *more):
+        runs.append(Running(tmp_path, key_prefix, *more))
         return runs[-1]
 
     yield start
@@ -145,7 +150,7 @@ def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_p
         f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, becomes="{fate}"}}'
         for k, fate in enumerate(("locked", "free", "torn_off"))
     )
-    bodies = ["vehicle.model=multibody", f"multibody.event=[{broken}]", "run.failed=[]"]  # it does crash
+    bodies = ["vehicle.model=multibody", f"multibody.event=[{broken}]", "success.require=[]"]  # it does crash
     alone = single(tmp_path, *bodies)
     assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
     with LogReader(tmp_path / "test-broken.mcap") as log:
@@ -184,22 +189,9 @@ def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
     assert parallel != single(tmp_path)
 
 
-def assert_space_is_taken(run, tmp_path):
-    """A second run on the key prefix of one that flies is refused, and the first flies on."""
-    key_prefix, other = run.log.stem, tmp_path / "other.mcap"
-    command = arguments(tmp_path, key_prefix, "--log", str(other))
-    second = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
-    assert second.returncode == 2
-    assert second.stderr.startswith(f"lapwing: --key-prefix {key_prefix}: another run uses this key prefix")
-    assert not other.exists()
-    assert run.launcher.poll() is None
-
-
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_all_processes_and_completes_the_log(started, tmp_path, number, code):
+def test_a_signal_ends_all_processes_and_completes_the_log(started, number, code):
     run = started(f"test-{number.name}")
-    if number == signal.SIGINT:
-        assert_space_is_taken(run, tmp_path)
     asked = time.monotonic()
     run.launcher.send_signal(number)
     assert run.end() == (code, f"lapwing: ended by {number.name}\n")
@@ -218,12 +210,34 @@ def test_a_service_that_dies_is_named_and_ends_the_run(started, victim):
     assert run.whole() == (victim != "recorder")
 
 
+def test_a_killed_recorder_loses_half_a_second_at_most(started):
+    """What a listener had heard of when the recorder was killed is in the recovered log; the best of three, for a
+    machine that is busy elsewhere."""
+    lost = []
+    while len(lost) < 3 and min(lost, default=1.0) > 0.5:
+        (door,) = loopback_endpoints(["door"]).values()
+        prefix = f"test-recover{len(lost)}"
+        run = started(prefix, "--open", door, "--insecure")
+        with ZenohBus(connect=[door], mode="client") as bus:
+            clock = bus.subscribe(f"{prefix}/clock")
+            heard = clock.get(STARTED)[0]
+            while newer := clock.get(0.0 if heard > 3_000_000_000 else STARTED):
+                heard = newer[0]
+            os.kill(run.children["recorder"], signal.SIGKILL)
+        assert run.end()[0] == 1
+        found = recover(run.log, run.log.with_suffix(".recovered.mcap"))
+        lost.append((heard - found.end_ns) * 1e-9)
+        with LogReader(run.log.with_suffix(".recovered.mcap")) as log:
+            assert log.complete
+    assert min(lost) <= 0.5
+
+
 def test_a_service_that_freezes_is_named_and_ends_the_run(started):
     run = started("test-frozen")
     os.kill(run.children["autopilot"], signal.SIGSTOP)
     code, said = run.end()
     assert code == 1
-    assert said.startswith("lapwing: autopilot: no answer since ")
+    assert said.startswith("lapwing: autopilot: stopped for ")
     assert said.count("\n") == 1
     assert run.whole()
 
@@ -238,7 +252,7 @@ def test_services_end_by_themselves_when_the_launcher_is_killed(started):
 def test_a_service_that_cannot_start_for_a_reason_that_the_user_can_mend(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-        command = arguments(tmp_path, "test-door", "--open", door)
+        command = arguments(tmp_path, "test-door", "--open", door, "--insecure")
         result = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
     assert result.returncode == 2
     assert result.stderr.startswith("lapwing: router: cannot listen on tcp/127.0.0.1:")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cosim.scene import Scene, SceneError
+from cosim.scene.files import parse_toml
 from cosim.serialise import from_json, to_json
 from services.autopilot.gains import GainSet
 from services.common.exchange import Exchange
@@ -165,6 +166,7 @@ def test_nothing_is_read_after_loading(write, tmp_path, monkeypatch):
     )
     scene = load(path, ["airframe.mass.total=9.5"])
     shutil.rmtree(tmp_path)
+    assert pickle.loads(pickle.dumps(scene)).resolved == scene.resolved
     again = pickle.loads(pickle.dumps(from_resolved(scene.resolved, scene.name)))
     assert again == scene
     for one in (scene, again):
@@ -273,7 +275,7 @@ def test_choices_are_listed():
     assert "unloading" in said(HOVER, "vehicle.model=none")
     assert "minimum_jerk" in said(HOVER, "trajectory.phase.0.z.kind=none")
     assert "autopilot" in said(HOVER, "nothing.here=1")
-    assert "expected one of duration, name, x, y, yaw, z" in said(HOVER, "trajectory.phase.0.q=1")
+    assert "expected one of duration, name, release, x, y, yaw, z" in said(HOVER, "trajectory.phase.0.q=1")
     assert "MPC_XY_CRUISE" in said(HOVER, "autopilot.parameters.MPC_XY_CRUSE=1")
 
 
@@ -390,3 +392,16 @@ def test_each_table_is_declared_once():
     assert {"run", "exchange", "vehicle", "solver", "sensors", "autopilot", "trajectory", "airframe", "gains"} <= set(
         vocabulary().sections
     )
+
+
+def test_what_is_found_in_a_scene_is_found_once():
+    scene, calls = load("hover"), []
+    assert [scene.once(calls.append), scene.once(calls.append)] == [None, None]
+    assert calls == [scene]
+
+
+def test_a_text_that_is_read_again_gives_tables_of_its_own(tmp_path):
+    path = tmp_path / "a.toml"
+    first = parse_toml("x = { y = [1] }", path)
+    first["x"]["y"].append(2)
+    assert parse_toml("x = { y = [1] }", path) == {"x": {"y": [1]}}

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.schedule import KEPT, Input, LockStepError, due, execution_order
+from cosim.errors import LockStepError
+from cosim.schedule import KEPT, Input, due, execution_order
 from services.table import load, resolve
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))

@@ -104,9 +104,10 @@ def test_a_class_is_named_and_found_again():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('{"$":"none.such:Thing"}', "none.such:Thing: no such class"),
+        ('{"$":"none.such:Thing"}', "none.such:Thing: no such class; expected one of cosim, "),
         ('{"$":"dynamics.effects.gravity:Weight"}', "Weight: no such class"),
         ('{"$":"pathlib:Path"}', "pathlib:Path: expected a NamedTuple"),
+        ('{"$":"this:Thing"}', "this:Thing: no such class; expected one of cosim, "),
         ('{"$":"dynamics.effects.gravity:Gravity","g":1}', "has the fields acceleration, got g"),
         ('{"$":"tuple"}', "damaged 'tuple'"),
         ("{", "Expecting"),
@@ -148,3 +149,14 @@ def test_it_is_imported_without_what_is_slow():
     code = "import cosim.serialise, sys; print([m for m in ('pydantic', 'scipy', 'numba') if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def test_nothing_is_imported_for_a_text_but_what_is_declared(tmp_path, monkeypatch):
+    (tmp_path / "somebodys.py").write_text("from typing import NamedTuple\nclass Thing(NamedTuple):\n    x: float\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    text = '{"$":"somebodys:Thing","x":0.5}'
+    with pytest.raises(ValueError, match="somebodys:Thing: no such class"):
+        from_json(text)
+    assert "somebodys" not in sys.modules
+    assert from_json(text, ["somebodys"]) == (0.5,)
+    sys.modules.pop("somebodys")

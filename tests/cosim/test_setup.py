@@ -2,7 +2,8 @@
 
 import pytest
 
-from cosim.schedule import Input, LockStepError, Port
+from cosim.errors import LockStepError
+from cosim.schedule import Input, Port
 from cosim.serialise import digest, first_difference, from_json, to_json
 from cosim.setup import ServiceSetup
 from services.table import load, resolve

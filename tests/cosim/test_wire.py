@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from cosim.fleet import members
 from cosim.schedule import Port
 from cosim.wire import Wire, due_ticks, encode
 from dynamics.rows import from_row, to_row
 from messages import Setpoint, header
 from messages.records import stamp_columns
-from messages.topics import SETPOINT, TOPICS, WALL_TIME
+from messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, of_all
 from services.autopilot.commander.request import Status as Words
 from services.processes import create_all
 from services.table import load, resolve
@@ -79,7 +80,11 @@ def fitting(value, texts, random):
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_every_topic_of_a_scene_is_its_values_one_by_one(path):
-    setup, random = resolve(load(path)), np.random.default_rng(5)
+    for setup in members(resolve(load(path))):
+        check_every_topic(setup, np.random.default_rng(5))
+
+
+def check_every_topic(setup, random):
     services = create_all(setup)
     given = known(setup, services)
     for wire in (wire for service in services for wire in service.wires):
@@ -98,9 +103,11 @@ def test_every_topic_of_a_scene_is_its_values_one_by_one(path):
             assert found[tick] == expected.encode(), wire.topic.name
 
 
-def test_the_scenes_that_ship_speak_on_every_topic():
-    spoken = {topic for path in SCENES for service in create_all(resolve(load(path))) for topic in service.topics}
-    assert spoken == set(TOPICS) - {WALL_TIME}
+def test_the_scenes_that_ship_and_all_sensors_speak_on_every_topic():
+    more = [f"sensors.{name}.rate=50.0" for name in ("airspeed", "rangefinder", "optical_flow")]  # which none carries
+    scenes = [*map(load, SCENES), load("delivery_mission", more)]
+    spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
+    assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}
 
 
 class Named(NamedTuple):

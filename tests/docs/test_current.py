@@ -28,7 +28,7 @@ def test_the_api_reference_says_all_that_can_be_imported_with_its_units_and_erro
         assert f"### lapwing.{name}\n" in page or f"### {name}\n" in page, name
     said = (
         "- `controller`: ",
-        "| `volts` | `tuple[float, float, float, float]` | V |",
+        "| `volts` | `tuple[float, ...]` | V |",
         "shape (n, 6)",
         "- `SceneError`: ",
     )

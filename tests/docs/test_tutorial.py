@@ -8,6 +8,8 @@ import pytest
 
 import lapwing
 
+pytestmark = pytest.mark.long
+
 PAGE = (Path(__file__).parents[2] / "docs/tutorial.md").read_text()
 BLOCKS = re.findall(r'```python(?: title="(.*?)")?\n(.*?)```', PAGE, re.DOTALL)
 

@@ -2,7 +2,7 @@
 
 from numba.core import types
 
-from dynamics.generate import define, each, each_index, generated
+from dynamics.generate import any_of, define, each, each_index, generated
 from dynamics.kernel import kernel, leaf
 
 
@@ -36,3 +36,19 @@ def test_compiled_and_uncompiled_are_the_same():
     x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
     assert (first.__name__, first.__doc__) == ("first", "The first number.")
+
+
+@kernel
+def any_above(x, y):
+    return any_of(each(above, 0.0, x, y))
+
+
+@leaf
+def above(_, x, y):
+    return x > y
+
+
+def test_any_of_a_tuple():
+    for y, found in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
+        assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == found
+    assert not any_of(())

@@ -33,11 +33,8 @@ def test_directions():
     assert geodesy.enu_to_geodetic(home, (0.0, 0.0, 7.0))[2] == pytest.approx(home.height + 7.0, abs=1e-6)
 
 
-def test_pressure_against_the_standard_atmosphere():
-    """ISO 2533 at 1000 m: 89 874.6 Pa. The paper's law divides by 273 + T where the standard has 288.15 K."""
-    assert geodesy.air_pressure(0.0, 15.0) == 101325.0
-    assert geodesy.air_pressure(1000.0, 15.15) == pytest.approx(89874.6, rel=2e-5)
-    for altitude in (-100.0, 0.0, 10.0, 3000.0):
-        assert geodesy.pressure_altitude(geodesy.air_pressure(altitude, 20.0), 20.0) == pytest.approx(
-            altitude, abs=1e-8
-        )
+def test_normal_gravity_at_equator_and_poles():
+    """NIMA TR8350.2, table 3.4."""
+    assert geodesy.normal_gravity(0.0) == 9.7803253359
+    assert geodesy.normal_gravity(90.0) == pytest.approx(9.8321849378, abs=2e-10)
+    assert geodesy.normal_gravity(-90.0) == geodesy.normal_gravity(90.0)

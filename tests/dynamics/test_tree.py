@@ -84,3 +84,9 @@ def test_compiled_and_uncompiled_give_the_same_bits():
 def test_a_state_of_something_else_is_refused():
     with pytest.raises(numba.TypingError, match="floats, tuples and manifold leaves"):
         tree.retract((1.0, "text"), (1.0, 1.0))
+
+
+def test_apart_is_the_largest_difference_relative_to_size():
+    y = X._replace(rotors=(X.rotors[0] + 0.3, X.rotors[1]), one=(X.one[0] - 0.01,))
+    assert tree.apart(X, y) == pytest.approx(0.3 / (1.0 + X.rotors[0]))
+    assert tree.apart(X, X) == tree.apart((), ()) == 0.0

@@ -5,6 +5,8 @@ import pytest
 from services.table import load
 from studies.fly import fly
 
+pytestmark = pytest.mark.long
+
 SHORT = {
     "trajectory.phase.1.z.to": 2.0,
     "trajectory.phase.2.duration": 1.0,

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from cosim.setup import Setup
 from services.common import plan
+from services.common.environment import environment
 from services.common.vehicle import start_height
 from services.table import load, resolve
 
@@ -21,7 +22,7 @@ class Case(NamedTuple):
     def resolve(self) -> Setup:
         """The set-up of the flight."""
         scene = load(self.scene, list(self.overrides))
-        commands = tuple(plan.read(self.plan, start_height(scene))) if self.plan else ()
+        commands = tuple(plan.read(self.plan, start_height(scene), environment(scene).home)) if self.plan else ()
         return resolve(scene, commands)
 
 

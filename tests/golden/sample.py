@@ -6,10 +6,11 @@ import math
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cosim.log import LogReader, LogWriter
 from messages import message_class
+from messages.difference import first_difference as first_field
 from tests.cosim.memory_log import MemoryLog
 
 FINGERPRINTS, KEPT = 200, 12  # of a topic, about
@@ -124,21 +125,8 @@ def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -
         if now is None:
             yield time_ns, where + "there is no such message any more"
             return
-        decode = message_class(kind).decode
-        for (field, a), (_, b) in zip(leaves(decode(was)), leaves(decode(now)), strict=False):
-            if repr(a) != repr(b):
-                by = f", by {b - a:.3g}" if isinstance(a, int | float) and isinstance(b, int | float) else ""
-                yield time_ns, where + f"{field} was {a!r}, is {b!r}{by}"
-                return
-        yield time_ns, where + f"{len(was)} bytes, now {len(now)}, with the same values as far as both go"
+        found = first_field(message_class(kind), was, now)
+        assert found
+        by = f", by {found.by:.3g}" if found.by is not None else ""
+        yield time_ns, where + f"{found.field or 'length'} was {found.one!r}, is {found.other!r}{by}"
         return
-
-
-def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """(dotted name, value) of everything in a message."""
-    if not isinstance(value, tuple):
-        yield path, value
-        return
-    names = getattr(value, "_fields", range(len(value)))
-    for name, part in zip(names, value, strict=True):
-        yield from leaves(part, f"{path}.{name}" if path else str(name))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cli import main as cli
+from lapwing.cli import start as cli
 
 ROOT = Path.cwd()
 

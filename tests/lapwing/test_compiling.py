@@ -9,7 +9,8 @@ from rich.console import Console
 
 from dynamics.kernel import kernel
 from lapwing.cli.progress import Display
-from lapwing.runs import compiling
+from lapwing.runs import ahead, compiling
+from lapwing.runs.ahead import compile_ahead
 from lapwing.runs.compiling import EACH, FILE, told
 from services.table import load, resolve
 
@@ -36,6 +37,16 @@ def compile_something():
 
     assert times(1.0) == new
     assert times(2) == 2.0 * new
+
+
+class Compiling:
+    """Stands for a graph: compiles when it is made, and has a tick to run."""
+
+    def __init__(self, *_):
+        compile_something()
+
+    def advance(self, _):
+        pass
 
 
 def test_it_is_said_once_and_only_where_something_compiles(setup, folder):
@@ -80,3 +91,14 @@ def test_a_terminal_has_a_bar_and_anything_else_a_line():
             said = console.file.getvalue()
             display.begin()
         assert expected in said
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monkeypatch, terminal):
+    monkeypatch.setattr(ahead, "Graph", Compiling)
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
+    compile_ahead({"one": setup, "two": setup}, console)
+    said = console.file.getvalue()
+    assert said.count("ready after") == 2
+    assert ("of about 72 s  " in said) == terminal
+    assert ("one: compiling kernels, about 36 s" in said) == (not terminal)

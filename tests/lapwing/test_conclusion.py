@@ -34,16 +34,18 @@ def test_a_landing_is_told_with_speed_place_events_and_degrees(lapwing):
 
 def test_a_crash_is_no_landing_and_ends_with_its_own_exit_code(lapwing):
     code, out, err = lapwing(*HOVER, *sets(FALL))
-    assert (code, err) == (4, "lapwing: the flight has failed: crashed\n")
+    assert (code, err) == (4, "lapwing: the flight has failed: crashed; success.require: verdict != 'crashed'\n")
     assert "hit the ground at 4.4 m/s" in out
     told = json.loads(Path("a.json").read_text())
     assert (told["verdict"]["kind"], told["landed"]) == ("crashed", False)
     assert "Crashed at " in Path("a.html").read_text()
 
 
-@pytest.mark.parametrize(("failed", "code"), [('["timed out"]', 4), ('["crashed"]', 0)])
-def test_the_scene_says_what_is_a_failure(lapwing, failed, code):
-    found, out, _ = lapwing(*HOVER, *sets("run.duration=2.0", f"run.failed={failed}"))
+@pytest.mark.parametrize(
+    ("require", "code"), [("verdict == 'landed'", 4), ("rmse.z < 0.1 and abs(time - 2) < 1e-6", 0), ("energy < 9", 4)]
+)
+def test_the_scene_says_what_is_a_success(lapwing, require, code):
+    found, out, _ = lapwing(*HOVER, *sets("run.duration=2.0", f'success.require=["{require}"]'))
     assert found == code
     assert "Timed out at 2.00 s: the mission was not over, in mission (climb)" in out
 
@@ -54,7 +56,7 @@ def test_a_divergence_has_its_verdict_in_both_modes(lapwing, mode):
         *("run", "gyrostat_feedback", "--mode", mode, "--key-prefix", "test-diverge", "--log", "a.mcap"),
         *sets(*RUN_AWAY),
     )
-    assert (code, err) == (4, "lapwing: the flight has failed: diverged\n")
+    assert (code, err) == (4, "lapwing: the flight has failed: diverged; success.require: verdict != 'diverged'\n")
     assert "Diverged at 0.00 s: gyrostat: not finite at t = 1 s" in out
     assert Flight.read("a.mcap").verdict.kind == "diverged"
 

@@ -5,7 +5,7 @@ import struct
 from typing import Any
 
 from messages import TYPES
-from messages.types import _definitions
+from messages.types import DEFINITIONS
 
 RANGES = {
     "byte": (0, 255), "char": (0, 255), "int8": (-128, 127), "uint8": (0, 255), "int16": (-(2**15), 2**15 - 1),
@@ -16,7 +16,7 @@ RANGES = {
 
 def sample(type_name: str, rng: random.Random) -> Any:
     """A random message of a type."""
-    return TYPES[type_name](*(_field(field, rng) for field in _definitions[type_name].fields))
+    return TYPES[type_name](*(_field(field, rng) for field in DEFINITIONS[type_name].fields))
 
 
 def _field(field, rng):
@@ -41,7 +41,7 @@ def _element(base, rng):
 
 def varied(message: Any, rng: random.Random) -> Any:
     """The same message with other numbers: strings and lengths of sequences stay."""
-    fields = _definitions[message.type_name].fields
+    fields = DEFINITIONS[message.type_name].fields
     return type(message)(*(_varied(field.base, getattr(message, field.name), rng) for field in fields))
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from messages.attachment import Attachment, pack, unpack
+from messages.attachment import Attachment, pack, time_and_gid, unpack
 
 GID = bytes(range(16))
 
@@ -12,6 +12,7 @@ def test_layout_byte_by_byte():
 
 def test_round_trip():
     assert unpack(pack(7, 123456789012, GID)) == Attachment(7, 123456789012, GID)
+    assert time_and_gid(pack(7, -5, GID)) == (-5, GID)
 
 
 def test_faults_are_named():
@@ -21,3 +22,6 @@ def test_faults_are_named():
         unpack(pack(0, 0, GID)[:-1])
     with pytest.raises(ValueError, match="length 17, expected 16"):
         unpack(bytes(16) + b"\x11" + GID)
+    for damaged in (b"", pack(0, 0, GID)[:-1], pack(0, 0, GID) + b"\0", bytes(16) + b"\x11" + GID):
+        with pytest.raises(ValueError, match="no attachment"):
+            time_and_gid(damaged)

@@ -1,5 +1,5 @@
 from messages import topics
-from messages.topics import CLOCK, GPS, TOPICS, WALL_TIME
+from messages.topics import CLOCK, EVENTS, GPS, TOPICS, WALL_TIME
 
 EXPECTED = {
     "/clock", "/tf", "/wall_time",
@@ -22,7 +22,7 @@ def test_keys():
     assert CLOCK.zenoh_key("drone1", "lapwing") == "lapwing/clock"
 
 
-def test_every_topic_holds_a_message_class_and_only_wall_time_is_not_reproducible():
+def test_every_topic_holds_a_message_class_and_what_stays_out_of_the_digest():
     assert all(topic.message().encode() for topic in TOPICS)
-    assert [topic for topic in TOPICS if not topic.deterministic] == [WALL_TIME]
+    assert [topic for topic in TOPICS if not topic.deterministic] == [WALL_TIME, EVENTS]
     assert all(getattr(topics, name) in TOPICS for name in ("TRUTH", "IMU", "TF"))

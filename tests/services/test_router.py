@@ -1,25 +1,71 @@
-"""A client outside the run hears it through the router."""
+"""A client outside the run hears it through the router, and is not heard."""
 
 import subprocess
 import sys
 import time
 
-from cosim.bus import BusError, ZenohBus
-from cosim.launcher import loopback_endpoints
+import pytest
+
+from cosim.access import VIEWER
+from cosim.bus import ZenohBus
+from cosim.certificates import make, tls
+from cosim.errors import BusError
+from cosim.keys import DIVERGED_KEY, STEP_KEY
 from messages import PoseStamped
+from services.common.operator import OPERATOR_KEY
+from services.processes import ROUTER
+from tests.endpoints import loopback_endpoints
+
+PREFIX = "test-router"
 
 
-def test_a_client_hears_the_run(tmp_path):
-    (door,) = loopback_endpoints(["door"]).values()
-    command = [sys.executable, "-m", "lapwing", "run", "scenes/hover.toml", "--speed", "2", "--open", door]
-    command += ["--set", "run.duration=4", "--key-prefix", "test-router", "--log", str(tmp_path / "log.mcap")]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
+def visit(command, door, **security):
+    """What a client reads while a run flies, and what the run says at its end; the client publishes, too."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
         heard = None
         while heard is None and run.poll() is None:
             try:
-                with ZenohBus(connect=[door], mode="client") as bus:
-                    heard = bus.subscribe("test-router/drone1/pose").get(timeout=2.0)
+                with ZenohBus(connect=[door], mode="client", **security) as bus:
+                    pose = bus.subscribe(f"{PREFIX}/drone1/pose")
+                    for _ in range(10):
+                        for key in (f"{OPERATOR_KEY}/mavlink", f"{STEP_KEY}/plant", f"{DIVERGED_KEY}/plant"):
+                            bus.publisher(f"{PREFIX}/{key}")(b"hello", 0)
+                            bus._session.put(f"{PREFIX}/{key}", b"hello")
+                        time.sleep(0.02)
+                    heard = pose.get(timeout=2.0)
             except BusError:  # nobody listens yet
                 time.sleep(0.1)
-        assert run.wait(timeout=200) == 0
+        said = run.communicate(timeout=200)[0]
+        assert run.returncode == 0, said
+    return heard, said
+
+
+def command(tmp_path, door, *more):
+    sets = ["--set", "run.duration=4", "--key-prefix", PREFIX, "--log", str(tmp_path / "log.mcap")]
+    return [sys.executable, "-m", "lapwing", "run", "hover", "--speed", "2", "--open", door, *sets, *more]
+
+
+def test_a_viewer_reads_and_is_not_heard_and_nobody_else_reads(tmp_path):
+    (tcp,) = loopback_endpoints(["door"]).values()
+    door, keys, foreign = tcp.replace("tcp/", "tls/"), tmp_path / "keys", tmp_path / "foreign"
+    make(keys, [ROUTER, VIEWER], 1)
+    make(foreign, [VIEWER], 1)
+    security = tls(keys, VIEWER)
+    heard, said = visit(command(tmp_path, door, "--keys", str(keys)), door, security=security)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
+    assert "refused" not in said  # the door itself lets nothing in
+
+    with ZenohBus([door], security=tls(keys, ROUTER)):
+        authority = {"root_ca_certificate": security["transport/link/tls"]["root_ca_certificate"]}
+        nothing = {"transport/link/tls": {**authority, "verify_name_on_connect": False}}
+        for stranger in (tls(foreign, VIEWER), nothing, {}):
+            with pytest.raises(BusError):
+                ZenohBus(connect=[door], mode="client", security=stranger)
+        ZenohBus(connect=[door], mode="client", security=security).close()
+
+
+def test_a_door_without_certificates_is_for_reading_too(tmp_path):
+    (door,) = loopback_endpoints(["door"]).values()
+    heard, said = visit(command(tmp_path, door, "--insecure"), door)
+    assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
+    assert "refused" not in said

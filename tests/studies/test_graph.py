@@ -20,16 +20,16 @@ def test_what_is_handed_over(mission):
 
 
 def test_who_listens(mission):
-    assert [p.name for p in graph.listeners(mission)] == ["recorder", "router", "mavlink"]
+    assert [p.name for p in graph.listeners(mission)] == ["recorder", "router", "mavlink", "foxglove", "ros2"]
     load_only = resolve(load("cooperative_load"))  # nobody steers: nothing for a ground station
-    assert [p.name for p in graph.listeners(load_only)] == ["recorder", "router"]
+    assert [p.name for p in graph.listeners(load_only)] == ["recorder", "router", "foxglove", "ros2"]
 
 
 def test_every_topic_has_an_arrow_of_its_own_and_the_link_leads_to_a_ground_station(mission):
     found = graph.arrows(mission)
     told = [arrow.text for arrow in found]
     handed = [text for texts in graph.handed(mission).values() for text in texts]
-    beside = ["every recorded topic", "every topic", "telemetry", "commands", "MAVLink 2"]
+    beside = ["every recorded topic", *["every topic"] * 3, "telemetry", "commands", "MAVLink 2"]
     assert sorted(told) == sorted([*handed, *beside])
     assert len({(arrow.start, arrow.end) for arrow in found}) == len(found)  # none lies on another
     link = found[told.index("MAVLink 2")]

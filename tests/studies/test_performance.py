@@ -8,7 +8,7 @@ import pytest
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import load_airframe
-from services.autopilot.resolve import known_airframe
+from services.autopilot.known_airframe import known_airframe
 from services.table import load, resolve
 from studies.performance import card, show, write_json
 from studies.terminal import console
@@ -32,8 +32,10 @@ def test_units_of_the_card():
 
 def test_where_nothing_is_chosen_the_models_come_near_the_paper():
     rows = {row.name: row for row in card(VEHICLE)}
-    for name in ("hover time", "maximum payload", "ceiling", "maximum tilt"):
+    for name in ("hover time", "maximum payload", "maximum tilt"):
         assert rows[name].computed == pytest.approx(rows[name].published, rel=0.06), name
+    ceiling = rows["ceiling"]  # in the standard atmosphere, which is denser aloft than the paper's law
+    assert 1.1 < ceiling.computed / ceiling.published < 1.2
 
 
 def test_every_published_figure_says_why_it_may_differ():

@@ -28,7 +28,7 @@ from studies.report.whole import phases
 RATE, SECONDS = 50, 6.0
 OFFSET = (0.1, -0.2, 0.05, 0.01, -0.02, 0.03)  # reference minus truth, so the errors are these numbers
 THRUST, TORQUE = 2e-4, 8e-6  # over speed squared
-BELIEVED = 0.02  # estimate minus truth of x [m]
+ESTIMATE_ERROR = 0.02  # estimate minus truth of x [m]
 SETUP = made_up.setup(
     int(RATE * SECONDS) + 1,
     RATE,
@@ -79,7 +79,7 @@ def messages(std=0.05, rotors=4, reference=True, east=0.0):
                 Actuators(stamp)._replace(armed=t >= 1.0, attitude_reference=Vector3(asked[3], asked[4], 0.0)),
             )
         if tick % 5 == 0:
-            estimated = pose._replace(position=Point(position[0] + BELIEVED, *position[1:]))
+            estimated = pose._replace(position=Point(position[0] + ESTIMATE_ERROR, *position[1:]))
             wrong = ("gps", "sonar") if tick == 50 else ("gps",) if tick == 100 else ()
             spread = dict.fromkeys(("position_std", "velocity_std", "attitude_std"), Vector3(std, std, std))
             yield "estimate", Estimate(stamp, estimated)._replace(rejected=wrong, **spread)
@@ -118,7 +118,7 @@ class Page(HTMLParser):
         if tag == "section":
             self.ids.append(found["id"])
         self.addresses += [v for k, v in attrs if k in ("src", "href", "srcset", "data", "action")]
-        if tag not in ("meta", "link"):
+        if tag not in ("meta", "link", "input"):
             self._open.append("json" if found.get("type") == "application/json" else tag)
 
     def handle_endtag(self, tag):
@@ -153,9 +153,9 @@ def values(array):
 
 def test_every_plot_is_on_the_page_in_its_order(page):
     of_multirotors = [m for m in plots.modules() if "reduced" in getattr(m, "MODELS", ("reduced",))]
-    names = [module.__name__.rpartition(".")[2] for module in of_multirotors]
-    assert page.ids == names
-    assert list(page.plots) == names
+    names = [m.__name__.rpartition(".")[2] for m in of_multirotors if not getattr(m, "FLEET", False)]
+    assert page.ids == ["motion", *names]
+    assert list(page.plots) == ["motion", *names]
     assert names[:2] == ["timeline", "position"]
 
 
@@ -228,7 +228,7 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
 def test_the_same_plots_on_paper(log, page, tmp_path):
     pdf = write(Flight.read(log), tmp_path / "circle.pdf").read_bytes()
     assert pdf.startswith(b"%PDF")
-    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots)
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots) - 1  # all but the motion
 
 
 def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monkeypatch):
@@ -331,7 +331,7 @@ def test_coefficients_are_those_of_the_propeller(log):
 def test_estimate_errors_and_refusals(log):
     error = estimator.errors(Flight.read(log))
     expected = np.zeros(9)
-    expected[0] = BELIEVED
+    expected[0] = ESTIMATE_ERROR
     assert error == pytest.approx(np.broadcast_to(expected, error.shape), abs=1e-9)
     assert estimator.refusals(Flight.read(log)) == "Measurements refused: gps 2, sonar 1."
 
@@ -365,7 +365,7 @@ def test_a_truncated_log_gives_a_report_too(log, tmp_path):
 def test_what_is_missing_is_said(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
-    assert set(page.plots) == {"timeline", "position", "attitude", "path", "air"}
+    assert set(page.plots) - {"motion"} == {"timeline", "position", "attitude", "path", "air"}
     assert "Left out: the vehicle has no motors." in text
     assert "Left out: the estimate states no uncertainty (it is the truth)." in text
     assert "No reference in this log" in text

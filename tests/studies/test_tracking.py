@@ -2,8 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from studies import tracking
+
+
+def test_roll_pitch_yaw_are_scipys():
+    some = Rotation.random(100, random_state=np.random.default_rng(3))
+    found, expected = tracking.roll_pitch_yaw(some.as_quat()), some.as_euler("ZYX")[:, ::-1]
+    assert found[:, :2] == pytest.approx(expected[:, :2], abs=1e-7)  # asin is steep near 90 degrees
+    assert np.cos(found[:, 2] - expected[:, 2]) == pytest.approx(1.0)
 
 
 def test_angles_are_taken_the_short_way_round():
@@ -15,3 +23,21 @@ def test_angles_are_taken_the_short_way_round():
     assert found[:, 5] == pytest.approx([-0.2, 6.0 - 2.0 * np.pi, 2.0 * np.pi - 6.0])
     assert found[:, 0].tolist() == [1.0, 2.0, 3.0]
     assert len(tracking.errors(reference, np.zeros((3, 3)), attitude, np.array([True, False, True]))) == 2
+
+
+def test_errors_have_the_bits_of_numpys():
+    random = np.random.default_rng(5)
+    reference, position, attitude = (random.normal(size=(500, k)) * 9.0 for k in (6, 3, 3))
+    armed = random.random(500) > 0.3
+    turn = reference[:, 3:] - attitude
+    turn -= tracking.TURN * np.round(turn / tracking.TURN)
+    expected = np.column_stack([reference[:, :3] - position, turn])[armed]
+    assert np.array_equal(tracking.errors(reference, position, attitude, armed), expected)
+    assert np.array_equal(tracking.errors(reference, position.T.copy().T, attitude, armed), expected)  # other layout
+
+
+def test_yaw_goes_on_over_half_a_turn():
+    yaw = np.linspace(0.0, 9.0, 50)
+    xyzw = np.column_stack([np.zeros((50, 2)), np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
+    assert tracking.roll_pitch_yaw(xyzw)[:, 2] == pytest.approx(yaw)
+    assert tracking.roll_pitch_yaw(xyzw[:17])[:, 2] == pytest.approx(yaw[:17])  # no jump

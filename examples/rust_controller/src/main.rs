@@ -2,7 +2,7 @@
 //!
 //!     lapwing protocol rust_mission.toml --json layout.json
 //!     rust_controller layout.json tcp/127.0.0.1:7450 [SPACE] &
-//!     lapwing run rust_mission.toml --external autopilot=tcp/127.0.0.1:7450
+//!     lapwing run rust_mission.toml --external autopilot=tcp/127.0.0.1:7450 --insecure
 
 mod bus;
 mod control;

@@ -14,7 +14,7 @@ from services.autopilot.commander.transitions import Context
 Handler = Callable[[Context, Any], None]
 HANDLERS: dict[str, Handler] = {}
 """What is done for each kind of command."""
-STREAMS = ("manual", "link", "offboard_position", "offboard_attitude")  # not acknowledged
+STREAMS = ("manual", "link", "offboard_position", "offboard_attitude", "offboard_motors")  # not acknowledged
 
 
 class Denied(ValueError):
@@ -116,12 +116,17 @@ def manual(context: Context, command: Any) -> None:
     inputs.sticks, inputs.sticks_age = tuple(0.0 if math.isnan(v) else v for v in sticks), 0.0
 
 
-@handles("offboard_position", "offboard_attitude")
+@handles("offboard_position", "offboard_attitude", "offboard_motors")
 def offboard(context: Context, command: Any) -> None:
-    """A setpoint; the mode offboard is accepted only while they come."""
+    """A setpoint, or the voltage of each motor [V]; the mode offboard is accepted only while they come."""
+    inputs, motors = context.state.guidance.inputs, context.constants.rotors
+    inputs.offboard_refused = ""
     if any(math.isinf(v) for v in command.values):
-        raise Denied("offboard: expected finite setpoints")
-    inputs = context.state.guidance.inputs
+        inputs.offboard_refused = "expected finite setpoints"
+    elif command.kind == "offboard_motors" and (len(command.values) != motors or any(map(math.isnan, command.values))):
+        inputs.offboard_refused = f"expected {motors} voltages, got {list(command.values)}"
+    if inputs.offboard_refused:
+        raise Denied(f"offboard: {inputs.offboard_refused}")
     inputs.offboard_kind, inputs.offboard, inputs.offboard_age = command.kind, command.values, 0.0
 
 

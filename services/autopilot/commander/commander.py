@@ -25,7 +25,7 @@ from services.autopilot.interface import Setpoint
 
 BLOCKED_TIME = 1.0  # [s] of sinking in vain after which the vehicle is on the ground
 LOW_THRUST = 0.5  # of the hovering thrust, below which the vehicle does not carry itself
-STILL = 0.15  # [m/s]
+LANDED_SPEED = 0.15  # [m/s]
 
 
 class Commander:
@@ -56,14 +56,16 @@ class Commander:
         state.guidance.inputs.age(view.dt)
         _retry_arming(context)
         setpoint, from_estimate = _setpoint(context)
+        volts = state.mode.motor_voltage if state.mode and state.guidance.flying else None
         return Request(
             setpoint=setpoint,
             parameters=context.outbox.parameters,
             faults=context.outbox.faults,
             acknowledgements=tuple(context.outbox.acknowledgements),
             texts=tuple(context.outbox.texts),
-            reset_controller=not state.on_trajectory and not state.guidance.flying,
+            reset_controller=volts is not None or (not state.on_trajectory and not state.guidance.flying),
             estimate_every_tick=from_estimate,
+            motor_voltage=volts,
             status=status(constants, view, state),
             quiet=_is_quiet(context),
         )
@@ -112,7 +114,7 @@ def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
 def _detect_landing(context: Context) -> None:
     """Notice the ground: the controller did, or the vehicle does not sink although nothing carries it."""
     view, state, guidance = context.view, context.state, context.state.guidance
-    still = abs(view.estimate.velocity_world[2]) < STILL
+    still = abs(view.estimate.velocity_world[2]) < LANDED_SPEED
     blocked = guidance.smoothing.velocity[2] < -0.2 and still and view.thrust < LOW_THRUST
     state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
     if view.motors_cut or state.blocked_time > BLOCKED_TIME:

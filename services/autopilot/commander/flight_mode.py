@@ -14,6 +14,7 @@ class FlightMode:
     needs_flight = False  # whether it can only be entered in the air
     needs_position = True  # whether it can only be entered while the vehicle knows where it is
     next_mode: str | None = None  # to go on with, once this one has done its work
+    motor_voltage: tuple[float, ...] | None = None  # [V] for each motor, past the controller; None: the controller's
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         """Entered with the values of the operator's command of its name; ValueError says why it cannot be."""

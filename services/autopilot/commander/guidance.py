@@ -21,7 +21,8 @@ class OperatorInputs:
 
     sticks: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # forward, left, up, yaw rate, each from -1 to 1
     sticks_age: float = math.inf
-    offboard_kind: str = ""  # offboard_position or offboard_attitude
+    offboard_kind: str = ""  # offboard_position, offboard_attitude or offboard_motors
+    offboard_refused: str = ""  # why the last setpoint was not taken; "": it was
     offboard: tuple[float, ...] = ()
     offboard_age: float = math.inf
     link_age: float = math.inf

@@ -38,6 +38,9 @@ class Request(NamedTuple):
     texts: tuple[str, ...]  # for the operator
     reset_controller: bool  # the vehicle is on the ground: the controller must be as before a flight
     estimate_every_tick: bool  # the setpoint was made from the estimate: show a new one at the next tick
+    motor_voltage: (
+        tuple[float, ...] | None
+    )  # of each motor, in the place of the controller's [V]; None: the controller's
     status: Status
     quiet: bool  # nothing to do until `attention.needs_attention`: up to then, every request would be this one
 

@@ -9,7 +9,7 @@ from services.autopilot.commander.modes import hold
 from services.autopilot.commander.smoothing import PositionSmoothing
 from services.autopilot.commander.view import Constants
 from services.autopilot.estimator import SOURCES
-from services.common.failures import Faults
+from services.common.failures import SOUND, Faults
 
 TRAJECTORY_MODE = "mission"  # how the flight along the scene's own trajectory is called
 
@@ -54,6 +54,7 @@ def initial(constants: Constants) -> State:
     """Before the first tick: on the ground, disarmed."""
     values = {p.name: p.default for p in constants.parameters.values()}
     guidance = Guidance(values, PositionSmoothing((0.0, 0.0, constants.resting_height), 0.0))
+    faults = Faults(motors=(SOUND,) * constants.rotors)
     if constants.has_trajectory:
-        return State(guidance, TRAJECTORY_MODE, None)
-    return State(guidance, hold.NAME, hold.Mode(constants, guidance))
+        return State(guidance, TRAJECTORY_MODE, None, faults=faults)
+    return State(guidance, hold.NAME, hold.Mode(constants, guidance), faults=faults)

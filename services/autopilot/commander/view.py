@@ -21,6 +21,7 @@ class Constants(NamedTuple):
     has_trajectory: bool  # the run begins along the scene's own trajectory
     has_operator: bool  # somebody may give commands
     failing: tuple[str, ...] = ()  # units whose failures may be injected
+    rotors: int = 4
 
     @property
     def autonomous(self) -> bool:

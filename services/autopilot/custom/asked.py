@@ -4,15 +4,17 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from cosim.schedule import KEPT, LockStepError, Port
+from cosim.errors import LockStepError
+from cosim.schedule import KEPT, Port
 from cosim.user_module import FAULTS, blame
 from dynamics.kernel import uncompiled
 from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
-from services.autopilot.custom.demand import DEMAND, Demand, demand
+from services.autopilot.custom.demand import DEMAND, demand, off
 from services.autopilot.custom.periodic import PeriodicPart
 from services.autopilot.setup import CustomCode
 from services.autopilot.stage import FLYING, INITIAL_STAGE, Stage, advance_stage
 from services.common import ports
+from services.common.controllers import VehicleModel
 
 _advance_stage, _estimate_of = uncompiled(advance_stage), uncompiled(estimate_of)
 _setpoint_of = uncompiled(setpoint_of)
@@ -22,7 +24,6 @@ class AskedController(PeriodicPart):
     """Shows the controller estimate and setpoint, and puts what it asks for into the port `demand`."""
 
     name = "autopilot.controller"
-    outputs = (Port(DEMAND, Demand(), KEPT),)
 
     def __init__(
         self,
@@ -30,7 +31,7 @@ class AskedController(PeriodicPart):
         module: ModuleType,
         construct: Callable[[], Any],
         reference: str,
-        resting_height: float,
+        vehicle: VehicleModel,
     ):
         """A controller that is constructed anew at every take-off.
 
@@ -39,10 +40,12 @@ class AskedController(PeriodicPart):
             module: in which its class is.
             construct: gives a new one.
             reference: port of the trajectory, or `NO_TRAJECTORY`.
-            resting_height: world z of the standing vehicle [m].
+            vehicle: what it is told.
         """
+        self.outputs = (Port(DEMAND, off(len(vehicle.rotor_positions_body)), KEPT),)
+        self._none = self.outputs[0].like.volts
         self._code, self._module, self._construct = code, module, construct
-        self._reference, self._resting_height = reference, resting_height
+        self._reference, self._resting_height = reference, vehicle.resting_height
         self._controller: Any = None
 
     def _ask(self, tick: int) -> None:
@@ -61,7 +64,7 @@ class AskedController(PeriodicPart):
         time = tick * graph.setup.interval
         try:
             self._controller = self._controller or self._construct()
-            found = demand(self._controller.step(time, estimate, setpoint))
+            found = demand(self._controller.step(time, estimate, setpoint), self._none)
         except FAULTS as error:
             raise LockStepError(f"{self._said(error)} at t = {time:.3f} s") from error
         graph.put(DEMAND, tick, found)

@@ -11,6 +11,7 @@ import numba
 from numba.core.errors import NumbaError
 
 from cosim.user_module import FAULTS, blame
+from dynamics.cell import Cell
 from dynamics.errors import KeyedError
 from services.autopilot.custom.demand import demand
 from services.autopilot.law import Airframe
@@ -30,7 +31,7 @@ def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
         a.mass,
         a.inertia_body,
         a.gravity,
-        tuple((x, y, 0.0) for x, y in zip(a.rotor_x, a.rotor_y, strict=True)),
+        tuple(zip(a.rotor_x, a.rotor_y, a.rotor_z or (0.0,) * len(a.rotor_x), strict=True)),
         a.reaction_sign,
         a.torque_per_thrust,
         thrust_at(a.motor, a.voltage_max),
@@ -38,6 +39,7 @@ def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
         a.motor.time_constant,
         a.resting_height,
         interval,
+        a.rotor_axis or ((0.0, 0.0, 1.0),) * len(a.rotor_x),
     )
 
 
@@ -58,7 +60,7 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
     given = (0.0, StateEstimate(position_world=start), Reference(position_world=start))
     if not is_compiled(found):
         p = constructor(CONTROLLER, module, found, vehicle, options)()
-        _try(CONTROLLER, name, module, p, lambda: demand(p.step(*given)))
+        _try(CONTROLLER, name, module, p, lambda: demand(p.step(*given), (0.0,) * len(vehicle.spin_directions)))
         return _rate(CONTROLLER, name, p)
     p, s = compiled(module, found, vehicle, options)
 
@@ -68,6 +70,7 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
             raise TypeError("step is to return (state, MotorVoltages or ThrustAndMoments)")
         if numba.typeof(output[0]) != numba.typeof(s):
             raise TypeError("step returns a state of another type than build; write every number as a float")
+        Cell((p, s))  # which they are flown in
 
     _try(CONTROLLER, name, module, module, trial)
     return _rate(CONTROLLER, name, p)

@@ -9,15 +9,15 @@ from numba import types
 
 from cosim.part import GO_ON, Received
 from dynamics.generate import implements
-from dynamics.kernel import leaf
+from dynamics.kernel import leaf, uncompiled
 from dynamics.vector import Vec3
 from services.autopilot import motor_failure
 from services.autopilot.core import Controller, estimate_of, outcome, setpoint_of
-from services.autopilot.custom.demand import Demand, command, demand
+from services.autopilot.custom.demand import NO_WRENCH, Demand, command, demand, off
+from services.autopilot.interface import PerRotor
+from services.autopilot.mixer import at_rest
 from services.autopilot.stage import FLYING, INITIAL_STAGE, Stage, advance_stage
 from services.common.ports import Reference, StateEstimate
-
-OFF = Demand()
 
 
 class FromPort(NamedTuple):
@@ -33,7 +33,8 @@ class CustomController(NamedTuple):
     own: Any  # parameters of a compiled controller, or `FromPort`
     own_start: Any  # its state at take-off
     every: int  # ticks between two of its steps
-    arms: Vec3  # (roll, pitch, yaw) moment of a rotor over its thrust [m]
+    lift: float  # force along body z [N] of a collective demand of 1 N
+    moments: Vec3  # torques about body x, y, z [N m] of demands of 1 N
     voltage_max: float  # [V]
 
 
@@ -50,30 +51,44 @@ class CustomState(NamedTuple):
 
 def start(p: CustomController) -> CustomState:
     """Before the first tick."""
-    return CustomState(INITIAL_STAGE, p.own_start, OFF, motor_failure.START, 0, float("nan"))
+    watch = p.common.watch
+    held = off(len(watch.roll_arm))
+    return CustomState(INITIAL_STAGE, p.own_start, held, uncompiled(motor_failure.start)(watch), 0, float("nan"))
 
 
 def _ask(
-    p: Any, s: Any, time: float, estimate: StateEstimate, setpoint: Reference, by_port: tuple[Received, ...]
+    p: Any,
+    s: Any,
+    time: float,
+    estimate: StateEstimate,
+    setpoint: Reference,
+    by_port: tuple[Received, ...],
+    none: PerRotor,
 ) -> tuple[Any, Demand]:
     """`step` of the user's module; or what has come by the port."""
     raise NotImplementedError("compiled code only")
 
 
 @leaf
-def _demanded(given: tuple) -> tuple[Any, Demand]:
+def _demanded(given: tuple, none: PerRotor) -> tuple[Any, Demand]:
     """State and output of the user's step, the output as a demand."""
-    return given[0], demand(given[1])
+    return given[0], demand(given[1], none)
 
 
 @implements(_ask, inline=True)
 def _ask_of(
-    p: types.Type, s: types.Type, time: types.Type, estimate: types.Type, setpoint: types.Type, by_port: types.Type
+    p: types.Type,
+    s: types.Type,
+    time: types.Type,
+    estimate: types.Type,
+    setpoint: types.Type,
+    by_port: types.Type,
+    none: types.Type,
 ) -> Callable:
     if p.instance_class is FromPort:
-        return lambda p, s, time, estimate, setpoint, by_port: (s, by_port[0].value)
+        return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
-    return lambda p, s, time, estimate, setpoint, by_port: _demanded(found(p, s, time, estimate, setpoint))
+    return lambda p, s, time, estimate, setpoint, by_port, none: _demanded(found(p, s, time, estimate, setpoint), none)
 
 
 @leaf
@@ -86,14 +101,14 @@ def step(
     wanted = inputs[3].value if order.follow else order.reference
     stage, watched, still_from = s.stage, s.watch, s.still_from
     if order.restart_at == tick:
-        stage, watched, still_from = INITIAL_STAGE, motor_failure.START, tick + c.bounce
+        stage, watched, still_from = INITIAL_STAGE, motor_failure.start(c.watch), tick + c.bounce
     charge = battery.value.charge if battery.due else s.charge
     stage = advance_stage(stage, c.law.value.resting_height, estimate_of(e), setpoint_of(wanted), c.interval)
-    own, held = s.own, s.held
+    own, held, none = s.own, s.held, at_rest(c.law.value.shares[0])
     if stage.name != FLYING:
-        own, held = p.own_start, OFF
+        own, held = p.own_start, Demand(True, none, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:
-        own, held = _ask(p.own, own, tick * c.interval, e, wanted, inputs[4:])
-    given = command(c.law.value, p.arms, p.voltage_max, held, wanted.yaw, stage.name)
+        own, held = _ask(p.own, own, tick * c.interval, e, wanted, inputs[4:], none)
+    given = command(c.law.value, p.lift, p.moments, p.voltage_max, held, wanted.yaw, stage.name, watched.failed)
     watched, outputs = outcome(c, watched, still_from, charge, order, e, wanted, stage.name, given)
     return CustomState(stage, own, held, watched, still_from, charge), outputs, GO_ON

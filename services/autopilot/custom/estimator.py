@@ -4,8 +4,9 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from cosim.errors import LockStepError
 from cosim.part import GO_ON, LOOK, Received
-from cosim.schedule import KEPT, Input, LockStepError, Port
+from cosim.schedule import KEPT, Input, Port
 from cosim.user_module import FAULTS, blame
 from dynamics.kernel import leaf
 from services.autopilot.attention import Attention, attention_due

@@ -14,7 +14,7 @@ from services.autopilot.custom.build import CONTROLLER, ESTIMATOR, compiled, con
 from services.autopilot.custom.core import CustomController, FromPort
 from services.autopilot.custom.demand import DEMAND
 from services.autopilot.custom.estimator import HELD, AskedEstimator, HeldEstimate
-from services.autopilot.law import arms
+from services.autopilot.law import lift, moments
 from services.autopilot.setup import AutopilotSetup
 from services.common.user_code import named
 
@@ -41,14 +41,14 @@ def controller_parts(
     assert code is not None
     assert vehicle is not None
     module, found = named(CONTROLLER, code.name, texts)
-    lever = arms(given.airframe)
+    per_demand = lift(given.airframe), moments(given.airframe)
     if is_compiled(found):
         own, start = compiled(module, found, vehicle, code.options)
-        p = CustomController(common, own, start, code.every, lever, vehicle.voltage_max)
+        p = CustomController(common, own, start, code.every, *per_demand, vehicle.voltage_max)
         return [Part(name, p, Cell(core.start(p)), inputs, outputs)]
     construct = constructor(CONTROLLER, module, found, vehicle, code.options)
-    asked = AskedController(code, module, construct, inputs[3].port, vehicle.resting_height)
-    p = CustomController(common, FromPort(0.0), 0.0, code.every, lever, vehicle.voltage_max)
+    asked = AskedController(code, module, construct, inputs[3].port, vehicle)
+    p = CustomController(common, FromPort(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
     return [asked, Part(name, p, Cell(core.start(p)), (*inputs, Input(DEMAND)), outputs)]
 
 

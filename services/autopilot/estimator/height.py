@@ -1,8 +1,8 @@
-"""Height by the sonar near the ground and by the barometer (theory.md, eqs. (3.31) and (3.32))."""
+"""Height by the sonar near the ground and by the barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
 
 import math
 
-from dynamics.geodesy import pressure_altitude
+from dynamics.atmosphere import pressure_altitude
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import ZERO
@@ -11,6 +11,8 @@ from services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
 from services.autopilot.estimator.watch import judge, repeated
+
+_GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] by which the ground under the vehicle may rise and fall
 
 
 @kernel
@@ -42,8 +44,8 @@ def update_barometer(p: Estimator, s: State, pressure: float, variance: float, v
     if not valid or not pressure > 0.0 or repeated(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
         judge(m, BARO, False, 0.0)
         return s
-    altitude = pressure_altitude(pressure, p.temperature_celsius) - p.home.height
-    slope = pressure_altitude(pressure + 1.0, p.temperature_celsius) - p.home.height - altitude  # [m/Pa]
+    altitude = pressure_altitude(p.atmosphere, pressure) - p.home.height
+    slope = pressure_altitude(p.atmosphere, pressure + 1.0) - p.home.height - altitude  # [m/Pa]
     clear(m)
     m.row[POSITION + 2] = 1.0
     m.row[BAROMETER] = 1.0
@@ -79,3 +81,24 @@ def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid
     m.row[POSITION + 2] = factor
     m.row[SCALE] = slant * height
     return _scalar(p, s, SONAR, distance - factor * height, variance)
+
+
+@kernel
+def follow_ground(p: Estimator, s: State) -> None:
+    """Let the height count from the ground, which is not level: that under the vehicle since the last echo is unknown.
+
+    The barometer keeps its own level, so that what the height loses its bias gains (theory.md, eq. (3.39)).
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+    """
+    c = s.memory.covariance
+    vx, vy, _ = s.nominal.velocity_world
+    dt = max(s.memory.since[SONAR], 1) * p.interval
+    variance = (_GROUND_GRADIENT**2 * (vx * vx + vy * vy) + _GROUND_RATE**2) * dt * dt
+    z = POSITION + 2
+    c[z, z] += variance
+    c[BAROMETER, BAROMETER] += variance
+    c[z, BAROMETER] -= variance
+    c[BAROMETER, z] -= variance

@@ -4,7 +4,9 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Lt
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
+from dynamics.atmosphere import Atmosphere
+from dynamics.environment import STANDARD
+from dynamics.geodesy import Home
 from dynamics.vector import Vec3
 
 
@@ -12,11 +14,11 @@ class Estimator(NamedTuple):
     """Parameters of the filter. White noise is not among them: every reading states its own variance."""
 
     interval: Annotated[float, Gt(0)] = 0.004  # [s] between two IMU readings
-    home: Home = Home()
+    home: Home = STANDARD.home
     gravity: Annotated[float, Gt(0)] = 9.81  # [m/s^2]
-    temperature_celsius: Annotated[float, Gt(-100)] = 15.0  # [deg C] of the air, for the pressure law
-    magnetic_field_world: Vec3 = MAGNETIC_FIELD_WORLD  # [T]
-    ground_height: float = 0.0  # [m] of the level ground under the home point, world z
+    atmosphere: Atmosphere = STANDARD.atmosphere  # for the pressure law
+    magnetic_field_world: Vec3 = STANDARD.magnetic_field_world  # [T]
+    ground_height: float = 0.0  # [m] of the ground under the home point, world z; taken for level
 
     start_std: Annotated[float, Gt(0)] = 0.1  # [m] in each axis: the world's origin is where the vehicle is put down
     position_std: Annotated[float, Gt(0)] = 10.0  # [m] above it the position is not known
@@ -36,6 +38,8 @@ class Estimator(NamedTuple):
     gps_wander_horizontal: Annotated[float, Ge(0)] = 0.010  # [m] error that is correlated in time, per axis
     gps_wander_vertical: Annotated[float, Ge(0)] = 0.013  # [m]
     gps_wander_time: Annotated[float, Gt(0)] = 60.0  # [s]
+
+    flow_scale_std: Annotated[float, Ge(0)] = 0.02  # ratio, focal length of the camera that sees the ground pass by
 
     gate: Annotated[float, Gt(0)] = 5.0  # standard deviations beyond which a reading is refused
     patience: Annotated[float, Gt(0)] = 1.0  # [s] without an accepted reading before a source counts as lost

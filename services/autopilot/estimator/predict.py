@@ -17,16 +17,17 @@ from services.autopilot.estimator.state import (
     IRON,
     POSITION,
     SIZE,
-    SOURCES,
     THETA,
     VELOCITY,
     WANDER,
+    WATCHED,
     Inertial,
     Nominal,
     State,
 )
 from services.autopilot.estimator.watch import repeated
 
+_STRAIGHT = 0.1  # of a jolt: up to it two readings are taken to lie on a straight line
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 
 
@@ -133,6 +134,9 @@ def predict(
     twist = norm(subtract(omega_body, i.omega))
     q_theta = dt * dt * omega_variance + dt * rate * p.gyro_scale_std**2
     q_velocity = dt * dt * specific_force_variance
+    if not first:  # what the trapezoidal rule may miss between readings that are far apart
+        q_theta += (dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0) ** 2
+        q_velocity += (dt * max(jolt - _STRAIGHT * p.jolt_force, 0.0) / 6.0) ** 2
     if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
         q_velocity += max(0.5 * dt * jolt, _IMPACT) ** 2
     if not first and (twist > p.jolt_rate or spike):
@@ -141,6 +145,7 @@ def predict(
         q_velocity += dt * 1.0
         q_theta += dt * 0.1
     m.history[tick % HISTORY, 6] = q_velocity
+    m.history[tick % HISTORY, 7] = q_theta
     for k in range(3):
         c[THETA + k, THETA + k] += q_theta
         c[VELOCITY + k, VELOCITY + k] += q_velocity
@@ -151,7 +156,7 @@ def predict(
         c[IRON + k, IRON + k] += dt * p.magnetometer_bias_walk**2
     c[BAROMETER, BAROMETER] += dt * p.barometer_walk**2
 
-    for k in range(len(SOURCES)):
+    for k in range(WATCHED):
         if m.since[k] >= 0:
             m.since[k] += 1
     m.refused[IMU] = 0 if usable else 1

@@ -21,6 +21,8 @@ HEADING, BAROMETER, SCALE = 21, 22, 23
 
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
 IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
+FLOW = len(SOURCES)  # kept books on as well, but it only stands in for GPS: its lack is no fault
+WATCHED = FLOW + 1
 
 HISTORY = 128  # IMU readings that are remembered for late measurements
 NEVER = -1
@@ -60,12 +62,12 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) not yet added to the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    history: np.ndarray  # (HISTORY, 7) velocity_gain, distance_gain, variance that the tick added to the velocity
-    since: np.ndarray  # (6,) ticks since a source was last accepted, or NEVER
-    refused: np.ndarray  # (6,) 1 where the last reading of a source was refused
-    repeats: np.ndarray  # (6,) equal readings in a row
-    last: np.ndarray  # (6, 6) last reading of each source
-    nis: np.ndarray  # (6,) last normalised innovation squared of each source
+    history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, what the tick added to velocity and attitude
+    since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
+    refused: np.ndarray  # (WATCHED,) 1 where the last reading of a source was refused
+    repeats: np.ndarray  # (WATCHED,) equal readings in a row
+    last: np.ndarray  # (WATCHED, 6) last reading of each source
+    nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
 
 
 class State(NamedTuple):
@@ -116,13 +118,13 @@ def initial(p: Estimator, position_world: Vec3, specific_force_body: Vec3, field
     attitude = level(p, specific_force_body, field_body)
     nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False)
-    count = len(SOURCES)
+    count = WATCHED
     memory = Memory(
         covariance,
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
-        np.zeros((HISTORY, 7)),
+        np.zeros((HISTORY, 8)),
         np.full(count, NEVER),
         np.zeros(count, np.int64),
         np.zeros(count, np.int64),
@@ -181,10 +183,12 @@ def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
 def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> tuple[int, int]:
     health = 0
     rejected = 0
+    carried = m.since[FLOW] != NEVER and m.since[FLOW] * p.interval < p.patience
     for i in range(len(SOURCES)):
         if m.refused[i] == 1:
             rejected |= 1 << i
-        if m.refused[i] == 1 or m.since[i] * p.interval > p.patience:
+        lost = m.refused[i] == 1 or m.since[i] * p.interval > p.patience
+        if lost and not (carried and i in (GPS, GPS_VELOCITY)):
             health |= 1 << i
     if max(position_std[0], position_std[1], position_std[2]) > p.position_std:
         health |= 64

@@ -1,10 +1,10 @@
-"""The battery's failure: off, it reports that it is empty, as PX4's does."""
+"""Failures of the battery's gauge, as PX4's: off, it reports an empty pack, wrong, a low charge."""
 
 from typing import Any, NamedTuple
 
 from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
-from services.common.failures import OFF
+from services.common.failures import OFF, STUCK, WRONG
 from services.common.ports import BatteryGauge
 
 
@@ -15,8 +15,15 @@ class BatteryInjection(NamedTuple):
 
 
 @leaf
-def step(p: BatteryInjection, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
-    """What arrives of the gauge."""
-    r = inputs[0].value
-    x = BatteryGauge(0.0, r.voltage, r.current) if p.faults.value.battery == OFF else r
-    return s, (x,), GO_ON
+def step(
+    p: BatteryInjection, s: BatteryGauge, tick: int, inputs: tuple[Received, ...]
+) -> tuple[BatteryGauge, tuple, int]:
+    """What arrives of the gauge; the state is what arrived of it before it stuck."""
+    r, kind = inputs[0].value, p.faults.value.battery
+    last = s if kind == STUCK else r
+    x = last
+    if kind == OFF:
+        x = BatteryGauge(0.0, r.voltage, r.current, r.temperature)
+    elif kind == WRONG:
+        x = BatteryGauge(p.faults.value.battery_charge, r.voltage, r.current, r.temperature)
+    return last, (x,), GO_ON

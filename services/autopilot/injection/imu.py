@@ -4,36 +4,54 @@ from typing import Any, NamedTuple
 
 from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
-from services.autopilot.injection.memory import Memory, silent
-from services.common.failures import STUCK, WRONG
+from dynamics.noise import Key
+from dynamics.vector import Vec3
+from services.autopilot.injection.memory import Memory, garbage, silent
+from services.common.failures import DELAYED, GARBAGE, STUCK, WRONG
 from services.common.ports import ImuReading
 
 TURN, PUSH = 0.2, 2.0  # [rad/s] about x, [m/s^2] along z by which a wrong one is off
+FULL_TURN, FULL_PUSH = 35.0, 160.0  # [rad/s], [m/s^2] full scale, which garbage fills
+_GYRO, _ACCELEROMETER = 0, 1  # lanes of their random numbers
 
 
 class ImuInjection(NamedTuple):
     """What is wrong."""
 
     faults: Any  # cell of `Faults`
+    key: Key  # of random numbers
+
+
+@leaf
+def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: Vec3) -> Vec3:
+    if kind == STUCK:
+        return stuck
+    if kind == DELAYED:
+        return late
+    if kind == WRONG:
+        return wrong
+    return random if kind == GARBAGE else now
 
 
 @leaf
 def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
-    """What arrives of the reading of the tick."""
-    r, gyro, accelerometer = inputs[0].value, p.faults.value.gyro, p.faults.value.accelerometer
-    omega, force = r.omega_body, r.specific_force_body
-    if gyro == STUCK:
-        omega = s.last.omega_body
-    elif gyro == WRONG:
-        omega = (omega[0] + TURN, omega[1], omega[2])
-    if accelerometer == STUCK:
-        force = s.last.specific_force_body
-    elif accelerometer == WRONG:
-        force = (force[0], force[1], force[2] + PUSH)
-    valid = r.valid and not silent(gyro, s.readings) and not silent(accelerometer, s.readings)
+    """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
+    r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer
+    late, turn, push = before.value, r.omega_body, r.specific_force_body
+    omega = _chosen(
+        gyro, turn, s.last.omega_body, late.omega_body, (turn[0] + TURN, turn[1], turn[2]),
+        garbage(p.key, tick, _GYRO, FULL_TURN) if gyro == GARBAGE else turn,
+    )  # fmt: skip
+    force = _chosen(
+        accelerometer, push, s.last.specific_force_body, late.specific_force_body, (push[0], push[1], push[2] + PUSH),
+        garbage(p.key, tick, _ACCELEROMETER, FULL_PUSH) if accelerometer == GARBAGE else push,
+    )  # fmt: skip
+    valid = late.valid and before.due if DELAYED in (gyro, accelerometer) else r.valid
+    valid = valid and not silent(gyro, p.key, _GYRO, s.readings)
+    valid = valid and not silent(accelerometer, p.key, _ACCELEROMETER, s.readings)
     last = ImuReading(
-        omega if gyro == STUCK else r.omega_body,
-        force if accelerometer == STUCK else r.specific_force_body,
+        omega if gyro == STUCK else turn,
+        force if accelerometer == STUCK else push,
         r.omega_variance, r.specific_force_variance, r.valid,
     )  # fmt: skip
     x = ImuReading(omega, force, r.omega_variance, r.specific_force_variance, valid)

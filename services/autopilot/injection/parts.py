@@ -1,19 +1,22 @@
-"""The parts that make failures, and the ports that carry what arrives."""
+"""The parts that make failures or pass on motor commands from outside, and the ports that carry what arrives."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from cosim.part import Part
 from cosim.schedule import Input, Port
+from cosim.setup import Setup
 from dynamics.cell import Cell
+from dynamics.noise import Key, stream_key
 from services.autopilot.injection.battery import BatteryInjection
 from services.autopilot.injection.imu import ImuInjection
-from services.autopilot.injection.memory import Memory
-from services.autopilot.injection.motors import MotorInjection
+from services.autopilot.injection.memory import DELAY, Memory
+from services.autopilot.injection.motors import Direct, MotorInjection
 from services.autopilot.injection.sensor import SensorInjection
+from services.autopilot.motor import Motor
 from services.common import ports
 
-_SENSORS: dict[str, Callable[[Any], Any]] = {
+_SENSORS: dict[str, Callable[[Any, Key], Any]] = {
     ports.IMU: ImuInjection,
     ports.MAGNETOMETER: SensorInjection,
     ports.BAROMETER: SensorInjection,
@@ -32,11 +35,14 @@ _UNITS = {
 class Injection:
     """Where failures are injected in a run; without a cell of `Faults`, nowhere."""
 
-    def __init__(self, faults: Cell | None, known: Mapping[str, Port], fuses: bool):
-        """`known`: the ports of the run by name; `fuses`: the autopilot's estimator reads the sensors."""
-        self.faults = faults
-        self._known = known
-        self._sensors = [name for name in _SENSORS if name in known] if fuses and faults is not None else []
+    def __init__(self, faults: Cell | None, setup: Setup, fuses: bool, motor: Motor):
+        """`setup`: the run; `fuses`: the autopilot's estimator reads the sensors; `motor`: of every rotor."""
+        self.faults, self._motor = faults, motor
+        rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
+        self.released = Direct(False, (0.0,) * rotors)  # the controller's command reaches the motors
+        self.direct = None if faults is None else Cell(self.released)
+        self._setup, self._known = setup, setup.ports
+        self._sensors = [name for name in _SENSORS if name in self._known] if fuses and faults is not None else []
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -61,14 +67,17 @@ class Injection:
             known = self._known[port]
             memory = Cell(Memory(known.like, 0))
             given = known._replace(name=self.received(port))
-            parameters = _SENSORS[port](self.faults)
-            found.append(Part(f"{name}.inject.{port}", parameters, memory, (Input(port),), (given,), known.period))
+            key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
+            late = known.period * max(1, round(DELAY / self._setup.interval / known.period))
+            inputs = Input(port), Input(port, late)
+            parameters = _SENSORS[port](self.faults, key)
+            found.append(Part(f"{name}.inject.{port}", parameters, memory, inputs, (given,), known.period))
         if self.faults is not None:
             known = self._known[ports.BATTERY]
             given = known._replace(name=self.received(ports.BATTERY))
-            inputs = (Input(ports.BATTERY),)
-            parameters = BatteryInjection(self.faults)
-            found.append(Part(f"{name}.inject.battery", parameters, Cell(0.0), inputs, (given,), known.period))
+            battery, memory = BatteryInjection(self.faults), Cell(known.like)
+            reads = (Input(ports.BATTERY),)
+            found.append(Part(f"{name}.inject.battery", battery, memory, reads, (given,), known.period))
         return found
 
     def after(self, name: str, actuators: Port) -> list[Part]:
@@ -76,4 +85,6 @@ class Injection:
         if self.faults is None:
             return []
         inputs = (Input(self.commanded(actuators).name),)
-        return [Part(f"{name}.inject.motors", MotorInjection(self.faults), Cell(0.0), inputs, (actuators,))]
+        memory = Cell(Memory(actuators.like.motor_voltage, 0))
+        parameters = MotorInjection(self.faults, self.direct, self._motor)
+        return [Part(f"{name}.inject.motors", parameters, memory, inputs, (actuators,))]

@@ -1,4 +1,4 @@
-"""The readings of a barometer, a sonar or a magnetometer: each kind of reading has its update of the filter."""
+"""The readings of a barometer, a sonar, a magnetometer or optical flow: each kind has its update of the filter."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,9 +11,15 @@ from dynamics.kernel import ByClass, leaf
 from services.autopilot import estimator
 from services.autopilot.estimator import Estimator, State
 from services.autopilot.navigation.state import NavigationState
-from services.common.ports import BarometerReading, MagnetometerReading, SonarReading
+from services.common.ports import (
+    BarometerReading,
+    MagnetometerReading,
+    OpticalFlowReading,
+    RangefinderReading,
+    SonarReading,
+)
 
-Reading = BarometerReading | MagnetometerReading | SonarReading
+Reading = BarometerReading | MagnetometerReading | OpticalFlowReading | RangefinderReading | SonarReading
 
 
 class Correction(NamedTuple):
@@ -33,15 +39,22 @@ def _magnetometer(p: Estimator, x: State, r: MagnetometerReading) -> State:
 
 
 @leaf
-def _sonar(p: Estimator, x: State, r: SonarReading) -> State:
+def _distance(p: Estimator, x: State, r: SonarReading | RangefinderReading) -> State:
     return estimator.update_sonar(p, x, r.range, r.variance, r.valid)
+
+
+@leaf
+def _flow(p: Estimator, x: State, r: OpticalFlowReading) -> State:
+    return estimator.update_flow(p, x, r.flow, r.rate, r.distance, r.variance, r.valid)
 
 
 UPDATES = ByClass()
 """The compiled update of the filter by the class of a reading."""
 UPDATES[BarometerReading] = _barometer
 UPDATES[MagnetometerReading] = _magnetometer
-UPDATES[SonarReading] = _sonar
+UPDATES[SonarReading] = _distance
+UPDATES[RangefinderReading] = _distance
+UPDATES[OpticalFlowReading] = _flow
 
 
 def update(p: Estimator, x: State, r: Reading) -> State:

@@ -11,7 +11,7 @@ from services.autopilot.estimator import Estimator
 from services.autopilot.navigation.state import NavigationState
 from services.autopilot.stage import ON_GROUND
 
-STILL = 0.02  # ratio by which the specific force of a vehicle at rest may differ from gravity
+STANDSTILL_RATIO = 0.02  # ratio by which the specific force of a vehicle at rest may differ from gravity
 STANDSTILL_EVERY = 10  # readings between two corrections by a vehicle that is known to stand
 
 
@@ -31,7 +31,7 @@ def step(
     imu, magnetometer, flight = inputs
     r, begun, x = imu.value, s.begun, s.filter
     if not begun:
-        still = abs(norm(r.specific_force_body) - p.filter.gravity) < STILL * p.filter.gravity
+        still = abs(norm(r.specific_force_body) - p.filter.gravity) < STANDSTILL_RATIO * p.filter.gravity
         if magnetometer.due and still:
             nothing = (math.nan, math.nan, math.nan)
             field = magnetometer.value.field_body if magnetometer.value.valid else nothing

@@ -6,7 +6,7 @@ import numpy as np
 
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.vector import ZERO
-from services.autopilot.estimator.state import HISTORY, SIZE, SOURCES, Inertial, Memory, Nominal, State
+from services.autopilot.estimator.state import HISTORY, SIZE, WATCHED, Inertial, Memory, Nominal, State
 
 
 class NavigationState(NamedTuple):
@@ -18,7 +18,7 @@ class NavigationState(NamedTuple):
 
 def blank() -> NavigationState:
     """Before the first reading."""
-    n = len(SOURCES)
+    n = WATCHED
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False)
     memory = Memory(
@@ -26,7 +26,7 @@ def blank() -> NavigationState:
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
-        np.zeros((HISTORY, 7)),
+        np.zeros((HISTORY, 8)),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),

@@ -7,7 +7,7 @@ from dynamics import discovery
 from services.mavlink.adapter import Adapter
 from services.mavlink.links.link import Link
 
-__all__ = ["Link", "check", "kinds", "open_link"]
+__all__ = ["Link", "check", "kinds", "numbered", "open_link"]
 
 
 @cache
@@ -30,6 +30,19 @@ def check(url: str) -> type[Link]:
         forms = ", ".join(cls.FORM for cls in kinds().values())
         raise ValueError(f"--mavlink {url}: expected one of {forms}; for example udpout:127.0.0.1:14550")
     return kind
+
+
+def numbered(url: str, i: int) -> str:
+    """The URL of the link of vehicle i (from 0) of several that one URL is given for.
+
+    Raises:
+        ValueError: no such kind, or there is none for so many.
+    """
+    kind, (scheme, _, rest) = check(url), url.partition(":")
+    try:
+        return f"{scheme}:{kind.numbered(rest, i)}"
+    except ValueError as error:
+        raise ValueError(f"--mavlink {url}: {error}") from None
 
 
 def open_link(url: str, adapter: Adapter, selector: BaseSelector) -> Link:

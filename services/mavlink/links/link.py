@@ -47,6 +47,11 @@ class Link:
         match = re.fullmatch(r"[\w.-]+:(\d+)", rest, re.ASCII)
         return match is not None and int(match[1]) < 65536
 
+    @classmethod
+    def numbered(cls, rest: str, i: int) -> str:
+        """The rest of the URL for vehicle i (from 0) of several: the same for all that send to one station."""
+        return rest
+
     def affords(self) -> bool:
         """Whether one more piece may be read; counts it where not."""
         if self.budget.take():
@@ -57,6 +62,14 @@ class Link:
     def close(self) -> None:
         """Close it."""
         raise NotImplementedError
+
+
+def next_port(rest: str, i: int) -> str:
+    """Host and the port i further on; ValueError where there is none."""
+    host, _, port = rest.rpartition(":")
+    if int(port) + i > 65535:
+        raise ValueError(f"port {port}: the link of vehicle {i} would be at {int(port) + i}")
+    return f"{host}:{int(port) + i}"
 
 
 def socket_address(rest: str) -> tuple[str, int]:

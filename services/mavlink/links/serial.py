@@ -18,6 +18,13 @@ class Serial(Link):
     SCHEME: ClassVar[str] = "serial"
     FORM: ClassVar[str] = "serial:DEVICE:BAUD"
 
+    @classmethod
+    def numbered(cls, rest: str, i: int) -> str:
+        """A line has room for one vehicle."""
+        if i:
+            raise ValueError(f"serial:{rest}: has room for one vehicle; expected udpout, udpin or tcpin")
+        return rest
+
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         path, _, baud = rest.rpartition(":")

@@ -5,7 +5,7 @@ from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
 from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link, is_local, socket_address
+from services.mavlink.links.link import Link, is_local, next_port, socket_address
 from services.mavlink.links.stream import ByteStream
 
 MAX_ENDPOINTS = 8
@@ -16,6 +16,11 @@ class TcpIn(Link):
 
     SCHEME: ClassVar[str] = "tcpin"
     FORM: ClassVar[str] = "tcpin:HOST:PORT"
+
+    @classmethod
+    def numbered(cls, rest: str, i: int) -> str:
+        """Each vehicle listens at the port after that of the one before."""
+        return next_port(rest, i)
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)

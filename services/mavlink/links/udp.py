@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from services.mavlink.adapter import Adapter
 from services.mavlink.endpoint import Endpoint
-from services.mavlink.links.link import PIECE, ROUND, Link, is_local, socket_address
+from services.mavlink.links.link import PIECE, ROUND, Link, is_local, next_port, socket_address
 
 MAX_ENDPOINTS = 8
 SILENT = 10.0  # [s] of wall time after which an endpoint makes room for another
@@ -84,6 +84,11 @@ class UdpIn(_Udp):
 
     SCHEME: ClassVar[str] = "udpin"
     FORM: ClassVar[str] = "udpin:HOST:PORT"
+
+    @classmethod
+    def numbered(cls, rest: str, i: int) -> str:
+        """Each vehicle listens at the port after that of the one before."""
+        return next_port(rest, i)
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)

@@ -1,17 +1,10 @@
 """The command that injects failures."""
 
-from services.common import failures
+from services.common.failures import UNITS, possible, refusal
 from services.mavlink.dialect import mavlink
 from services.mavlink.protocols.commands import UNSUPPORTED, Command, Outcome, Request, rule
 from services.mavlink.session import Session
 
-_FAILURES = {  # by FAILURE_TYPE
-    mavlink.FAILURE_TYPE_OK: failures.SOUND,
-    mavlink.FAILURE_TYPE_OFF: failures.OFF,
-    mavlink.FAILURE_TYPE_STUCK: failures.STUCK,
-    mavlink.FAILURE_TYPE_WRONG: failures.WRONG,
-    mavlink.FAILURE_TYPE_SLOW: failures.SLOW,
-}
 _UNITS = {  # by FAILURE_UNIT
     mavlink.FAILURE_UNIT_SENSOR_GYRO: "gyro",
     mavlink.FAILURE_UNIT_SENSOR_ACCEL: "accelerometer",
@@ -27,8 +20,11 @@ _UNITS = {  # by FAILURE_UNIT
 @rule(mavlink.MAV_CMD_INJECT_FAILURE)
 def inject_failure(session: Session, c: Command) -> Outcome:
     """Let a unit fail, or make it sound again."""
-    unit, kind = _UNITS.get(int(c.params[0])), _FAILURES.get(int(c.params[1]))
-    if unit is None or kind is None:
-        session.say(f"INJECT_FAILURE: unit {c.params[0]:.0f}, type {c.params[1]:.0f} unsupported")
+    unit, kind = _UNITS.get(int(c.params[0])), int(c.params[1])  # our kinds bear the numbers of FAILURE_TYPE
+    if unit is None:
+        session.say(f"INJECT_FAILURE: unit {c.params[0]:.0f} unsupported")
         return UNSUPPORTED
-    return Request("inject_failure", (failures.UNITS.index(unit), kind, c.params[2]))
+    if kind not in possible(unit):
+        session.say(f"INJECT_FAILURE: type {kind} unsupported; {refusal(unit)}")
+        return UNSUPPORTED
+    return Request("inject_failure", (UNITS.index(unit), kind, c.params[2]))

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from dynamics.vector import Vec3
-from services.mavlink.coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_world, to_world
+from services.mavlink.coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_local, from_world, to_world
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from services.mavlink.protocols.handler import handles
@@ -39,7 +39,7 @@ def rotated(v: Vec3, heading: float) -> Vec3:
 
 @handles("SET_POSITION_TARGET_LOCAL_NED")
 def local_target(session: Session, m: Any) -> None:
-    """Position, velocity, acceleration from home, or from the vehicle along the world's or its own axes."""
+    """Position, velocity, acceleration from the local origin, or from the vehicle along the world's or its own axes."""
     estimate = session.vehicle.estimate
     if m.coordinate_frame not in _LOCAL or estimate is None:
         _refuse(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
@@ -56,7 +56,8 @@ def local_target(session: Session, m: Any) -> None:
         n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
     turned = heading if session.vehicle.flavour.GUIDED and m.coordinate_frame in _BODY else 0.0
-    _put(session, m, swap_world(position), velocity, acceleration, turned)
+    position_world = from_local(session.vehicle.description.standing_height, position)
+    _put(session, m, position_world, velocity, acceleration, turned)
 
 
 @handles("SET_POSITION_TARGET_GLOBAL_INT")
@@ -95,7 +96,7 @@ def _put(
         _refuse(session, f"{m.get_type()}: forces unsupported")
     elif all(map(math.isnan, values)):
         _refuse(session, f"{m.get_type()}: nothing to follow")
-    elif session.vehicle.flavour.GUIDED and all(map(math.isnan, values[3:9])):
+    elif session.vehicle.flavour.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
         if _guided(session, m):  # ArduPilot flies to a place that it is told once
             _send(session, m, "goto", (*position_world, yaw))
     else:

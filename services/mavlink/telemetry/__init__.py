@@ -29,6 +29,5 @@ def requested(vehicle: VehicleView, number: int, parameter: float = 0.0) -> list
         None for a message that is not of the telemetry; empty while it has no content.
     """
     if number in streams():
-        message = streams()[number].build(vehicle)
-        return [] if message is None else [message]
+        return streams()[number].messages(vehicle)
     return ON_REQUEST[number](vehicle, parameter) if number in ON_REQUEST else None

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from dynamics.geodesy import enu_to_geodetic
 from messages.topics import ESTIMATE
+from services.mavlink.coordinates import enu_to_geodetic, to_local
 from services.mavlink.dialect import mavlink
-from services.mavlink.frames import saturated, swap_world
+from services.mavlink.frames import saturated
 from services.mavlink.telemetry.stream import stream
 from services.mavlink.view import VehicleView
 
@@ -32,7 +32,7 @@ def home_position(v: VehicleView) -> Any:
         saturated(latitude * 1e7, 32),
         saturated(longitude * 1e7, 32),
         saturated(height * 1e3, 32),
-        *swap_world(home),
+        *to_local(v.description.standing_height, home),
         [math.cos(0.5 * v.home_heading), 0.0, 0.0, math.sin(0.5 * v.home_heading)],
         *(0.0, 0.0, 0.0),
         time_usec=v.boot_us,

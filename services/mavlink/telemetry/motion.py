@@ -7,6 +7,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.frames import compass, saturated
 from services.mavlink.telemetry.power import motor_fractions
 from services.mavlink.telemetry.stream import stream
+from services.mavlink.telemetry.surroundings import indicated_airspeed
 from services.mavlink.view import VehicleView
 
 
@@ -60,8 +61,14 @@ def hud(v: VehicleView) -> Any:
     ground_speed = math.hypot(north, east)
     fractions = motor_fractions(v)
     throttle = round(100.0 * sum(fractions) / max(1, len(fractions)))
+    airspeed = indicated_airspeed(v)
     return mavlink.MAVLink_vfr_hud_message(
-        ground_speed, ground_speed, compass(m.angles[2]) // 100, throttle, m.geodetic[2], -down
+        ground_speed if airspeed is None else airspeed,
+        ground_speed,
+        compass(m.angles[2]) // 100,
+        throttle,
+        m.geodetic[2],
+        -down,
     )
 
 
@@ -70,6 +77,5 @@ def altitude(v: VehicleView) -> Any:
     """Every altitude there is."""
     if (m := v.estimate) is None:
         return None
-    above_sea, local = m.geodetic[2], m.position_world[2]
-    above_home = local - v.home_world[2]
+    above_sea, local, above_home = m.geodetic[2], -m.position_ned[2], m.position_world[2] - v.home_world[2]
     return mavlink.MAVLink_altitude_message(v.boot_us, above_sea, above_sea, local, above_home, math.nan, math.nan)

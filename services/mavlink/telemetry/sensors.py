@@ -4,14 +4,18 @@ import math
 from typing import Any
 
 from messages import NavSatStatus
-from messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG, SONAR
+from messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import compass, saturated, swap_body
 from services.mavlink.telemetry.stream import stream
 from services.mavlink.view import VehicleView
 
-GAUSS, HECTOPASCAL, CENTIMETRE, MILLI_G = 1e-4, 100.0, 0.01, 9.80665e-3
-TEMPERATURE = 15.0  # [deg C], which no sensor measures
+GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 9.80665e-3
+FIX_TYPES = {  # by what the receiver says of itself
+    NavSatStatus.STATUS_FIX: mavlink.GPS_FIX_TYPE_3D_FIX,
+    NavSatStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,
+    NavSatStatus.STATUS_GBAS_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,
+}
 SATELLITES = 16  # that a fix is said to come from
 UNKNOWN_16, UNKNOWN_32 = 0xFFFF, 0xFFFFFFFF
 
@@ -54,7 +58,7 @@ def highres_imu(v: VehicleView) -> Any:
     if good_baro(v):
         pressure, updated = v.get(BARO).fluid_pressure / HECTOPASCAL, updated | 0x200
     return mavlink.MAVLink_highres_imu_message(
-        v.boot_us, *force, *omega, *field, pressure, 0.0, 0.0, TEMPERATURE, updated
+        v.boot_us, *force, *omega, *field, pressure, 0.0, 0.0, v.description.air_temperature, updated
     )
 
 
@@ -80,30 +84,7 @@ def scaled_pressure(v: VehicleView) -> Any:
     if not good_baro(v):
         return None
     pressure = v.get(BARO).fluid_pressure / HECTOPASCAL
-    return mavlink.MAVLink_scaled_pressure_message(v.boot_ms, pressure, 0.0, round(1e2 * TEMPERATURE))
-
-
-@stream("DISTANCE_SENSOR", 5.0, 10.0)
-def distance_sensor(v: VehicleView) -> Any:
-    """Distance downwards; nothing in reach reads just beyond it."""
-    m = v.get(SONAR)
-    if m is None or math.isnan(m.range):
-        return None
-    minimum, maximum = round(m.min_range / CENTIMETRE), round(m.max_range / CENTIMETRE)
-    distance = maximum + 1 if m.range == math.inf else 0 if m.range == -math.inf else round(m.range / CENTIMETRE)
-    return mavlink.MAVLink_distance_sensor_message(
-        v.boot_ms,
-        minimum,
-        maximum,
-        distance,
-        mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND,
-        0,
-        mavlink.MAV_SENSOR_ROTATION_PITCH_270,
-        saturated(m.variance / CENTIMETRE**2, 8, unsigned=True),
-        m.field_of_view,
-        m.field_of_view,
-        [0.0] * 4,
-    )
+    return mavlink.MAVLink_scaled_pressure_message(v.boot_ms, pressure, 0.0, round(1e2 * v.description.air_temperature))
 
 
 @stream("GPS_RAW_INT", 5.0)
@@ -120,22 +101,25 @@ def gps_raw(v: VehicleView) -> Any:
         )
     east, north, _ = moving.twist.twist.linear
     spread = math.sqrt(fix.position_covariance[0]), math.sqrt(fix.position_covariance[8])
-    return _fix(v, (fix.latitude, fix.longitude, fix.altitude), (north, east), spread, moving.twist.covariance[0])
+    place = (fix.latitude, fix.longitude, fix.altitude)
+    return _fix(v, FIX_TYPES[fix.status.status], place, (north, east), spread, moving.twist.covariance[0])
 
 
 def _estimated(v: VehicleView) -> Any:
     if (m := v.estimate) is None:
         return None
-    return _fix(v, m.geodetic, m.velocity_ned[:2], (0.0, 0.0), 0.0)
+    return _fix(v, mavlink.GPS_FIX_TYPE_3D_FIX, m.geodetic, m.velocity_ned[:2], (0.0, 0.0), 0.0)
 
 
-def _fix(v: VehicleView, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float) -> Any:
+def _fix(
+    v: VehicleView, fix_type: int, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float
+) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
     height = saturated(altitude * 1e3, 32)
     return mavlink.MAVLink_gps_raw_int_message(
         v.boot_us,
-        mavlink.GPS_FIX_TYPE_RTK_FIXED,
+        fix_type,
         saturated(latitude * 1e7, 32),
         saturated(longitude * 1e7, 32),
         height,

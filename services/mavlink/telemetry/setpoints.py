@@ -5,7 +5,7 @@ from typing import Any
 
 from dynamics.vector import Vec3
 from messages.topics import ACTUATORS, SETPOINT
-from services.mavlink.coordinates import from_world
+from services.mavlink.coordinates import from_world, to_local
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
 from services.mavlink.telemetry.power import motor_fractions
@@ -25,7 +25,7 @@ def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
     position = tuple(setpoint.position)
     velocity, acceleration = swap_world(tuple(setpoint.velocity)), swap_world(tuple(setpoint.acceleration))
     turn = swap_yaw(setpoint.yaw), -setpoint.yaw_rate
-    given = (*swap_world(position), *velocity, *acceleration)
+    given = (position[1], position[0], position[2], *velocity, *acceleration)
     mask = sum(1 << k for k, value in enumerate(given) if not math.isfinite(value))
     mask |= sum(1 << _YAW_BIT + k for k, value in enumerate(turn) if not math.isfinite(value))
     return mask, position, (*velocity, *acceleration, *turn)
@@ -39,7 +39,7 @@ def local_target(v: VehicleView) -> Any:
         return None
     mask, position, rest = _kinematics(setpoint)
     return mavlink.MAVLink_position_target_local_ned_message(
-        v.boot_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *swap_world(position), *rest
+        v.boot_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *to_local(v.description.standing_height, position), *rest
     )
 
 

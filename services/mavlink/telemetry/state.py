@@ -8,6 +8,8 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.telemetry.power import power
 from services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
 from services.mavlink.telemetry.stream import stream
+from services.mavlink.telemetry.surroundings import good_airspeed, good_distance, good_flow
+from services.mavlink.vehicle_type import vehicle_type
 from services.mavlink.view import VehicleView
 
 NONE = 0xFFFF  # no item of a mission
@@ -29,6 +31,11 @@ _SENSORS = {
     mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: good_baro,
     mavlink.MAV_SYS_STATUS_SENSOR_GPS: good_gps,
 }
+_OPTIONAL = {  # by the sensors that they stand for, and only where one of them is fitted
+    ("sonar", "rangefinder"): (mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION, good_distance),  # PX4's for any distance
+    ("optical_flow",): (mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW, good_flow),
+    ("airspeed",): (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, good_airspeed),
+}
 
 
 @stream("HEARTBEAT", 1.0)
@@ -43,10 +50,12 @@ def heartbeat(v: VehicleView) -> Any:
     else:
         base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
     state = mavlink.MAV_STATE_ACTIVE if s.armed else mavlink.MAV_STATE_STANDBY
+    if v.get(ESTIMATE) is None:
+        state = mavlink.MAV_STATE_BOOT
     if s.failsafe:
         state = mavlink.MAV_STATE_CRITICAL
     return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_QUADROTOR, v.flavour.AUTOPILOT, base, v.flavour.mode_number(s.mode), state, 3
+        vehicle_type(len(v.description.rotors)), v.flavour.AUTOPILOT, base, v.flavour.mode_number(s.mode), state, 3
     )
 
 
@@ -66,6 +75,10 @@ def sys_status(v: VehicleView) -> Any:
     sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
     for bits, good in _SENSORS.items():
         sound |= bits if (good(v) if v.description.sensors else healthy(v)) else 0
+    for sensors, (bit, good) in _OPTIONAL.items():
+        if set(sensors) & set(v.description.sensors):
+            present |= bit
+            sound |= bit if good(v) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
     sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from services.mavlink.dialect import id_of
 from services.mavlink.view import VehicleView
 
-Builder = Callable[[VehicleView], Any]  # the message, or None while there is nothing to say
+Builder = Callable[[VehicleView], Any]  # the message, None while there is nothing to say, or a list of several
 
 
 class Stream(NamedTuple):
@@ -16,6 +16,13 @@ class Stream(NamedTuple):
     ground: float  # [Hz] to a ground station, as PX4 sends it there
     onboard: float  # [Hz] to a companion computer
     build: Builder
+
+    def messages(self, vehicle: VehicleView) -> list[Any]:
+        """What there is to say now."""
+        found = self.build(vehicle)
+        if found is None:
+            return []
+        return found if isinstance(found, list) else [found]
 
 
 STREAMS: dict[int, Stream] = {}

@@ -7,7 +7,7 @@ from numba import types
 
 from cosim.part import Received
 from dynamics.generate import implements
-from dynamics.integrators import march
+from dynamics.integrators import Controlled, march, march_controlled
 from dynamics.kernel import ByClass, leaf
 from dynamics.tree import finite
 from services.plant.cores.ending import signal
@@ -17,7 +17,7 @@ class AutonomousPlant(NamedTuple):
     """The system and how it is integrated."""
 
     system: Any  # parameters, a class of dynamics.integrators.RATES
-    method: Any  # `Method()` of an integrator
+    method: Any  # `Method()` of an integrator, or one whose error is `Controlled`
     steps: int  # of a tick
     step: float  # [s]
     interval: float  # [s] a tick
@@ -39,10 +39,21 @@ def _told(p: types.Type, t: types.Type, x: types.Type) -> Callable:
     return lambda p, t, x: found(p, t, x)
 
 
+def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_marched, inline=True)
+def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
+    if getattr(method, "instance_class", None) is Controlled:
+        return lambda method, p, t, x: march_controlled(method, p.system, t, x, p.step, t + p.interval)
+    return lambda method, p, t, x: march(method, p.system, t, x, p.step, p.steps)
+
+
 @leaf
 def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
     """March to `tick`; at tick 0 leave the system where it is."""
     x = s
     if tick > 0:
-        x = march(p.method, p.system, (tick - 1) * p.interval, x, p.step, p.steps)
+        x = _marched(p.method, p, (tick - 1) * p.interval, x)
     return x, told(p.system, tick * p.interval, x), signal(tick, p.last, finite(x))

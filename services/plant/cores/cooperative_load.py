@@ -51,7 +51,7 @@ def step(
     if tick > 0:
         x = march(p.method, g, (tick - 1) * p.interval, x, p.step, p.steps)
     truth = TrueState(
-        x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False
+        x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO
     )
     nothing = each_index(_zero, x.link, x.link)
     bodies = BodyMotions(

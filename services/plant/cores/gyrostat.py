@@ -11,7 +11,7 @@ from services.plant.cores.autonomous import TOLD
 @leaf
 def told(p: GyrostatParameters, t: float, x: RigidBody) -> tuple[TrueState]:
     """The attitude and its rate."""
-    return (TrueState(ZERO, x.attitude, ZERO, x.omega_body, ZERO, (), (), (), (), (), (), ZERO, 0.0, False),)
+    return (TrueState(ZERO, x.attitude, ZERO, x.omega_body, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO),)
 
 
 TOLD[GyrostatParameters] = told

@@ -54,8 +54,8 @@ def step(
     truth = TrueState(
         motion.position_world, motion.attitude, motion.velocity_world, motion.omega_body, o.acceleration_world,
         motion.rotor_speed, o.motor_voltage, o.motor_current, o.motor_power, o.thrust, o.torque,
-        o.wind_world, o.air_density, o.in_contact,
+        o.wind_world, o.air_density, o.in_contact, o.angular_acceleration_body,
     )  # fmt: skip
-    gauge = BatteryGauge(o.battery[0], o.battery[1], o.battery[2])
+    gauge = BatteryGauge(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
     sound = finite(vehicle.motion)
     return MultirotorPlantState(vehicle, last), (truth, gauge), signal(tick, last, sound)

@@ -18,7 +18,7 @@ def told(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
             x.position_world, x.attitude, x.velocity_world, x.omega_body, rate(p, t, x).velocity_world,
             x.rotor_speed, (), (), (),
             (k * a * a, k * b * b, k * c * c, k * d * d), (m * a * a, m * b * b, m * c * c, m * d * d),
-            ZERO, 0.0, False,
+            ZERO, 0.0, False, ZERO,
         ),
     )  # fmt: skip
 

@@ -12,7 +12,21 @@ def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState
     """The pack's motion."""
     return (
         TrueState(
-            x.position_world, x.attitude, x.velocity_world, x.omega_body, ZERO, (), (), (), (), (), (), ZERO, 0.0, False
+            x.position_world,
+            x.attitude,
+            x.velocity_world,
+            x.omega_body,
+            ZERO,
+            (),
+            (),
+            (),
+            (),
+            (),
+            (),
+            ZERO,
+            0.0,
+            False,
+            ZERO,
         ),
     )
 

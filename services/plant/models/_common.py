@@ -65,7 +65,13 @@ def can_have(scene: Scene, *tables: str) -> None:
 
 
 def autonomous(
-    scene: Scene, p: Any, start: Any, told: TrueState, bodies: Any = None, names: tuple[str, ...] = ()
+    scene: Scene,
+    p: Any,
+    start: Any,
+    told: TrueState,
+    bodies: Any = None,
+    names: tuple[str, ...] = (),
+    controlled: bool = False,
 ) -> ServiceSetup:
     """A plant that nobody commands.
 
@@ -76,8 +82,12 @@ def autonomous(
         told: the shape of what is told of it.
         bodies: parameters of the part that tells of single bodies, None without it.
         names: the bodies.
+        controlled: whether the error of every step is controlled, for systems with contacts.
     """
-    core = AutonomousPlant(p, *method(scene), scene[Exchange].interval, last_tick(scene))
+    how, steps, step = method(scene)
+    if controlled:
+        how = integrators.Controlled(how, scene[Solver].contact_tolerance)
+    core = AutonomousPlant(p, how, steps, step, scene[Exchange].interval, last_tick(scene))
     given = (Port(ports.TRUTH, told), *([bodies_port(scene, len(names))] if bodies else []))
     return ServiceSetup(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
 
@@ -94,6 +104,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceSetup:
     how, steps, step = method(scene)
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
     settle = round(scene[Run].settle * exchange.rate)
+    p = p._replace(tolerance=scene[Solver].contact_tolerance)
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
     start = MultirotorPlantState(at_rest(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
@@ -116,8 +127,12 @@ def check_system(scene: Scene, p: Any, start: Any) -> None:
         check_start(p, start)
     except ValueError as error:
         raise KeyedError(model, str(error)) from None
-    name = scene[Solver].integrator
-    required = getattr(integrators.get(name), "REQUIRES", start._fields)
-    if tuple(required) != start._fields:
-        has = ", ".join(start._fields)
-        raise KeyedError("solver.integrator", f"{name} is for states of {', '.join(required)}; {model} has {has}")
+    check_integrator(scene, p, start)
+
+
+def check_integrator(scene: Scene, p: Any, start: Any) -> None:
+    """KeyedError of `solver.integrator` if it is not for a system with parameters p and such states."""
+    name, model = scene[Solver].integrator, scene[Vehicle].model
+    if why := integrators.unfit(name, p, start):
+        others = ", ".join(integrators.fitting(p, start))
+        raise KeyedError("solver.integrator", f"{name} does not fit the model {model}: {why}", f"one of {others}")

@@ -7,15 +7,17 @@ from cosim.scene import Scene
 from cosim.setup import ServiceSetup
 from dynamics.vehicles import multirotor
 from services.common.vehicle import active, airframe
-from services.plant.models._common import multirotor_plant, needs
+from services.plant.models._common import check_integrator, multirotor_plant, needs
 
 
 def check(scene: Scene) -> None:
-    """The airframe's file is there and sound, and somebody flies it."""
+    """The airframe's file is there and sound, somebody flies it, and the integrator is for such a state."""
     airframe(scene)
     needs(scene, "autopilot")
     if not scene.lookup("autopilot.operator"):
         needs(scene, "trajectory")
+    p = multirotor.parameters(airframe(scene))
+    check_integrator(scene, p, multirotor.initial_state(p).motion)
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:

@@ -80,7 +80,7 @@ def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the crate."""
     p, start = system(scene)
     view = UnloadingView(p, scene[Exchange].interval)
-    return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES)
+    return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES, controlled=True)
 
 
 def _surface(friction: Pair) -> Surface:

@@ -30,6 +30,11 @@ class HeavyTopParameters(NamedTuple):
     arm_body: Vec3  # [m] from the pivot to the centre of mass
     weight_world: Vec3  # [N]
 
+    @property
+    def torque_without_rate(self) -> bool:
+        """That of the weight is one of attitude."""
+        return True
+
 
 @leaf
 def rate(p: HeavyTopParameters, t: float, x: RigidBody) -> RigidBody:

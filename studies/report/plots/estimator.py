@@ -3,7 +3,6 @@
 from collections import Counter
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from studies.flight import Flight
 from studies.report.plot import Band, Line, NotRecordedError, Panel, Plot
@@ -52,6 +51,8 @@ def deviations(estimate: TopicView) -> np.ndarray:
 
 def errors(flight: Flight) -> np.ndarray:
     """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
+    from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
+
     stamps, wanted = flight.truth.stamps, flight.estimate.stamps
     later = np.searchsorted(stamps, wanted).clip(1, len(stamps) - 1)
     nearer = stamps[later] - wanted > wanted - stamps[later - 1]

@@ -11,6 +11,8 @@ ORDER = 0
 TITLE = "Timeline"
 NEEDS = ("truth", "status")
 BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
+MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events that have no lane of their own
+WIDTH = 0.004  # of the whole time, of an instant
 
 
 def draw(flight: Flight) -> Plot:
@@ -27,6 +29,7 @@ def draw(flight: Flight) -> Plot:
         "motor failed": (runs(t, failed), BOUND),
         "battery": (runs(t, warning), BOUND),
         "said": (runs(t, status.text), COLOURS[3]),
+        **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
     }
     found = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
     bars = tuple(Stretch(lane, s, e, text, colour) for lane, (some, colour) in found.items() for text, s, e in some)
@@ -43,3 +46,9 @@ def draw(flight: Flight) -> Plot:
 
 def _where(flags: np.ndarray, text: str) -> np.ndarray:
     return np.where(flags, text, "")
+
+
+def _instants(flight: Flight, kind: str) -> list[tuple[str, float, float]]:
+    """Events of a kind as stretches that are just wide enough to be seen."""
+    first, last = over(flight)["span"]
+    return [(e.text, e.time, min(last, e.time + WIDTH * (last - first))) for e in flight.events if e.kind == kind]

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from studies.flight import Flight
 from studies.report.plot import Line, Panel, Plot
@@ -89,4 +88,6 @@ def _matrix(degrees: float) -> np.ndarray:
 
 def _pitch(xyzw: np.ndarray) -> np.ndarray:
     """Angle about y [degrees] of attitudes that only turn about y, nearly."""
+    from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
+
     return np.degrees(Rotation.from_quat(xyzw).as_rotvec()[:, 1])

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from cosim.errors import LockStepError
 from cosim.graph import NEVER, Graph, Service
-from cosim.schedule import LockStepError, Port
+from cosim.schedule import Port
 from dynamics.integrators import check_start
 from dynamics.tree import flatten, unflatten
 from dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody

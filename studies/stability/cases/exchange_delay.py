@@ -7,9 +7,9 @@ from cosim.schedule import Input
 from cosim.setup import Setup
 from messages.topics import TRUTH
 from services.autopilot.gains import GainSet
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
 from services.autopilot.margins import open_loops, stable
-from services.autopilot.resolve import known_airframe
 from services.common.exchange import Exchange
 from services.table import load, resolve
 from studies.flight import Flight

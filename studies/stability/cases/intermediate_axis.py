@@ -42,7 +42,11 @@ def closed_form(epsilon: float, t: np.ndarray) -> np.ndarray:
 
 def figures(method: str, epsilon: float, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(largest difference to the closed form up to each sample, drift of the energy, of the momentum), (k,) each."""
-    y = marched(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES)
+    return compared(marched(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES), epsilon)
+
+
+def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`figures` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     off = np.abs(y[:, 9:12] - closed_form(epsilon, t)).max(axis=1)
     energy = drift(0.5 * (y[:, 9:12] ** 2 * INERTIA).sum(axis=1))

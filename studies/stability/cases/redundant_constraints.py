@@ -83,17 +83,22 @@ def off_by(size: float) -> tuple[float, float]:
     return found[0], found[1]
 
 
+def tips(t: np.ndarray, n: int) -> np.ndarray:
+    """Where the first crank's tip of n four-bars is at times t [s], from one equation of motion [m], shape (k, 3)."""
+    inertia, weight = (n + 1) * (1.0 / 12.0 + 0.25) + n, GRAVITY * ((n + 1) * 0.5 + n)
+    theta = solve_ivp(
+        lambda t, y: [y[1], weight / inertia * math.sin(y[0])],
+        (0.0, END), [0.0, 1.0], "DOP853", t, rtol=1e-13, atol=1e-13,
+    ).y[0]  # fmt: skip
+    return np.column_stack([np.sin(theta), np.cos(theta), 0.0 * theta])
+
+
 def singular_position() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(times, error of the first crank's tip [m], the same by the naive way) of two four-bars that turn over."""
     n = 2
     system, q, v = four_bars(n)
     motion = simulate(system, q, v, END / STEPS, STEPS, record_every=LOOKS)
-    inertia, weight = (n + 1) * (1.0 / 12.0 + 0.25) + n, GRAVITY * ((n + 1) * 0.5 + n)
-    theta = solve_ivp(
-        lambda t, y: [y[1], weight / inertia * math.sin(y[0])],
-        (0.0, END), [0.0, 1.0], "DOP853", motion.time, rtol=1e-13, atol=1e-13,
-    ).y[0]  # fmt: skip
-    tip = np.column_stack([np.sin(theta), np.cos(theta), 0.0 * theta])
+    tip = tips(motion.time, n)
     off = np.abs(2.0 * motion.configuration[:, 0, :3] - tip).max(axis=1)
     naive = simulate(system, q, v, END / STEPS, STEPS, "none", record_every=LOOKS)
     return motion.time, off, np.abs(2.0 * naive.configuration[:, 0, :3] - tip).max(axis=1)

@@ -70,7 +70,7 @@ def one_foot() -> float:
 
 def bumps() -> float:
     """Distance [m] that it moves in a minute on bumps of 2 cm, once it has come to rest."""
-    p, state = standing(0.1, 0.0, bump_height=0.02, bump_length=0.7)
+    p, state = standing(0.1, 0.0, ground={"bump_height": 0.02, "bump_length": 0.7})
     state = run_on(p, state, 3.0)
     later = run_on(p, state, 60.0).motion
     return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))

@@ -33,7 +33,7 @@ def situation():
 
         motion = Motion(vector(position), attitude, vector(velocity), vector(omega), vector(speed))
         R = tuple(map(float, rotation.as_matrix().ravel()))
-        return Situation(float(t), motion, R, p.body, p.layout, Air(float(density), vector(wind)))
+        return Situation(float(t), motion, R, p.body, p.layout, Air(float(density), vector(wind)), (0.0,) * 3)
 
     return build
 
@@ -43,6 +43,8 @@ def rotors():
     """Build Rotors with given loads, accelerations, currents and voltages; the same for all four."""
 
     def build(thrust=25.0, torque=1.0, acceleration=(0.0,) * 4, current=10.0, voltage=32.0):
-        return Rotors((thrust,) * 4, (torque,) * 4, tuple(acceleration), (current,) * 4, (voltage,) * 4)
+        return Rotors(
+            (thrust,) * 4, (torque,) * 4, tuple(acceleration), (current,) * 4, (voltage,) * 4, (current * voltage,) * 4
+        )
 
     return build

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from dynamics import effects
 from dynamics.effects.rotor_inflow import rotor_inflow
 from dynamics.effects.rotor_thrust import rotor_thrust
+from dynamics.vehicles import multirotor
 
 
 def both(drone, s):
@@ -55,3 +56,24 @@ def test_only_the_axial_air_speed_counts(drone, situation):
 def test_a_rotor_at_rest_has_no_loads(drone, situation):
     _, total = both(drone, situation(velocity=(0, 0, -3), speed=(0, 0, 0, 0)))
     assert total == ((0.0,) * 4, (0.0,) * 4)
+
+
+def test_rolling_and_pitching_are_damped_by_each_hubs_own_speed(drone, situation):
+    """Each rotor at (x, y) in pure turning gets the loads of a climb at omega_x y - omega_y x."""
+    omega = (0.4, -0.3, 0.8)
+    _, turning = both(drone, situation(omega=omega))
+    for k, (x, y, _) in enumerate(drone.rotors.position):
+        _, climbing = both(drone, situation(velocity=(0.0, 0.0, omega[0] * y - omega[1] * x)))
+        assert turning.thrust[k] == pytest.approx(climbing.thrust[k])
+        assert turning.torque[k] == pytest.approx(climbing.torque[k])
+
+
+def test_the_damping_of_roll_is_the_slope_of_thrust_over_the_inertia(drone):
+    tables = {"rotor_thrust": {}, "rotor_inflow": {}}
+    p = multirotor.parameters(drone, effects.from_scene(tables, drone))
+    state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=335.0, omega_body=(0.1, 0.0, 0.0))
+    found = multirotor.observe(p, 0, 0.004, state, (32.0,) * 4).angular_acceleration_body[0] / -0.1
+    inflow = p.effects[0]
+    slope = inflow.thrust_constant * multirotor.STANDARD_DENSITY * 335.0 * inflow.turn_per_metre  # [N s/m] of a rotor
+    assert found == pytest.approx(slope * sum(y * y for _, y, _ in drone.rotors.position) / drone.mass.inertia[0])
+    assert found == pytest.approx(4.5, abs=0.2)

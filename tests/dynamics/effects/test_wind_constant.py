@@ -1,6 +1,30 @@
+"""The same wind everywhere, and who feels it."""
+
+import pytest
+
+from dynamics import effects
 from dynamics.effects.wind_constant import WindConstant, wind_constant
+from dynamics.vehicles import multirotor
 
 
 def test_adds_to_the_wind(situation):
     s = situation(wind=(1, 0, 0), density=1.1)
     assert wind_constant.py_func(WindConstant((2.0, -1.0, 0.5)), (), s, s.air) == (1.1, (3.0, -1.0, 0.5))
+
+
+def test_every_aerodynamic_effect_feels_the_motion_of_the_air(drone):
+    """At rest in a wind is flying against it in still air, for drag, H-force and inflow (Galileo)."""
+    tables = {"rotor_thrust": {}, "rotor_inflow": {}, "body_drag": {}, "h_force": {}}
+    wind = (4.0, -2.0, 1.0)
+    still = multirotor.parameters(drone, effects.from_scene(tables, drone))
+    windy = multirotor.parameters(drone, effects.from_scene({**tables, "wind_constant": {"velocity": wind}}, drone))
+    start = {"position_world": (0.0, 0.0, 20.0), "rotor_speed": 330.0, "omega_body": (0.5, -0.3, 0.2)}
+    against = tuple(-v for v in wind)
+    one = multirotor.observe(windy, 0, 0.004, multirotor.initial_state(windy, **start), (32.0,) * 4)
+    other = multirotor.observe(
+        still, 0, 0.004, multirotor.initial_state(still, **start, velocity_world=against), (32.0,) * 4
+    )
+    assert one.acceleration_world == pytest.approx(other.acceleration_world, abs=1e-12)
+    assert one.angular_acceleration_body == pytest.approx(other.angular_acceleration_body, abs=1e-11)
+    assert one.motor_power == pytest.approx(other.motor_power)
+    assert one.acceleration_world[0] > 0.1

@@ -1,14 +1,23 @@
 import numpy as np
 import pytest
+from scipy.signal import welch
 
-from dynamics.effects.wind_random import WindRandom, draw, told, wind_random
+from dynamics import effects
+from dynamics.effects.wind_random import draw, told, wind_random
+from dynamics.kernel import kernel
 from dynamics.noise import stream_key
 
+WIND = {"mean": [3.0, 1.0, 0.0], "sigma": 0.7}
 KEY = stream_key(3, "drone1", "effects")
 
 
-def test_force_of_a_steady_wind_is_the_source_formula(situation, rotors):
-    e = WindRandom((3.0, 1.0, 0.0), 0.0)
+def make(drone, **table):
+    (e,) = effects.from_scene({"wind_random": {**WIND, **table}}, drone)
+    return e
+
+
+def test_force_of_a_steady_wind_is_the_source_formula(drone, situation, rotors):
+    e = make(drone, sigma=0.0)
     s = situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 0, 0.004)
     force, torque = wind_random.py_func(e, memory, s, rotors())
@@ -16,9 +25,9 @@ def test_force_of_a_steady_wind_is_the_source_formula(situation, rotors):
     assert torque == (0.0, 0.0, 0.0)
 
 
-def test_draws_have_mean_and_deviation(situation, rotors):
+def test_draws_have_mean_and_deviation(drone, situation, rotors):
     """The wind's draws, got back from the force: F = k |v| v."""
-    e, s = WindRandom((3.0, 1.0, 0.0), 0.7), situation()
+    e, s = make(drone), situation()
     forces = np.array([draw.py_func(e, (), s, rotors(), KEY, tick, 0.004)[0] for tick in range(2000)])
     size = np.linalg.norm(forces, axis=1, keepdims=True)
     wind = forces / np.sqrt(size * 0.5 * 0.06 * 1.22)
@@ -26,19 +35,58 @@ def test_draws_have_mean_and_deviation(situation, rotors):
     assert wind.std(axis=0) == pytest.approx((0.7,) * 3, rel=0.07)
 
 
-def test_depends_on_tick_and_key_only(situation, rotors):
-    e, s = WindRandom(), situation()
+def test_depends_on_tick_and_key_only(drone, situation, rotors):
+    e, s = make(drone), situation()
     other = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     one = draw.py_func(e, other, s, rotors(), KEY, 7, 0.004)
-    assert one == draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 7, 0.01)
+    assert one == draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 7, 0.004)
     assert one != draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 8, 0.004)
     assert one != draw.py_func(e, e.initial_memory(), s, rotors(), stream_key(4, "drone1", "effects"), 7, 0.004)
 
 
-def test_the_wind_that_makes_the_force_is_told(situation, rotors):
+def test_the_wind_that_makes_the_force_is_told(drone, situation, rotors):
     """The truth's wind: 0 before, though the vehicle was blown about."""
-    e, s = WindRandom((3.0, 1.0, 0.0), 0.7), situation(velocity=(1, 1, 0))
+    e, s = make(drone), situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 5, 0.004)
     wind = np.array(told.py_func(e, memory, (0.5, 0.0, 0.0))) - (0.5, 0.0, 0.0)
     past = wind - (1.0, 1.0, 0.0)
     assert memory[0] == pytest.approx(0.5 * 0.06 * 1.22 * np.linalg.norm(past) * past)
+
+
+@kernel
+def series(e, s, rotors, key, interval, out):
+    for tick in range(out.shape[0]):
+        force, wind = draw(e, (), s, rotors, key, tick, interval)
+        out[tick, 0], out[tick, 1] = force[0], wind[0]
+
+
+def test_the_spectrum_does_not_depend_on_the_exchange_interval(drone, situation, rotors):
+    """sigma^2 T, two-sided, below the frequency of the draws, for wind and (linearised about the mean) for force."""
+    e, densities, means = make(drone), [], []
+    for interval in (0.001, 0.004, 0.01, 0.02):
+        out = np.empty((round(800.0 / interval), 2))
+        series(e, situation(), rotors(), KEY, interval, out)
+        frequency, power = welch(out, fs=1 / interval, nperseg=round(4.0 / interval), axis=0)
+        densities.append(power[(frequency > 0.5) & (frequency < 10.0)].mean(axis=0) / 2)
+        means.append(out[:, 0].mean())
+    assert np.array(densities)[:, 1] == pytest.approx([0.7**2 * 0.004] * 4, rel=0.05)
+    assert np.array(densities)[:, 0] == pytest.approx([densities[1][0]] * 4, rel=0.05)
+    assert means == pytest.approx([means[1]] * 4, rel=0.01)
+
+
+def test_a_draw_is_shared_by_the_exchanges_within_it_and_averaged_over_long_ones(drone, situation, rotors):
+    e, s = make(drone), situation()
+
+    def at(tick, interval):
+        return np.array(draw.py_func(e, e.initial_memory(), s, rotors(), KEY, tick, interval))
+
+    assert (at(28, 0.001) == at(7, 0.004)).all()
+    assert (at(31, 0.001) == at(7, 0.004)).all()
+    assert (at(32, 0.001) == at(8, 0.004)).all()
+    assert at(1, 0.01) == pytest.approx((at(2, 0.004) / 2 + at(3, 0.004) + at(4, 0.004)) / 2.5)
+
+
+def test_drag_is_not_counted_twice(drone):
+    with pytest.raises(ValueError, match=r"^effects.wind_random: is drag already.*beside_drag = true"):
+        effects.from_scene({"wind_random": {}, "body_drag": {}}, drone)
+    assert len(effects.from_scene({"wind_random": {"beside_drag": True}, "body_drag": {}}, drone)) == 2

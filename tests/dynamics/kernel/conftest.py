@@ -75,6 +75,27 @@ def times(n):
         return n * inner(x)
     return product
 """,
+    "plant/large.py": """
+from dynamics.kernel import apart, kernel
+
+@apart
+def large(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x * x
+
+@kernel
+def middle(x):
+    return large(x) + large(2.0 * x)
+""",
+    "plant/outermost.py": """
+from dynamics.kernel import kernel
+from plant.large import middle
+
+@kernel
+def outermost(x):
+    return middle(x) + 1.0
+""",
     "run.py": """
 import json, sys
 from dynamics.kernel import on_compile, statistics

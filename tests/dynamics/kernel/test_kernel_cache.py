@@ -1,5 +1,6 @@
 """What is kept of compiled kernels: found again, never stale, never trusted when damaged, nobody else's business."""
 
+import os
 import shutil
 import stat
 
@@ -53,6 +54,22 @@ def test_an_edit_of_what_a_kernel_cannot_reach_compiles_nothing(package):
     package.edit("plant/law.py", "10.0", "20.0")
     package.edit("plant/factory.py", "n * inner", "n + inner")
     assert package.run(OUTER)["compiled"] == 0
+
+
+def test_what_comes_from_the_disk_brings_the_functions_apart_that_it_calls(package):
+    run = """
+from plant.outermost import outermost
+try:
+    outermost(-1.0)
+except ValueError as error:
+    values["refused"] = str(error)
+values["outermost"] = outermost(3.0)
+"""
+    assert package.run(run)["values"] == {"refused": "below zero", "outermost": 46.0}
+    package.edit("plant/outermost.py", "1.0", "2.0")
+    edited = package.run(run)
+    assert edited["values"] == {"refused": "below zero", "outermost": 47.0}
+    assert edited["compiling"] == ["plant.outermost.outermost"]
 
 
 def test_a_constant_set_from_outside_counts_as_an_edit(package):
@@ -134,6 +151,19 @@ def test_others_cannot_read_or_write_it(package):
     assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
 
 
+def test_what_others_could_have_written_is_not_run(package):
+    package.run(ALL)
+    for path in files(package):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        path.chmod(0o666)
+    assert package.run(ALL)["loaded"] == 0
+    assert package.run(ALL)["compiled"] == 0  # by files of its own
+    if os.geteuid() == 0:
+        for path in files(package):
+            os.chown(path, 1, 1)
+        assert package.run(ALL)["loaded"] == 0
+
+
 def test_only_the_last_versions_are_kept(package):
     for gain in range(7):
         package.edit("plant/constants.py", f"GAIN = {2 + gain}.0", f"GAIN = {3 + gain}.0")
@@ -154,12 +184,12 @@ def test_numbas_own_cache_is_left_alone(package):
 
 
 def test_what_a_script_defines_itself_is_compiled_each_time(package):
-    inside = "from dynamics.kernel import kernel; from dynamics.cell import Cell, read; from typing import NamedTuple\n"
-    inside += "class Here(NamedTuple):\n    x: float\n\n@kernel\ndef here(x):\n    return x * 2.0\n"
-    inside += "values['here'] = [here(2.0), read(Cell(Here(5.0))).x]"
+    inside = "from dynamics.kernel import kernel; from typing import NamedTuple\n"
+    inside += "class Here(NamedTuple):\n    x: float\n\n@kernel\ndef here(x):\n    return x.x * 2.0\n"
+    inside += "values['here'] = here(Here(2.0))"
     first, second = package.run(inside), package.run(inside)
-    assert first["values"] == second["values"] == {"here": [4.0, 5.0]}
-    assert second["compiled"] == first["compiled"] == 3
+    assert first["values"] == second["values"] == {"here": 4.0}
+    assert second["compiled"] == first["compiled"] == 1
 
 
 def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_factory):

@@ -22,7 +22,7 @@ def test_the_delivery_drone_loads():
         (
             "total = 10.0224",
             "weight = 1.0",
-            "mass.weight: unknown key 'weight'; expected one of inertia, ",
+            "mass.weight: unknown key 'weight'; expected one of centre, inertia, ",
         ),
         ("blades = 2 ", 'blades = "two" ', "propeller.blades"),
         ("[0.27, 0.26, 0.42]", "[0.1, 0.1, 0.42]", "triangle"),

@@ -14,6 +14,8 @@ from dynamics.vehicles.airframe import load_airframe
 from dynamics.vehicles.multirotor import MultirotorDrive
 from dynamics.vehicles.multirotor_multibody import BECOMES
 
+pytestmark = pytest.mark.long
+
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 VOLTS, SPEED = (25.0, 27.0, 24.0, 28.0), 200.0

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dynamics.integrators import get, march, rate
+from dynamics.integrators import Controlled, get, march, march_controlled, rate
 from dynamics.lie.quaternion import Quaternion, exp
 from dynamics.tree import retract, scale
 from dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
@@ -102,8 +102,11 @@ def test_a_fall_bounces_lower_every_time():
 
 
 def test_the_whole_unloading_converges_and_the_door_shuts():
-    coarse, fine = (run(P, initial_state(P), 4.5, h=h) for h in (H, H / 2))
-    assert fine.position_world == pytest.approx(coarse.position_world, abs=2e-3)
+    coarse, fine = (
+        march_controlled(Controlled(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)
+        for tolerance, step in ((1e-5, 1e-3), (1e-8, 2.5e-4))
+    )
+    assert coarse.position_world == pytest.approx(fine.position_world, abs=1e-5)
     x, _, z = coarse.position_world
     assert x > 0.2  # out of the crate
     assert z < 0.16  # and down

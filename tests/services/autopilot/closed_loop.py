@@ -10,7 +10,7 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract,
 from dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
 from services.autopilot.attitude import wrap
 from services.autopilot.control import START, step
-from services.autopilot.interface import Estimate, Four, Setpoint
+from services.autopilot.interface import Estimate, PerRotor, Setpoint
 from services.autopilot.law import Airframe
 from services.autopilot.motor import RPM, Motor
 from services.autopilot.stage import LANDED
@@ -75,7 +75,7 @@ class Body(NamedTuple):
     attitude: Quaternion
     velocity_world: Vec3
     omega_body: Vec3
-    speed: Four  # of the propellers [rad/s]
+    speed: PerRotor  # of the propellers [rad/s]
 
 
 @kernel
@@ -132,7 +132,7 @@ def fly(p, trajectory, plant, white, noise):
             add(b.velocity_world, (noise[1] * e[6], noise[1] * e[7], noise[1] * e[8])),
             add(b.omega_body, (noise[3] * e[12], noise[3] * e[13], noise[3] * e[14])),
         )
-        s, u = step(p, s, TICK, estimate, setpoint)
+        s, u = step(p, s, TICK, estimate, setpoint, 0)
         angles = to_roll_pitch_yaw(b.attitude)
         for k in range(3):
             log[i, 1 + k] = b.position_world[k]

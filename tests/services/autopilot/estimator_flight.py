@@ -5,10 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home
+from dynamics.environment import STANDARD
 from dynamics.kernel import kernel, leaf
 from dynamics.lie import quaternion
 from dynamics.noise import TURN_ON, normal3, stream_key
+from dynamics.terrain import LEVEL
 from dynamics.vector import cross, norm, scale
 from services.autopilot import estimator
 from services.sensors import barometer, gps, imu, magnetometer, sonar
@@ -20,7 +21,7 @@ from services.sensors.truth import Truth
 INTERVAL = 0.004  # [s]
 STAND = 3.0  # [s] on the ground first
 REST = 0.35  # [m] height of the body's origin on the ground
-HOME = Home()
+HOME, AIR, FIELD = STANDARD.home, STANDARD.atmosphere, STANDARD.magnetic_field_world
 THETA, V, P = slice(0, 3), slice(3, 6), slice(6, 9)  # columns of the error: rotation vector, velocity, position
 NIS, HEALTH, REJECTED, COVARIANCE = 9, 15, 16, 17
 COLUMNS = COVARIANCE + 81
@@ -74,8 +75,16 @@ def truth_at(t, agility):
         REST + z[0],
         9.81,
         HOME,
-        15.0,
-        MAGNETIC_FIELD_WORLD,
+        AIR,
+        FIELD,
+        LEVEL,
+        (0.0, 0.0, 0.0),
+        0.0,
+        0.0,
+        (x[1], y[1], z[1]),
+        1.225,
+        0.0,
+        0.0,
     )
 
 

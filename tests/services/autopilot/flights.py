@@ -1,6 +1,9 @@
 """Short flights on the true state with scripted commands, without wind."""
 
+import numpy as np
+
 from messages import CommandAck, MissionItem, OperatorCommand, Vector3
+from services.common.failures import UNITS
 from services.table import load
 from tests.cosim import memory_log
 
@@ -39,6 +42,31 @@ def fly(seconds, script, *overrides, operated=True):
     """The recorded flight."""
     sets = [*(OPERATED if operated else []), f"run.duration={seconds}", *overrides]
     return memory_log.fly(load(SCENE, sets), scripted(script))
+
+
+ENABLED = "autopilot.parameters.SYS_FAILURE_EN=1"
+
+
+def inject(unit, kind, motor=0, id=7):
+    """A failure of `services.common.failures`."""
+    return command("inject_failure", UNITS.index(unit), kind, motor, id=id)
+
+
+UP_BY_SENSORS = {0.04: [command("takeoff", 4.0), command("arm", NAN, 10.0)]}
+
+
+def fly_by_sensors(seconds, script, *overrides):
+    """The recorded flight of the ground station's vehicle, which climbs to 4 m; in wind, by its sensors."""
+    scene = load("groundstation", ["autopilot.trajectory=false", f"run.duration={seconds}", *overrides])
+    return memory_log.fly(scene, scripted(UP_BY_SENSORS | script))
+
+
+def error(flown, start):
+    """Largest distance [m] of the estimate from the truth from a time on."""
+    known, true = (flown.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "truth"))
+    times, true_times = flown.times("estimate"), flown.times("truth")
+    nearest = true[np.searchsorted(true_times, times).clip(0, len(true) - 1)]
+    return np.linalg.norm(known - nearest, axis=1)[times >= start].max()
 
 
 def at(flown, topic, t, value):

@@ -21,7 +21,7 @@ LOOPS = pytest.mark.parametrize("geometric", [False, True])
 def command(name, setpoint=HIGH, attitude=NO_ROTATION, yaw=0.0, geometric=False, ticks=20, omega=ZERO):
     p, s = build(load(name), AIRFRAME, geometric), START
     for _ in range(ticks):
-        s, u = step(p, s, TICK, Estimate(HIGH, attitude, ZERO, omega), Setpoint(setpoint, ZERO, ZERO, yaw, 0.0))
+        s, u = step(p, s, TICK, Estimate(HIGH, attitude, ZERO, omega), Setpoint(setpoint, ZERO, ZERO, yaw, 0.0), 0)
     return u
 
 

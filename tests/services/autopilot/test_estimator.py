@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD
+from dynamics.environment import STANDARD
 from dynamics.lie.quaternion import NO_ROTATION, exp, from_roll_pitch_yaw, multiply, rotate_back, rotation_matrix
 from dynamics.vector import ZERO
 from services.autopilot import estimator
 from services.autopilot.estimator import doubt, fuse, state
 from services.autopilot.estimator.predict import _propagate_covariance
+
+pytestmark = pytest.mark.long
 
 P = estimator.PRESETS["rtk"]
 SEEDS = 100
@@ -20,7 +22,7 @@ SEEDS = 100
 
 def at_rest(attitude=NO_ROTATION, p=P):
     force = rotate_back(attitude, (0.0, 0.0, p.gravity))
-    return estimator.initial(p, ZERO, force, rotate_back(attitude, MAGNETIC_FIELD_WORLD))
+    return estimator.initial(p, ZERO, force, rotate_back(attitude, STANDARD.magnetic_field_world))
 
 
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.1, -0.2, 2.5), (-0.4, 0.3, -1.0), (0.0, 0.0, math.pi / 2)])
@@ -111,17 +113,17 @@ def heading_innovation(attitude, iron):
     s = at_rest()
     s = s._replace(nominal=s.nominal._replace(attitude=attitude, magnetometer_bias=iron))
     s.memory.covariance[:] = np.eye(state.SIZE) * 1e-30
-    s = estimator.update_magnetometer(P._replace(gate=1e30), s, MAGNETIC_FIELD_WORLD, 1.0, True)
+    s = estimator.update_magnetometer(P._replace(gate=1e30), s, STANDARD.magnetic_field_world, 1.0, True)
     return s.memory
 
 
 def test_row_of_the_heading_against_differences():
     h = 1e-6
     row = heading_innovation(NO_ROTATION, ZERO).row.copy()
-    bx, by, _ = MAGNETIC_FIELD_WORLD
+    bx, by, _ = STANDARD.magnetic_field_world
 
     def innovation(attitude, iron):
-        f = np.array(rotation_matrix(attitude)).reshape(3, 3) @ np.subtract(MAGNETIC_FIELD_WORLD, iron)
+        f = np.array(rotation_matrix(attitude)).reshape(3, 3) @ np.subtract(STANDARD.magnetic_field_world, iron)
         return math.atan2(by, bx) - math.atan2(f[1], f[0])
 
     for i in range(3):

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD
+from dynamics.environment import STANDARD
+from dynamics.lie.quaternion import exp, multiply, rotation_matrix
 from dynamics.vector import ZERO
 from services.autopilot import estimator
-from services.autopilot.estimator import fuse, late, state
+from services.autopilot.estimator import fuse, gps, late, state
 from services.autopilot.estimator.late import Noise
 
 P = estimator.PRESETS["rtk"]
@@ -15,7 +16,7 @@ REST = (0.0, 0.0, P.gravity)
 
 
 def at_rest():
-    return estimator.initial(P, ZERO, REST, MAGNETIC_FIELD_WORLD)
+    return estimator.initial(P, ZERO, REST, STANDARD.magnetic_field_world)
 
 
 def predicted(s, ticks, force=REST):
@@ -64,11 +65,12 @@ def test_the_covariance_against_dense_matrices(share):
     m = random_memory(rng)
     m.row[:] = rng.normal(size=state.SIZE)
     before, h, variance = m.covariance.copy(), m.row.copy(), 0.02
-    since = Noise(0.8 * share, 0.3 * share, 0.2 * share)
+    since, force = Noise(0.8 * share, 0.3 * share, 0.2 * share, 0.05 * share, 0.02 * share), (7.0, 1.0, -2.0)
     block = h[[state.VELOCITY, state.POSITION]]
     now, noise = h @ before @ h, block @ np.array([[0.8, 0.3], [0.3, 0.2]]) @ block * share
+    noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0  # 1^2 + 2^2: what the attitude turns onto the axis
     part = min(noise / now, 1.0)
-    s, largest = late.late_innovation_variances(m, 0, since, variance)
+    s, largest = late.late_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
     fuse.absorb(m, 0.7, s)
@@ -81,11 +83,53 @@ def test_the_covariance_against_dense_matrices(share):
     assert np.linalg.eigvalsh(m.covariance).min() > 0.0
 
 
+def turning(s):
+    """So many ticks as a fix is late, in which the force goes from one side to the other, and to its half."""
+    for k in range(AGE):
+        a = 3.0 * k / AGE
+        force = (4.0 * np.cos(a), 4.0 * np.sin(a), 10.0 - 0.2 * k)
+        s = estimator.predict(P, s, (0.01 * k, 0.0, 0.0), force, 0.0, 1e-4, True)
+    return s
+
+
+def test_rows_of_the_past_do_not_move_with_an_attitude_that_was_wrong_all_along():
+    """Two filters at the same place then, one turned by a little: what both say of then is the same."""
+    theta = 1e-5 * np.array([1.0, -2.0, 0.5])
+    one, other = predicted(at_rest(), 100), predicted(at_rest(), 100)
+    turned = multiply(exp(tuple(theta)), other.nominal.attitude)
+    one, other = turning(one), turning(other._replace(nominal=other.nominal._replace(attitude=turned)))
+    off = np.zeros(state.SIZE)
+    off[state.THETA : state.THETA + 3] = theta
+    for at, name in ((state.VELOCITY, "velocity_world"), (state.POSITION, "position_world")):
+        off[at : at + 3] = np.subtract(getattr(other.nominal, name), getattr(one.nominal, name))
+    _, _, delay, weighted, mean = gps._past(P, one, AGE)
+    matrix = rotation_matrix(one.nominal.attitude)
+    for row, force, at in (
+        (late.late_velocity_row, mean, state.VELOCITY),
+        (late.late_position_row, weighted, state.POSITION),
+    ):
+        for axis in range(3):
+            row(one.memory, force, matrix, axis, delay)
+            assert one.memory.row @ off == pytest.approx(0.0, abs=1e-3 * np.abs(off[at : at + 3]).max())
+
+
+def test_noise_of_the_attitude_counts_by_what_it_has_left_to_do():
+    """A gyroscope's noise of the last ticks alone says little of a late fix, that of the first all."""
+    s = at_rest()
+    for k in range(AGE):
+        rate = (0.0, 0.0, 1e-9 * k)  # no two readings alike
+        s = estimator.predict(P, s, rate, REST, 1e-2 if k == 4 else 0.0, 1e-12, True)
+    since, noise = gps._noise_since(P, s, AGE), (P.interval * 0.1) ** 2
+    left = (AGE - (AGE - 1 - 4)) * P.interval  # of the delay, before the fifth tick
+    assert since.attitude_velocity == pytest.approx(noise * left**2, rel=1e-3)
+    assert since.attitude_position == pytest.approx(noise * left**4 / 4.0, rel=1e-3)
+
+
 def test_an_exact_measurement_of_the_past_leaves_just_what_came_in_since():
     m = at_rest().memory
     m.covariance[:] = np.eye(state.SIZE)
     m.row[:] = 0.0
     m.row[state.VELOCITY + 1] = 1.0
-    s, _ = late.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0), 0.0)
+    s, _ = late.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
     fuse.absorb(m, 0.3, s)
     assert m.covariance[state.VELOCITY + 1, state.VELOCITY + 1] == pytest.approx(0.25)

@@ -10,6 +10,8 @@ from flights import REJECTED, UP, at, command, fly, height, mode, place, results
 from services.table import load
 from tests.cosim import memory_log
 
+pytestmark = pytest.mark.long
+
 
 def airframe(tmp_path, capacity):
     """The delivery drone with a battery of another capacity [A s]: its file, as an override."""

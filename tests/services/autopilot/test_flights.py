@@ -24,6 +24,8 @@ from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
 from services.common.parameters import table
 from services.table import load
 
+pytestmark = pytest.mark.long
+
 
 def angles(flown, t):
     """True roll, pitch and yaw [rad] at t [s]."""
@@ -243,7 +245,7 @@ def test_gains_change_in_flight_and_act():
 def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
     sets = ["autopilot.estimator=sensors", *[f"sensors.{each}" for each in sensors]]
-    # with 3, 8, 11 and 16 the receiver was refused for 10 s when a fix of before the touch-down was believed after it
+    # with 3, 8, 11 and 16 the receiver was refused for 10 s; a fix of before the touch-down was fused as if after it
     for seed in (1, 2, 3, 8, 11, 16):
         again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}
         script = {1: UP[0.04], 7: [command("land")]} | again

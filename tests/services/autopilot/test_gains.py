@@ -43,7 +43,7 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
             load(str(tmp_path / name))
         assert name in str(error.value)
         assert message in str(error.value)
-    with pytest.raises(ValueError, match="unknown gain set 'papr'; did you mean paper\\? expected one of paper, tuned"):
+    with pytest.raises(ValueError, match=r"unknown gain set 'papr'; did you mean paper\? expected one of "):
         load("papr")
 
 

@@ -9,7 +9,7 @@ from services.autopilot.gains import load
 from services.autopilot.law import build
 from services.autopilot.mixer import Demands, mix, saturate
 
-SIGNS = build(load("paper"), AIRFRAME).signs
+SHARES = build(load("paper"), AIRFRAME).shares[0]
 TOP = 48.0
 ANY = st.floats(-100.0, 100.0)
 
@@ -28,14 +28,14 @@ def wrench(thrust):
 def test_each_demand_turns_about_its_own_axis_only(axis):
     demands = [0.0, 0.0, 0.0, 0.0]
     demands[1 + axis] = 2.0
-    force, torque = wrench(mix(SIGNS, Demands(*demands)))
+    force, torque = wrench(mix(SHARES, Demands(*demands)))
     arm = (AIRFRAME.rotor_y[0], AIRFRAME.rotor_x[0], AIRFRAME.torque_per_thrust)[axis]
     assert force == pytest.approx(0.0, abs=1e-12)
     assert torque == pytest.approx([8.0 * arm if k == axis else 0.0 for k in range(3)], abs=1e-12)
 
 
 def test_lift_turns_nothing():
-    force, torque = wrench(mix(SIGNS, Demands(3.0, 0.0, 0.0, 0.0)))
+    force, torque = wrench(mix(SHARES, Demands(3.0, 0.0, 0.0, 0.0)))
     assert force == pytest.approx((0.0, 0.0, 12.0))
     assert torque == pytest.approx(0.0, abs=1e-12)
 
@@ -44,11 +44,11 @@ def test_lift_turns_nothing():
 @settings(deadline=None)
 def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
     wanted = Demands(collective, roll, pitch, yaw)
-    given_ = saturate(SIGNS, wanted, TOP)
-    thrust = mix(SIGNS, given_)
+    given_ = saturate(SHARES, wanted, TOP)
+    thrust = mix(SHARES, given_)
     assert min(thrust) >= -1e-9
     assert max(thrust) <= TOP + 1e-9
-    free = mix(SIGNS, wanted)
+    free = mix(SHARES, wanted)
     if min(free) >= 0.0 and max(free) <= TOP:
         assert given_ == pytest.approx(wanted, abs=1e-12)
     assert all(abs(a) <= abs(b) + 1e-12 and a * b >= 0.0 for a, b in zip(given_[1:], wanted[1:], strict=True))
@@ -57,10 +57,10 @@ def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll,
 @given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
 @settings(deadline=None)
 def test_yaw_gets_what_the_others_leave_and_no_less(collective, roll, pitch, yaw):
-    given_ = saturate(SIGNS, Demands(collective, roll, pitch, yaw), TOP)
+    given_ = saturate(SHARES, Demands(collective, roll, pitch, yaw), TOP)
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
-    bare = mix(SIGNS, given_._replace(yaw=0.0))
-    shares = [s[2] for s in SIGNS]
+    bare = mix(SHARES, given_._replace(yaw=0.0))
+    shares = [s[3] for s in SHARES]
     best = linprog(  # the most yaw towards what is wanted that keeps every thrust possible
         [-np.sign(yaw) or -1.0],
         A_ub=[[s] for s in shares] + [[-s] for s in shares],

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from dynamics.kernel import uncompiled
 from services.autopilot import motor_failure as watch
 from services.autopilot.law import Airframe
 from services.autopilot.motor import Motor
@@ -17,7 +18,8 @@ HOVER = 0.25 * FRAME.mass * FRAME.gravity
 
 def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
     """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
-    p, s, omega = watch.build(FRAME), watch.START, np.zeros(3)
+    p, omega = watch.build(FRAME), np.zeros(3)
+    s = uncompiled(watch.start)(p)
     random = np.random.default_rng(seed)
     thrust = np.full(4, HOVER)
     x, y = np.array(FRAME.rotor_x), np.array(FRAME.rotor_y)

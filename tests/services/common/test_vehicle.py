@@ -21,29 +21,30 @@ def without_gravity(*overrides):
 
 def test_gravity_is_that_of_whichever_effect_gives_one():
     assert gravity(load("hover")) == 9.80665
-    assert gravity(load("hover", ["effects.gravity.acceleration=3.7"])) == 3.7
+    assert gravity(load("hover", ["environment.gravity=3.7"])) == 3.7
     assert gravity(without_gravity()) == 0.0
-    altitude = without_gravity(("effects.gravity_altitude", {"home_altitude": 5000.0}))
+    altitude = without_gravity(("effects.gravity_altitude", {}), ("environment.home.height", 5000.0))
     assert gravity(altitude) == pytest.approx(9.80665 * (6_356_766.0 / 6_361_766.0) ** 2, rel=1e-12)
     assert gravity(altitude) == active(altitude)[0].initial_memory()[0]
 
 
 def test_the_imu_reads_gravity_whichever_effect_gives_it():
     effects = {"gravity_altitude": {}, "rotor_thrust": {}, "ground_contact": {}}
-    scene = load("delivery_mission", {"effects": effects, "sensors.imu.preset": "ideal"})
+    sea = {"effects": effects, "environment.home.height": 0.0}
+    scene = load("delivery_mission", {**sea, "sensors.imu.preset": "ideal"})
     sensors = Alone(scene, "sensors")
     sensors.step(truth=sensors.setup.port("truth").like)
     assert sensors.message(IMU).linear_acceleration.z == pytest.approx(9.80665)
 
 
 def test_on_level_ground_the_vehicle_starts_where_it_did():
-    for overrides in ([], ["effects.ground_contact.slope=[0.0, 0.0]"]):
+    for overrides in ([], ["environment.terrain.slope=[0.0, 0.0]"]):
         assert start_pose(load("hover", overrides)) == ((0.0, 0.0, 0.35), NO_ROTATION)
     assert start_height(load("hover")) == 0.35
 
 
 def test_on_a_slope_the_vehicle_starts_at_rest_and_stays():
-    scene = load("hover", ["effects.ground_contact.slope=[0.1, 0.0]"])
+    scene = load("hover", ["environment.terrain.slope=[0.1, 0.0]"])
     position, attitude = start_pose(scene)
     up = rotation_matrix(attitude)
     assert (up[2], up[5], up[8]) == pytest.approx(tuple(c / math.hypot(1.0, 0.1) for c in (-0.1, 0.0, 1.0)))

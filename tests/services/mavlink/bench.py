@@ -14,12 +14,15 @@ from services.table import load
 class Bench:
     """The vehicle, its adapter, and whoever has connected."""
 
-    def __init__(self, *overrides, recorded=False, **options):
+    period = PERIOD  # [s] of a step
+
+    def __init__(self, *overrides, recorded=False, starting=False, **options):
         self.vehicle = StandIn()
         put = None if recorded else lambda command: self.vehicle.operate(OperatorInput(commands=(command,)).encode())
         self.adapter = Adapter(
             describe(load("scenes/hover.toml", overrides))._replace(parameters=PARAMETERS), put, **options
         )
+        self.adapter.commands.started = not starting
         self.stations = []
 
     @property
@@ -40,7 +43,7 @@ class Bench:
                 station.step()
 
     def until(self, true, seconds=10.0):
-        for _ in range(round(seconds / PERIOD)):
+        for _ in range(round(seconds / self.period)):
             if true():
                 return True
             self.step()

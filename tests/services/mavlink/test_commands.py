@@ -6,6 +6,7 @@ import pytest
 from bench import Bench
 
 from messages import CommandAck
+from services.common.failures import KINDS, UNITS
 from services.mavlink.dialect import mavlink
 from services.mavlink.flavours import ardupilot, px4
 
@@ -63,14 +64,14 @@ def test_what_the_autopilot_refuses_is_refused(number):
 def test_progress_is_passed_on_before_the_end():
     bench = Bench()
     results = iter([CommandAck(result=CommandAck.IN_PROGRESS, progress=0.4)])
-    bench.vehicle.handle = lambda c: next(results)._replace(id=c.id)
+    bench.vehicle.handle = lambda c: next(results)._replace(id=c.id, source=c.source)
     station = bench.station()
     station.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
     bench.step(2)
     ack = station.last("COMMAND_ACK")
     assert (ack.result, ack.progress) == (mavlink.MAV_RESULT_IN_PROGRESS, 40)
     number = bench.vehicle.kinds["mission_start"].id
-    bench.vehicle.answers = [CommandAck(id=number, result=CommandAck.ACCEPTED)]
+    bench.vehicle.answers = [CommandAck("255/190", number, CommandAck.ACCEPTED)]
     bench.step()
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
 
@@ -204,7 +205,7 @@ def test_ardupilots_guided_follows_setpoints_at_once_and_a_place_for_good():
     bench.vehicle.armed, bench.vehicle.landed = True, False
     bench.step()
     position_target(station, LOCAL, 1, 0xDF8)
-    assert asked(bench, "goto")[:3] == pytest.approx((2.0, 3.0, 4.0))
+    assert asked(bench, "goto")[:3] == pytest.approx((2.0, 3.0, 4.0 + RESTING_HEIGHT))
     bench.vehicle.mode = "hold"
     bench.step()
     position_target(station, LOCAL, 1, 0xDC7)
@@ -269,3 +270,25 @@ def test_a_heartbeat_keeps_the_link_for_a_while():
     bench.step(500)
     assert len(links) == 4
     assert links[-1] < 4.0
+
+
+def test_failures_bear_the_numbers_of_mavlink_and_impossible_ones_are_unsupported():
+    bench = Bench()
+    bench.vehicle.do_inject_failure = lambda c: 0
+    station = bench.station()
+    for name, number in mavlink.enums["FAILURE_TYPE"].items():
+        if number.name != "FAILURE_TYPE_ENUM_END":
+            kind = KINDS[name]
+            assert number.name == f"FAILURE_TYPE_{'OK' if kind == 'sound' else kind.upper()}"
+            assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, name, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+            assert asked(bench, "inject_failure") == (UNITS.index("barometer"), name, 0.0)
+    for unit, kinds, words in (
+        (mavlink.FAILURE_UNIT_SYSTEM_MOTOR, (0, 1, 2, 4, 5), "a motor can be sound, off, stuck, wrong, slow"),
+        (mavlink.FAILURE_UNIT_SYSTEM_BATTERY, (0, 1, 2, 4), "a battery can be sound, off, stuck, wrong"),
+    ):
+        for kind in range(8):
+            expected = mavlink.MAV_RESULT_ACCEPTED if kind in kinds else mavlink.MAV_RESULT_UNSUPPORTED
+            assert station.command(420, unit, kind, 1.0) == expected
+        told = "".join(m.text for m in station.all("STATUSTEXT"))
+        assert f"INJECT_FAILURE: type 7 unsupported; {words}" in told
+    assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, 8.0, 0.0) == mavlink.MAV_RESULT_UNSUPPORTED

@@ -139,7 +139,8 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
 
     general = fetch(GENERAL)
     assert crc32(general) == m.file_crc
-    entry, events = json.loads(general)["metadataTypes"]
+    entry, events, actuators = json.loads(general)["metadataTypes"]
+    assert crc32(fetch(actuators["uri"].removeprefix("mftp://"))) == actuators["fileCrc"]
     assert entry["uri"] == f"mftp://{PARAMETERS}"
     assert crc32(fetch(events["uri"].removeprefix("mftp://"))) == events["fileCrc"]
     table = fetch(PARAMETERS)
@@ -151,6 +152,14 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
     assert {v.param_id for v in station.all("PARAM_VALUE")} == set(described)
     assert described["MIS_TAKEOFF_ALT"] | {"min": 0.5, "max": 100.0, "units": "m"} == described["MIS_TAKEOFF_ALT"]
     assert described["NAV_DLL_ACT"]["type"] == "Int32"
+
+
+def test_the_metadata_says_what_needs_a_restart_and_what_cannot_be_set():
+    content = files(describe(load("scenes/groundstation.toml")))[PARAMETERS]
+    described = {p["name"]: p for p in json.loads(content)["parameters"]}
+    assert [name for name, p in described.items() if p.get("rebootRequired")] == ["EKF2_HGT_REF"]
+    assert described["SYS_AUTOSTART"]["readOnly"]
+    assert "readOnly" not in described["NAV_DLL_ACT"]
 
 
 def test_a_scenes_metadata_is_json_without_nan():

@@ -11,6 +11,8 @@ import pymavlink
 import pytest
 from stand_in import flying, free_port, until
 
+pytestmark = pytest.mark.long
+
 if importlib.util.find_spec("MAVProxy") is None:
     pytest.skip("MAVProxy is not installed: pip install -e .[clients]", allow_module_level=True)
 
@@ -37,7 +39,7 @@ class Console:
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()
 
-    def shows(self, text, seconds=20.0):
+    def shows(self, text, seconds=60.0):
         return until(lambda: text in self.output.read_text(), seconds)
 
     def end(self):

@@ -28,6 +28,8 @@ from mavsdk.param import ParamError  # noqa: E402
 from cosim.log import LogReader  # noqa: E402
 from lapwing.runs.refly import refly  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 SCENE = "scenes/groundstation.toml"
 END = 150.0  # [s] of wall time a session is held to have failed after
 SPEED = 3.0  # simulated seconds per second
@@ -170,7 +172,7 @@ def test_offboard_by_position_velocity_and_attitude(tmp_path):
         with pytest.raises(OffboardError):  # no setpoints come
             await drone.offboard.start()
         await drone.offboard.set_position_ned(PositionNedYaw(3.0, 2.0, -4.0, 90.0))
-        await asyncio.sleep(0.2)
+        await asyncio.sleep(1.0)  # until setpoints have gone out
         await drone.offboard.start()
         place = 3.0, 2.0, -4.0
         await first(

@@ -54,6 +54,8 @@ def test_what_is_not_fitted_says_so():
     assert "BAT1_V_CHARGED" not in found
     assert found["SYS_HAS_NUM_DIST"] == 0
     assert facts("scenes/delivery_mission.toml")["SYS_HAS_NUM_DIST"] == 1
+    assert found["PD_GRIPPER_EN"] == 0  # QGroundControl hides the button
+    assert facts("scenes/delivery_full.toml")["PD_GRIPPER_EN"] == 1
 
 
 def test_names_fit_into_their_field_and_none_is_there_twice():

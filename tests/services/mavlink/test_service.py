@@ -14,12 +14,14 @@ import pytest
 from pymavlink import mavutil
 from stand_in import StandIn, free_port, until
 
-from cosim.launcher import loopback_endpoints
 from cosim.log import LogReader, LogWriter
 from lapwing.runs.single import fly_single
 from services.mavlink.dialect import mavlink
 from services.mavlink.links import check
 from services.table import load, resolve
+from tests.endpoints import loopback_endpoints
+
+pytestmark = pytest.mark.long
 
 sys.path.insert(0, str(Path(__file__).parent))
 

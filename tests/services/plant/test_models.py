@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.errors import LockStepError
 from cosim.scene import SceneError
-from cosim.schedule import LockStepError
 from dynamics.integrators import get, simulate
 from messages import stamp_ns
 from services.plant.models import gyrostat, os4
 from services.table import load
 from tests.cosim import memory_log
+
+pytestmark = pytest.mark.long
 
 SCENES = Path(__file__).parents[3] / "scenes"
 SATELLITE, OS4 = SCENES / "gyrostat_feedback.toml", SCENES / "os4_experiment_3.toml"
@@ -111,7 +113,7 @@ WRONG = {
         "vehicle.model: unknown model 'gyro'; did you mean gyrostat? expected one of",
     ),
     "another model's table": (SATELLITE, "vehicle.model=os4", "os4: missing; expected a table [os4], which the mod"),
-    "effects": (SATELLITE, "effects.gravity.acceleration=9.81", "effects: the model gyrostat knows no such table"),
+    "effects": (SATELLITE, "effects.gravity={}", "effects: the model gyrostat knows no such table"),
     "no rotation": (
         SATELLITE,
         "gyrostat.initial_attitude=[1.0, 0.1, 0.0, 0.0]",
@@ -121,7 +123,7 @@ WRONG = {
     "not for this state": (
         OS4,
         "solver.integrator=rigid_splitting",
-        "rigid_splitting is for states of attitude, omega_",
+        "it is for states of attitude and omega_body",
     ),
     "a link of no length": (LOAD, "cooperative_load.link_length=[0.6, 0.0]", "link_length[1] = 0: must be positive"),
     "a link that is no unit vector": (LOAD, "cooperative_load.link_start=[[0, 0, -2], [1, 0, 0]]", "off its manifold"),
@@ -159,3 +161,18 @@ def test_numbers_that_run_away_are_named_with_their_time():
     )
     with pytest.raises(LockStepError, match=r"os4: not finite at t = [\d.]+ s: \w+.*take a smaller step than 0.004 s"):
         ticks(scene, 5000)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("hover", "does not fit the model reduced: it is for states of attitude and omega_body"),
+        ("gyrostat_feedback", "does not fit the model gyrostat: it is for a torque that does not depend on the rate"),
+    ],
+)
+def test_an_integrator_that_does_not_fit_is_refused_with_those_that_do(name, message):
+    with pytest.raises(SceneError, match=rf"solver.integrator: rigid_splitting {message}") as error:
+        load(name, ["solver.integrator=rigid_splitting"])
+    assert "expected one of cf4, " in str(error.value)
+    assert "rigid_splitting" not in str(error.value).partition("expected")[2]
+    load("gyrostat_blocked", ["solver.integrator=rigid_splitting"])

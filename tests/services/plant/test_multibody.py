@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from cosim.errors import LockStepError
 from cosim.scene import SceneError
-from cosim.schedule import LockStepError
 from messages.topics import BODIES, TRUTH
 from services.common.ports import MotorCommand
 from services.table import load
 from tests.cosim.alone import Alone
+
+pytestmark = pytest.mark.long
 
 MISSION = Path(__file__).parents[3] / "scenes/delivery_mission.toml"
 FLOWN = "vehicle.model=multibody"

@@ -5,14 +5,16 @@ import pytest
 
 import lapwing
 
+pytestmark = pytest.mark.long
+
 STANDING = {"autopilot.operator": True, "autopilot.trajectory": False, "run.duration": 0.2}  # nobody arms it
 UNEVEN = [[0.20, 0.25, -0.30], [-0.20, 0.20, -0.35], [-0.20, -0.25, -0.36], [0.25, -0.25, -0.32]]
 CASES = {
     "level": {},
     "unequal heights and places": {"airframe.contact.feet": UNEVEN},
-    "slope": {"effects.ground_contact.slope": [0.1, -0.2]},
-    "unequal feet on a slope": {"airframe.contact.feet": UNEVEN, "effects.ground_contact.slope": [-0.2, 0.1]},
-    "bumps": {"effects.ground_contact.bump_height": 0.02, "effects.ground_contact.bump_length": 1.3},
+    "slope": {"environment.terrain.slope": [0.1, -0.2]},
+    "unequal feet on a slope": {"airframe.contact.feet": UNEVEN, "environment.terrain.slope": [-0.2, 0.1]},
+    "bumps": {"environment.terrain.bump_height": 0.02, "environment.terrain.bump_length": 1.3},
     "soft ground": {"effects.ground_contact.stiffness": 1e4, "airframe.contact.feet": UNEVEN},
     "heavier": {"vehicle.mass": 14.0},
 }
@@ -28,6 +30,6 @@ def test_it_stands_still_from_the_first_tick_on(overrides):
 
 
 def test_on_ground_too_steep_for_its_friction_it_slides():
-    truth = lapwing.fly("hover", {**STANDING, "effects.ground_contact.slope": [0.7, 0.0]}).truth
+    truth = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.7, 0.0]}).truth
     assert truth.velocity[-1, 0] < -0.1
     assert np.ptp(truth.attitude, axis=0).max() < 0.1

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home, geodetic_to_enu
+from dynamics.environment import STANDARD
+from dynamics.geodesy import geodetic_to_enu
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.noise import stream_key
@@ -10,8 +11,7 @@ from dynamics.vector import ZERO
 from services.sensors import barometer, gps, imu, magnetometer, sonar
 from services.sensors.truth import Truth
 
-HOME = Home()
-REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, HOME, 15.0, MAGNETIC_FIELD_WORLD)
+REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, *STANDARD[:2], STANDARD.magnetic_field_world)
 
 
 @kernel

@@ -4,20 +4,25 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from dynamics.geodesy import MAGNETIC_FIELD_WORLD, Home, air_pressure, enu_to_geodetic
-from dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
+from dynamics.atmosphere import pressure
+from dynamics.environment import STANDARD
+from dynamics.geodesy import enu_to_geodetic
+from dynamics.lie.quaternion import NO_ROTATION, Quaternion, conjugate, exp, from_roll_pitch_yaw, log, multiply, rotate
 from dynamics.noise import stream_key
+from dynamics.terrain import LEVEL, relief
 from dynamics.vector import ZERO
-from services.sensors import barometer, gps, imu, magnetometer, sonar
+from services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
 from services.sensors.truth import Truth
 
 KEY = stream_key(7, "drone1", "test")
 G = 9.81
+FIELD = STANDARD.magnetic_field_world
 
 
-def truth(position=ZERO, attitude=NO_ROTATION, velocity=ZERO, omega=ZERO, acceleration=ZERO, height=2.0):
-    return Truth(position, attitude, velocity, omega, acceleration, height, G, Home(), 15.0, MAGNETIC_FIELD_WORLD)
+def truth(position=ZERO, attitude=NO_ROTATION, velocity=ZERO, omega=ZERO, acceleration=ZERO, height=2.0, terrain=LEVEL):
+    return Truth(position, attitude, velocity, omega, acceleration, height, G, *STANDARD[:2], FIELD, terrain)
 
 
 def read(module, p, *truths):
@@ -77,7 +82,7 @@ def test_imu_warms_up():
 
 def test_magnetometer_turns_with_the_body():
     """Heading north (yaw 90 degrees in ENU), the body's x axis reads the north component."""
-    east, north, up = MAGNETIC_FIELD_WORLD
+    east, north, up = FIELD
     reading = read(
         magnetometer, magnetometer.Magnetometer(), truth(attitude=from_roll_pitch_yaw(0.0, 0.0, math.pi / 2))
     )
@@ -87,7 +92,7 @@ def test_magnetometer_turns_with_the_body():
 def test_barometer_reads_the_pressure_law_and_falls_with_height():
     low = read(barometer, barometer.Barometer(), truth())
     high = read(barometer, barometer.Barometer(), truth(position=(0.0, 0.0, 10.0)))
-    assert low.pressure == pytest.approx(air_pressure(Home().height, 15.0))
+    assert low.pressure == pytest.approx(pressure(STANDARD.atmosphere, STANDARD.home.height))
     assert high.pressure - low.pressure == pytest.approx(-1.19 * 9.81 * 10.0, rel=0.02)
 
 
@@ -97,7 +102,7 @@ def test_gps_gives_the_position_of_its_latency_ago():
     reading = read(gps, p, *path)
     np.testing.assert_allclose(
         (reading.latitude_deg, reading.longitude_deg, reading.height),
-        enu_to_geodetic(Home(), (3.0, 6.0, 1.5)),
+        enu_to_geodetic(STANDARD.home, (3.0, 6.0, 1.5)),
         atol=1e-12,
     )
     assert reading.velocity_world == (30.0, 0.0, 0.0)
@@ -136,6 +141,276 @@ def test_sonar_range(height, tilt_deg, expected):
     reading = read(sonar, SONAR, truth(attitude=from_roll_pitch_yaw(math.radians(tilt_deg), 0.0, 0.4), height=height))
     assert reading.range == np.float32(expected)
     assert reading.valid
+
+
+@pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
+def test_sonar_over_a_slope(slope_deg, tilt_deg):
+    """The nearest ground within the beam: across the slope 2 m cos(slope), seen at slope - tilt off the beam's axis."""
+    slope, tilt = math.radians(slope_deg), math.radians(tilt_deg)
+    ground = relief(slope=(0.0, math.tan(slope)))
+    p = SONAR._replace(resolution=0.0)
+    reading = read(sonar, p, truth((0.0, 0.0, 2.0), from_roll_pitch_yaw(tilt, 0.0, 0.0), terrain=ground))
+    off = abs(slope - tilt)
+    expected = 2.0 * math.cos(slope) / math.cos(max(0.0, off - math.radians(10.0)))
+    assert reading.range == pytest.approx(math.inf if off > math.radians(25.0) else expected, rel=1e-6)
+
+
+def test_sonar_sees_a_box_and_the_next_tread_of_a_stair():
+    over_box = relief(boxes=[(0.5, 0.0, 0.4, 0.4, 0.0, 0.8)])
+    p = sonar.Sonar(half_beam_deg=0.0)
+    assert read(sonar, p, truth((0.5, 0.0, 2.0), terrain=over_box)).range == pytest.approx(1.2)
+    assert read(sonar, p, truth((0.0, 0.0, 2.0), terrain=over_box)).range == pytest.approx(2.0)
+    stair = relief(steps=[(1.0, 0.2), (2.0, 0.3)])
+    assert [round(read(sonar, p, truth((x, 5.0, 3.0), terrain=stair)).range, 6) for x in (0.5, 1.5, 9.0)] == [
+        3.0,
+        2.8,
+        2.5,
+    ]
+
+
+def test_accelerometers_off_the_centre_feel_the_turning():
+    """On a wheel of 0.3 m that turns at 2 rad/s and speeds up by 5 rad/s^2: inwards w^2 r, ahead a r."""
+    p = imu.Imu(position=(0.3, 0.0, 0.0))
+    spinning = truth(omega=(0.0, 0.0, 2.0))._replace(angular_acceleration_body=(0.0, 0.0, 5.0))
+    np.testing.assert_allclose(read(imu, p, spinning).specific_force_body, (-1.2, 1.5, G), atol=1e-12)
+    assert read(imu, imu.Imu(), spinning).specific_force_body == (0.0, 0.0, G)
+
+
+def test_gps_tells_of_its_antenna():
+    """0.4 m ahead on a vehicle that heads north and turns left at 1 rad/s: 0.4 m north, going west at 0.4 m/s."""
+    p = gps.Gps(antenna=(0.4, 0.0, 0.1))
+    north = truth((1.0, 2.0, 3.0), from_roll_pitch_yaw(0.0, 0.0, math.pi / 2), (5.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    reading = read(gps, p, north)
+    np.testing.assert_allclose(
+        (reading.latitude_deg, reading.longitude_deg, reading.height),
+        enu_to_geodetic(STANDARD.home, (1.0, 2.4, 3.1)),
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(reading.velocity_world, (4.6, 0.0, 0.0), atol=1e-12)
+
+
+def test_gps_has_no_fix_under_a_roof():
+    p = gps.Gps(outages=(gps.Outage(10.0, 0.0, 3.0), gps.Outage(0.0, 20.0, 1.0)))
+    places = [(0.0, 0.0), (7.1, 0.0), (6.9, 0.0), (10.0, 2.9), (0.0, 20.5), (0.0, 18.9)]
+    assert [read(gps, p, truth((*place, 2.0))).valid for place in places] == [True, False, True, False, False, True]
+
+
+def test_magnetometer_near_the_leads_and_barometer_in_the_wind():
+    """10 A at 30 nT/A along y; a hole that feels 0.2 of the 60 Pa of 10 m/s."""
+    near = truth()._replace(motor_current=10.0, dynamic_pressure=60.0)
+    leads = magnetometer.Magnetometer(current_nt_per_a=(0.0, 30.0, 0.0))
+    change = np.subtract(read(magnetometer, leads, near).field_body, FIELD)
+    np.testing.assert_allclose(change, (0.0, 300e-9, 0.0), atol=1e-15)
+    hole = barometer.Barometer(airspeed_error=0.2)
+    still = read(barometer, barometer.Barometer(), near).pressure
+    assert read(barometer, hole, near).pressure - still == pytest.approx(12.0)
+
+
+def test_airspeed_feels_the_air_along_the_body_alone():
+    """10 m/s ahead at 1.2 kg/m^3 are 60 Pa; as much suction backwards; across nothing."""
+    north = truth(attitude=from_roll_pitch_yaw(0.0, 0.0, math.pi / 2))._replace(air_density=1.2)
+    for air, expected in (((0.0, 10.0, 0.0), 60.0), ((0.0, -10.0, 0.0), -60.0), ((10.0, 0.0, 3.0), 0.0)):
+        reading = read(airspeed, airspeed.Airspeed(), north._replace(air_velocity_world=air))
+        assert reading.pressure == pytest.approx(expected, abs=1e-12)
+    assert read(airspeed, airspeed.SDP33, north._replace(air_velocity_world=(0.0, 90.0, 0.0))).pressure == 1500.0
+
+
+def test_airspeed_noise_and_spread():
+    """White noise of the stated density at 50 Hz; zero point and span over 300 units."""
+    still = truth()._replace(air_density=1.2, air_velocity_world=(10.0, 0.0, 0.0))
+    p = airspeed.Airspeed(noise_pa_per_sqrt_hz=0.5)
+    s, found = airspeed.initial(p, KEY, still), []
+    for tick in range(4000):
+        s, reading = airspeed.sample(p, s, KEY, tick, still)
+        found.append(reading.pressure)
+    assert np.std(found) == pytest.approx(0.5 * math.sqrt(25.0), rel=0.05)
+    assert reading.variance == pytest.approx(0.25 * 25.0)
+    p, units = airspeed.Airspeed(turn_on_pa=0.2, scale_error=0.03), []
+    for seed in range(300):
+        key = stream_key(seed, "drone1", "airspeed")
+        units.append(airspeed.sample(p, airspeed.initial(p, key, still), key, 0, still)[1].pressure)
+    assert np.std(units) == pytest.approx(math.hypot(0.2, 0.03 * 60.0), rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "elevation", "expected"),
+    [(0.0, -90.0, 2.5), (0.0, -30.0, 5.0), (90.0, -45.0, 2.5 * math.sqrt(2)), (0.0, 10.0, math.inf)],
+)
+def test_rangefinder_in_any_direction_over_level_ground(azimuth, elevation, expected):
+    p = rangefinder.Rangefinder(azimuth_deg=azimuth, elevation_deg=elevation, position=(0.0, 0.0, -0.5))
+    place = truth((7.0, 8.0, 3.0), from_roll_pitch_yaw(0.0, 0.0, 0.7))
+    assert read(rangefinder, p, place).range == pytest.approx(expected)
+
+
+def test_rangefinder_ahead_sees_a_wall_and_its_limits():
+    """A box whose face is 4 m ahead, seen level; turned away, nothing; beyond its range +inf, too near -inf."""
+    wall = relief(boxes=[(6.0, 0.0, 4.0, 4.0, 0.0, 5.0)])
+    p = rangefinder.Rangefinder(elevation_deg=0.0)
+    assert read(rangefinder, p, truth((0.0, 0.0, 2.0), terrain=wall)).range == pytest.approx(4.0, abs=1e-6)
+    away = from_roll_pitch_yaw(0.0, 0.0, math.pi)
+    assert read(rangefinder, p, truth((0.0, 0.0, 2.0), away, terrain=wall)).range == math.inf
+    for x, expected in ((0.0, math.inf), (3.0, 1.0), (3.8, -math.inf)):
+        limited = p._replace(range_min=0.3, range_max=3.0)
+        found = read(rangefinder, limited, truth((x, 0.0, 2.0), terrain=wall)).range
+        assert found == expected or found == pytest.approx(expected)
+
+
+def test_rangefinder_noise():
+    p = rangefinder.Rangefinder(noise_m_per_sqrt_hz=0.01)
+    s, found = rangefinder.initial(p, KEY, truth((0.0, 0.0, 4.0))), []
+    for tick in range(4000):
+        s, reading = rangefinder.sample(p, s, KEY, tick, truth((0.0, 0.0, 4.0)))
+        found.append(reading.range)
+    assert np.mean(found) == pytest.approx(4.0, abs=4e-3)
+    assert np.std(found) == pytest.approx(0.01 * 5.0, rel=0.05)
+
+
+def test_optical_flow_of_turning_alone_is_the_turning():
+    p, turning = optical_flow.OpticalFlow(), truth((0.0, 0.0, 3.0), omega=(0.3, -0.2, 0.5))
+    reading = read(optical_flow, p, turning)
+    assert reading.flow == reading.rate == (0.3, -0.2)
+
+
+def test_optical_flow_over_ground_that_passes():
+    """By the geometry of the point that the axis meets: the body's turning that would move its image as fast."""
+    attitude, velocity = from_roll_pitch_yaw(0.2, -0.1, 1.3), np.array([2.0, -1.0, 0.5])
+    ground = relief(slope=(0.1, -0.2))
+    for terrain, tolerance in ((LEVEL, 1e-12), (ground, 1e-6)):
+        now = truth((1.0, 2.0, 4.0), attitude, tuple(velocity), terrain=terrain)
+        w, x, y, z = attitude
+        R = Rotation.from_quat([x, y, z, w]).as_matrix()
+        axis = -R[:, 2]
+        slope = np.array([0.1, -0.2]) if terrain is ground else np.zeros(2)
+        over = 4.0 - slope @ [1.0, 2.0]
+        distance = over / (slope @ axis[:2] - axis[2])
+        image = -(R.T @ velocity) / distance  # [rad/s] of the point across the axis, body x and y
+        reading = read(optical_flow, optical_flow.OpticalFlow(), now)
+        assert reading.distance == pytest.approx(distance, rel=max(tolerance, 1e-9))
+        # a body that turns about x by r has the point below it move to +y by -r, about y to -x by -r
+        assert reading.flow == pytest.approx((-image[1], image[0]), rel=1e-6)
+
+
+def test_optical_flow_without_texture_and_its_noise():
+    p = optical_flow.PMW3901
+    assert not read(optical_flow, p, truth((0.0, 0.0, 0.5), velocity=(4.0, 0.0, 0.0))).valid  # 8 rad/s
+    assert not read(optical_flow, p, truth((0.0, 0.0, 25.0))).valid
+    assert not read(optical_flow, p, truth((0.0, 0.0, 5.0), from_roll_pitch_yaw(2.0, 0.0, 0.0))).valid
+    noisy = optical_flow.OpticalFlow(noise_rad_per_s_per_sqrt_hz=0.01)
+    s, found = optical_flow.initial(noisy, KEY, truth((0.0, 0.0, 5.0))), []
+    for tick in range(4000):
+        s, reading = optical_flow.sample(noisy, s, KEY, tick, truth((0.0, 0.0, 5.0)))
+        found.append(reading.flow)
+    assert np.std(found, axis=0) == pytest.approx([0.05, 0.05], rel=0.05)
+    assert reading.variance == pytest.approx(0.0025)
+
+
+def coning(k, rate):
+    """Attitude and rate of a body whose z axis goes round a cone of 5 degrees at 40 Hz, at sample k."""
+    tilt, turn = math.radians(5.0), 2.0 * math.pi * 40.0
+    t = k / rate
+    half = math.sin(tilt / 2)
+    return Quaternion(math.cos(tilt / 2), half * math.cos(turn * t), half * math.sin(turn * t), 0.0), (
+        -turn * math.sin(tilt) * math.sin(turn * t),
+        turn * math.sin(tilt) * math.cos(turn * t),
+        turn * (1.0 - math.cos(tilt)),
+    )
+
+
+def test_integrated_readings_bring_a_coning_body_home():
+    """What it turned by, one reading after the other, is its attitude; rates at instants drift away from it."""
+    rate, ends = 250.0, {}
+    for integrates in (True, False):
+        p = imu.Imu(rate=rate, integrates=integrates)
+        path = [truth(attitude=q, omega=omega) for q, omega in (coning(k, rate) for k in range(251))]
+        s, attitude = imu.initial(p, KEY, path[0]), path[0].attitude
+        for tick, now in enumerate(path):
+            s, reading = imu.sample(p, s, KEY, tick, now)
+            if tick:
+                attitude = multiply(attitude, exp(tuple(x / rate for x in reading.omega_body)))
+        ends[integrates] = np.linalg.norm(log(multiply(conjugate(path[-1].attitude), attitude)))
+    assert ends[True] < 1e-12
+    assert ends[False] > 0.02
+
+
+def test_integrated_readings_give_back_the_velocity_of_where_the_unit_sits():
+    """Turning and speeding up: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
+    rate, place = 100.0, (0.2, -0.1, 0.05)
+    p, gained, before, path = imu.Imu(rate=rate, integrates=True, position=place), np.zeros(3), None, []
+    for k in range(60):
+        t = k / rate
+        attitude = multiply(from_roll_pitch_yaw(0.3, -0.2, 0.0), exp((0.0, 0.0, 4.0 * t)))
+        path.append(truth(attitude=attitude, velocity=(3.0 * t, t * t, math.sin(t)), omega=(0.0, 0.0, 4.0)))
+    s = imu.initial(p, KEY, path[0])
+    for tick, now in enumerate(path):
+        s, reading = imu.sample(p, s, KEY, tick, now)
+        if tick:
+            gained += np.array(rotate(before, reading.specific_force_body)) / rate
+            gained[2] -= G / rate
+        before = now.attitude
+    speeds = [np.add(x.velocity_world, rotate(x.attitude, np.cross((0, 0, 4.0), place))) for x in (path[0], path[-1])]
+    np.testing.assert_allclose(gained, speeds[1] - speeds[0], atol=1e-12)
+
+
+def test_rotor_vibration_is_seen_at_another_frequency_and_integration_thins_it():
+    """251 Hz sampled at 250 Hz looks like 1 Hz; of its mean over a sample is left sin(x)/x, x = pi 251/250."""
+    speed = 2.0 * math.pi * 251.0
+    shaking = imu.Vibration((100.0, 100.0, 50.0), 0.5 * speed)
+    now, found = truth()._replace(rotor_speed=speed), {}
+    for integrates in (False, True):
+        p = imu.Imu(rate=250.0, vibration=shaking, integrates=integrates)
+        s, forces = imu.initial(p, KEY, now), []
+        for tick in range(1000):
+            s, reading = imu.sample(p, s, KEY, tick, now)
+            forces.append(reading.specific_force_body)
+        found[integrates] = np.array(forces) - (0.0, 0.0, G)
+    seen = np.abs(np.fft.rfft(found[False], axis=0)) / 500.0
+    assert np.argmax(seen[:, 0]) == 4  # cycles in 4 s
+    amplitude = 4.0 * 0.1 * 9.80665  # with the square of the speed
+    np.testing.assert_allclose(seen[4], (amplitude, amplitude, 0.5 * amplitude), rtol=1e-6)
+    left = np.abs(np.fft.rfft(found[True], axis=0))[4, 0] / 500.0
+    x = math.pi * 251.0 / 250.0
+    assert left == pytest.approx(amplitude * abs(math.sin(x) / x), rel=1e-6)
+
+
+def test_barometer_in_the_wash_of_the_rotors():
+    flying = truth()._replace(thrust=98.0)
+    still = read(barometer, barometer.Barometer(), flying).pressure
+    assert read(barometer, barometer.Barometer(wash_pa_per_n=-0.2), flying).pressure - still == pytest.approx(-19.6)
+
+
+def test_gps_dilution_of_precision_by_published_geometries():
+    """A regular tetrahedron has PDOP 1.5; three on the horizon and one overhead by hand HDOP^2 = VDOP^2 = 4/3."""
+    low = math.degrees(math.asin(1.0 / 3.0))
+    tetrahedron = [gps.Satellite(azimuth, -low) for azimuth in (0.0, 120.0, 240.0)] + [gps.Satellite(0.0, 90.0)]
+    factor = np.array(gps.geometry.py_func(tuple(tetrahedron))).reshape(3, 3)
+    assert np.trace(factor @ factor.T) == pytest.approx(1.5**2)
+    flat = [gps.Satellite(azimuth, 0.0) for azimuth in (0.0, 120.0, 240.0)] + [gps.Satellite(0.0, 90.0)]
+    factor = np.array(gps.geometry.py_func(tuple(flat))).reshape(3, 3)
+    assert np.diag(factor @ factor.T) == pytest.approx([2 / 3, 2 / 3, 4 / 3])
+
+
+STREET = tuple(gps.Satellite(a, e) for a, e in ((10.0, 60.0), (170.0, 50.0), (20.0, 30.0), (200.0, 70.0), (95.0, 80.0)))
+
+
+def test_gps_errors_have_the_covariance_of_the_satellites_in_view():
+    """Against the rows (east, north, up, 1) of least squares, over 1500 receivers; the reading says it."""
+    p = gps.Gps(sky=STREET, range_wander=2.0, range_noise_m_per_sqrt_hz=0.5)
+    rows = [
+        (math.cos(e) * math.sin(a), math.cos(e) * math.cos(a), math.sin(e), 1.0)
+        for a, e in np.radians([tuple(satellite) for satellite in STREET])
+    ]
+    expected = np.linalg.inv(np.array(rows).T @ rows)[:3, :3] * (4.0 + 0.25 * 5.0)
+    found = []
+    for seed in range(1500):
+        key = stream_key(seed, "drone1", "gps")
+        _, reading = gps.sample(p, gps.initial(p, key, truth()), key, 0, truth())
+        found.append((reading.longitude_deg, reading.latitude_deg, reading.height))
+    assert reading.position_variance == pytest.approx(np.diag(expected))
+    here = np.array(found) - (STANDARD.home.longitude_deg, STANDARD.home.latitude_deg, STANDARD.home.height)
+    one = [np.array(enu_to_geodetic(STANDARD.home, v)) for v in ((1.0, 0, 0), (0, 1.0, 0), ZERO)]
+    metres = here / (one[0][1] - one[2][1], one[1][0] - one[2][0], 1.0)
+    np.testing.assert_allclose(np.cov(metres.T), expected, atol=0.12 * np.trace(expected))
+    assert np.sqrt(expected[0, 0]) > 2.0 * np.sqrt(expected[1, 1])  # a street from north to south
 
 
 def test_same_key_and_tick_give_the_same_bits():

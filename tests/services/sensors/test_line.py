@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dynamics.geodesy import Home
+from dynamics.environment import STANDARD
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.noise import stream_key
 from dynamics.vector import ZERO
@@ -22,7 +22,7 @@ def fly(fault, sensor="magnetometer", ticks=30):
 
     def truth(tick):
         field = (float(tick), 0.0, 0.0)
-        return Truth(ZERO, NO_ROTATION, ZERO, field, ZERO, 1.0, 9.81, Home(), 15.0, field)
+        return Truth(ZERO, NO_ROTATION, ZERO, field, ZERO, 1.0, 9.81, *STANDARD[:2], field)
 
     s = module.initial(p, key, truth(0))
     readings = []

@@ -15,25 +15,25 @@ from services.sensors.registry import module_of
 from services.table import load, resolve
 from studies.fly import fly
 
-AIRSPEED = """
+ANEMOMETER = """
 from typing import NamedTuple
 from dynamics.kernel import kernel
 from dynamics.noise import normal
 from dynamics.vector import norm
 
-class Airspeed(NamedTuple):
+class Anemometer(NamedTuple):
     deviation: float = 0.0  # [m/s]
     rate: float = 50.0  # [Hz]
 
-class AirspeedReading(NamedTuple):
+class AnemometerReading(NamedTuple):
     speed: float = 0.0  # [m/s]
     valid: bool = False
 
 class State(NamedTuple):
     samples: float = 0.0
 
-PRESETS = {"ideal": Airspeed(), "pitot": Airspeed(0.1)}
-READING = AirspeedReading()
+PRESETS = {"ideal": Anemometer(), "noisy": Anemometer(0.1)}
+READING = AnemometerReading()
 
 def blank():
     return State()
@@ -45,7 +45,7 @@ def initial(p, key, truth):
 @kernel
 def sample(p, s, key, tick, truth):
     speed = norm(truth.velocity_world) + p.deviation * normal(key, tick, 0)
-    return State(s.samples + 1.0), AirspeedReading(speed, True)
+    return State(s.samples + 1.0), AnemometerReading(speed, True)
 """
 ESTIMATOR = """
 from services.common.estimators import StateEstimate
@@ -55,17 +55,17 @@ class Echo:
     def __init__(self, vehicle):
         pass
     def step(self, time, readings):
-        return StateEstimate(velocity_world=(readings["airspeed"].speed if readings else 0.0, 0.0, 0.0))
+        return StateEstimate(velocity_world=(readings["anemometer"].speed if readings else 0.0, 0.0, 0.0))
 """
 
 
 @pytest.fixture
 def scene(tmp_path):
-    def made(*overrides, text=AIRSPEED):
-        (tmp_path / "own_airspeed.py").write_text(text)
+    def made(*overrides, text=ANEMOMETER):
+        (tmp_path / "own_anemometer.py").write_text(text)
         (tmp_path / "own_echo.py").write_text(ESTIMATOR)
         path = tmp_path / "hover.toml"
-        path.write_text(Path("scenes/hover.toml").read_text() + '[sensors.airspeed]\nmodule = "own_airspeed"\n')
+        path.write_text(Path("scenes/hover.toml").read_text() + '[sensors.anemometer]\nmodule = "own_anemometer"\n')
         return load(path, ["run.duration=3.0", *overrides])
 
     return made
@@ -73,7 +73,7 @@ def scene(tmp_path):
 
 def test_its_readings_are_logged_and_reach_an_estimator(scene):
     flight = fly(scene())
-    readings = flight.topic("own_sensor/airspeed")["values"]
+    readings = flight.topic("own_sensor/anemometer")["values"]
     true = np.linalg.norm(flight.truth["velocity"][::5], axis=1)
     assert readings[:, 0] == pytest.approx(true)
     assert (readings[:, 1] == 1.0).all()
@@ -83,13 +83,15 @@ def test_its_readings_are_logged_and_reach_an_estimator(scene):
 
 def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     (tmp_path / "own_height.py").write_text(
-        AIRSPEED.replace("AirspeedReading", "HeightReading").replace(
+        ANEMOMETER.replace("AnemometerReading", "HeightReading").replace(
             "norm(truth.velocity_world)", "truth.position_world[2]"
         )
     )
-    given = scene("sensors.height.module=own_height", "sensors.height.rate=25.0", "sensors.second.module=own_airspeed")
+    given = scene(
+        "sensors.height.module=own_height", "sensors.height.rate=25.0", "sensors.second.module=own_anemometer"
+    )
     setup, flight = resolve(given), lapwing.fly(given)
-    speed, second, height = (flight.topic(f"own_sensor/{name}") for name in ("airspeed", "second", "height"))
+    speed, second, height = (flight.topic(f"own_sensor/{name}") for name in ("anemometer", "second", "height"))
     assert (speed["values"] == second["values"]).all()
     assert height["values"][:, 0] == pytest.approx(flight.truth.position[::10, 2])
     assert set(height["sensor"]) == {"height"}
@@ -102,20 +104,24 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
 
 
 def test_a_preset_and_its_noise(scene):
-    noisy = fly(scene("sensors.airspeed.preset=pitot")).topic("own_sensor/airspeed")["values"][:, 0]
-    ideal = fly(scene()).topic("own_sensor/airspeed")["values"][:, 0]
+    noisy = fly(scene("sensors.anemometer.preset=noisy")).topic("own_sensor/anemometer")["values"][:, 0]
+    ideal = fly(scene()).topic("own_sensor/anemometer")["values"][:, 0]
     assert np.std(noisy - ideal) == pytest.approx(0.1, rel=0.3)
 
 
 @pytest.mark.parametrize(
     ("overrides", "text", "said"),
     [
-        (("sensors.airspeed.deviatoin=1.0",), AIRSPEED, "sensors.airspeed.deviatoin: unknown key"),
-        (("sensors.airspeed.rate=60.0",), AIRSPEED, "sensors.airspeed.rate: expected a rate that divides"),
-        (("sensors.airspeed.faults=[{kind='bias'}]",), AIRSPEED, "sensors.airspeed.faults: airspeed knows none"),
-        ((), AIRSPEED.replace("READING =", "READ ="), "sensors.airspeed.module: own_airspeed has no READING"),
-        ((), AIRSPEED.replace("(speed, True)", "(speed, 1.0)"), "sample's reading is of another type"),
-        (('sensors.a-b.module="own_airspeed"',), AIRSPEED, "sensors.a-b: expected a name that a topic can have"),
+        (("sensors.anemometer.deviatoin=1.0",), ANEMOMETER, "sensors.anemometer.deviatoin: unknown key"),
+        (("sensors.anemometer.rate=60.0",), ANEMOMETER, "sensors.anemometer.rate: expected a rate that divides"),
+        (
+            ("sensors.anemometer.faults=[{kind='bias'}]",),
+            ANEMOMETER,
+            "sensors.anemometer.faults: anemometer knows none",
+        ),
+        ((), ANEMOMETER.replace("READING =", "READ ="), "sensors.anemometer.module: own_anemometer has no READING"),
+        ((), ANEMOMETER.replace("(speed, True)", "(speed, 1.0)"), "sample's reading is of another type"),
+        (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a name that a topic can have"),
     ],
 )
 def test_what_is_wrong_is_one_line(scene, overrides, text, said):
@@ -127,4 +133,4 @@ def test_what_is_wrong_is_one_line(scene, overrides, text, said):
 
 def test_a_sensor_that_ships_keeps_its_name():
     with pytest.raises(KeyedError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
-        module_of("gps", {"module": "own_airspeed"})
+        module_of("gps", {"module": "own_anemometer"})

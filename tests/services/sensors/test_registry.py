@@ -6,7 +6,16 @@ from services.sensors import registry
 
 
 def test_the_sensors_of_the_folder_are_found():
-    assert set(registry.sensors()) == {"barometer", "gps", "imu", "magnetometer", "sonar"}
+    assert set(registry.sensors()) == {
+        "airspeed",
+        "barometer",
+        "gps",
+        "imu",
+        "magnetometer",
+        "optical_flow",
+        "rangefinder",
+        "sonar",
+    }
 
 
 @pytest.mark.parametrize("sensor", registry.sensors())
@@ -44,5 +53,18 @@ def test_bad_tables_are_refused_in_one_line(table, words):
 
 
 def test_an_unknown_sensor_lists_the_choices():
-    with pytest.raises(ValueError, match="barometer, gps, imu, magnetometer, sonar"):
+    with pytest.raises(
+        ValueError, match="airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar"
+    ):
         registry.parameters("lidar", {}, 0.004)
+
+
+def test_satellites_that_give_no_position_are_refused():
+    few = [{"azimuth_deg": a, "elevation_deg": 45.0} for a in (0.0, 120.0, 240.0)]
+    with pytest.raises(ValueError, match=r"gps.sky: expected 4 or more, .* got 3 satellites"):
+        registry.parameters("gps", {"sky": few}, 0.004)
+    cone = [*few, {"azimuth_deg": 60.0, "elevation_deg": 45.0}]
+    with pytest.raises(ValueError, match=r"got 4 satellites with a dilution of precision \(PDOP\) of nan"):
+        registry.parameters("gps", {"sky": cone}, 0.004)
+    spread = [*few, {"azimuth_deg": 60.0, "elevation_deg": 90.0}]
+    assert len(registry.parameters("gps", {"sky": spread}, 0.004).sky) == 4

@@ -52,3 +52,16 @@ def test_errors_fall_with_what_causes_them():
     assert exchange[0] > exchange[1] > exchange[2] > 0.0
     delay = [p.position for p in by["coupling delay"]]
     assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # one interval of delay, first order
+
+
+def test_an_accuracy_is_kept_from_take_off_to_rest():
+    """Steps of 4 ms and the contact at the accuracy, against steps of an eighth and a contact 1000 times finer."""
+    coarse, fine = (
+        fly(load("hover", [f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]))
+        for step, accuracy in ((0.004, 1e-5), (0.0005, 1e-8))
+    )
+    contact = fine.truth.ground_contact
+    assert contact[0]
+    assert contact[-1]
+    assert not contact.all()
+    assert difference(coarse, fine)[2] < 1e-5

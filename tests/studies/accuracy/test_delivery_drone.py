@@ -5,6 +5,8 @@ import pytest
 from studies.accuracy.coordinates import error
 from studies.accuracy.systems.delivery_drone import problems
 
+pytestmark = pytest.mark.long
+
 STEP = 2.0 / 2048
 
 

@@ -9,6 +9,8 @@ from studies.accuracy.measure import drift
 from studies.accuracy.reference import turning
 from studies.accuracy.systems import free_rigid_body, problems
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("name", [n for n, p in problems().items() if any(w.name == "rkmk54" for w in p.ways)])
 def test_the_reference_is_met(name):

@@ -13,7 +13,18 @@ from studies.stability.case import Curve, Found, Plot, Row, Sweep
 from studies.stability.chart import chart
 from studies.stability.measure import chosen, one
 
-CHEAP = ("lie_limits", "odd_inertia", "looping", "intermediate_axis", "large_steps", "exact_time")
+pytestmark = pytest.mark.long
+
+CHEAP = (
+    "lie_limits",
+    "odd_inertia",
+    "looping",
+    "intermediate_axis",
+    "large_steps",
+    "exact_time",
+    "toppling",
+    "link_limits",
+)
 
 
 @pytest.mark.parametrize("name", CHEAP)

@@ -4,9 +4,9 @@ from pathlib import Path
 import pytest
 
 from services.autopilot.gains import load
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
 from services.autopilot.margins import margins, open_loops, stable
-from services.autopilot.resolve import known_airframe
 from services.table import load as load_scene
 from studies.tune.bandwidths import Bandwidths
 from studies.tune.design import GAIN, PHASE, assumed_airframe, design, gain_set, shortfalls

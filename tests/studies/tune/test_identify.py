@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from services.autopilot.gains import load
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
-from services.autopilot.resolve import known_airframe
 from services.table import load as load_scene
 from services.table import parse
 from studies.fly import fly

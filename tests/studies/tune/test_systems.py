@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from services.autopilot.gains import load
+from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
 from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
-from services.autopilot.resolve import known_airframe
 from services.table import load as load_scene
 from studies.tune.systems import closed, step, systems
 

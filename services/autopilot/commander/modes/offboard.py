@@ -1,18 +1,21 @@
-"""Setpoints from outside: positions, velocities, accelerations, or an attitude or body rates with their thrust."""
+"""Setpoints from outside: positions, velocities, accelerations, an attitude or body rates with their thrust; or the
+motors' voltages, past the controller."""
 
 import math
 
 from dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, to_roll_pitch_yaw
-from dynamics.vector import Vec3, add, scale
+from dynamics.vector import ZERO, Vec3, add, scale
 from services.autopilot.commander.attitude_flight import AttitudeFlight
 from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from services.autopilot.commander.guidance import Guidance
 from services.autopilot.commander.smoothing import clamp_norm
 from services.autopilot.commander.view import Constants, View
 from services.autopilot.interface import Setpoint
+from services.autopilot.stage import CUT_HEIGHT
 
 NAME = "offboard"
 ACCELERATION_TIME = 0.5  # [s] for which an acceleration is taken to last
+SINKING = 1.0  # [m/s] at least that a vehicle is asked for whose motors stand: where it stands too, it has landed
 
 
 class Mode(FlightMode):
@@ -20,14 +23,18 @@ class Mode(FlightMode):
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         if not guidance.offboard_fresh:
-            raise ValueError("offboard: no setpoints are coming")
+            refused = guidance.inputs.offboard_refused
+            raise ValueError(f"offboard: no setpoints are coming{refused and f'; the last was refused: {refused}'}")
         self._attitude: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
         """Towards the setpoint, within the limits."""
         values = guidance.inputs.offboard
+        self.motor_voltage = None
         if not guidance.armed:
             return None
+        if guidance.inputs.offboard_kind == "offboard_motors":
+            return self._drive(constants, view, guidance, values)
         if guidance.inputs.offboard_kind == "offboard_attitude":
             return self._follow_attitude(constants, view, guidance, values)
         self._attitude = None
@@ -42,6 +49,22 @@ class Mode(FlightMode):
             else:
                 guidance.smoothing.turn_at(rate, guidance.limits, view.dt)
         return None
+
+    def _drive(self, constants: Constants, view: View, guidance: Guidance, volts: tuple[float, ...]) -> Setpoint | None:
+        """Voltages of the motors [V]. The setpoint goes along with the vehicle: others go on from there."""
+        self._attitude = None
+        turning = any(v > 0.0 for v in volts)
+        if turning:
+            guidance.lift_off(constants, view)
+        if not guidance.flying:
+            return None
+        self.motor_voltage = volts
+        (x, y, z), (vx, vy, vz) = view.estimate.position_world, view.estimate.velocity_world
+        yaw = to_roll_pitch_yaw(view.estimate.attitude)[2]
+        position = (x, y, max(z, constants.resting_height + CUT_HEIGHT))
+        setpoint = Setpoint(position, (vx, vy, vz if turning else min(vz, -SINKING)), ZERO, yaw, 0.0)
+        guidance.follow(setpoint)
+        return setpoint
 
     def _follow_attitude(
         self, constants: Constants, view: View, guidance: Guidance, values: tuple[float, ...]

@@ -9,7 +9,7 @@ from services.autopilot.commander.smoothing import clamp_norm
 from services.autopilot.commander.view import Constants, View
 
 NAME = "orbit"
-TO_CENTRE, INITIAL, FREE, TANGENT = range(4)  # ORBIT_YAW_BEHAVIOUR
+TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR; the last is the usual one
 RADIUS, LEAST_RADIUS, MOST_RADIUS = 10.0, 1.0, 1000.0  # [m]
 SPEED, MOST_ACCELERATION = 1.0, 2.0  # [m/s], [m/s^2] towards the centre
 GAIN = 1.0  # [1/s] speed towards the circle over the distance from it
@@ -30,7 +30,7 @@ class Mode(FlightMode):
             raise ValueError("orbit: expected a place above the ground")
         limit = min(math.sqrt(MOST_ACCELERATION * self._radius), guidance.limits.horizontal)
         self._speed = max(-limit, min(limit, -SPEED if math.isnan(speed) else speed))
-        self._behaviour = TO_CENTRE if math.isnan(behaviour) else int(behaviour)
+        self._behaviour = TO_CENTRE if math.isnan(behaviour) or behaviour == UNCHANGED else int(behaviour)
         self._turns_left = turns if turns > 0.0 else math.inf
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> None:

@@ -10,10 +10,10 @@ from services.autopilot.commander.leg import Leg
 from services.autopilot.commander.view import Constants, View
 
 NAME = "return"
-ACCEPTANCE_RADIUS = 0.3  # [m] around a corner of the way
+ACCEPTANCE_RADIUS = 0.3  # [m] around a corner of the path
 OVERHEAD = 1.0  # [m] across from home, within which it does not climb
 HOME_OR_RALLY, TO_LANDING, ALONG_MISSION, NEAREST = range(4)  # RTL_TYPE
-_CLIMB, _HOME, _WAIT = "climb", "home", "wait"
+_CLIMB, _CRUISE, _WAIT = "climb", "home", "wait"
 
 
 class Mode(FlightMode):
@@ -36,8 +36,8 @@ class Mode(FlightMode):
 
     @property
     def phase(self) -> str:
-        """Which part of the way."""
-        return _WAIT if self._index == len(self._corners) else _HOME if self._index else _CLIMB
+        """Phase of the return: climb, home (across), wait (over the landing place)."""
+        return _WAIT if self._index == len(self._corners) else _CRUISE if self._index else _CLIMB
 
     def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
         """One corner after the other, then land."""
@@ -57,7 +57,7 @@ class Mode(FlightMode):
 
 
 def _way(guidance: Guidance) -> list[Point]:
-    """Corners [m] of the way back."""
+    """Corners [m] of the path back."""
     x, y, _ = guidance.smoothing.position
     kind, route = guidance.parameters["RTL_TYPE"], guidance.route
     landing = next(((k, i) for k, i in enumerate(route.items) if i.action == "land"), None)

@@ -1,0 +1,62 @@
+"""Steps a second of the plant, many vehicles side by side on all cores, beside one vehicle after the other.
+
+    python -m benchmarks.batch [SCENE...]
+
+Steps of the scene's own solver, exchange intervals of the scene; the best of some runs, so that other work shows least.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+import lapwing
+from dynamics import batch as kernels
+from dynamics.kernel import kernel
+from dynamics.vehicles import multirotor
+from services.table import load, resolve
+
+N, TICKS, REPETITIONS = 2048, 10, 300  # runs of a millisecond, so that most are not interrupted
+
+
+@kernel
+def one(method, p, key, state, command, h, n, ticks):
+    for tick in range(ticks):
+        state = multirotor.advance(method, p, key, tick, state, command, h, n)
+    return state
+
+
+def best(run):
+    run()
+    times = []
+    for _ in range(REPETITIONS):
+        started = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - started)
+    return min(times)
+
+
+def main() -> None:
+    print(f"{'scene':20} {'batch, all cores':>18} {'batch, one core':>18} {'one by one':>14}   [10^6 steps/s]")
+    for scene in sys.argv[1:] or ["hover", "delivery_mission"]:
+        batch = lapwing.Batch(scene, N)
+        batch.reset(position_world=(0.0, 0.0, 2000.0), rotor_speed=np.full(4, 330.0))
+        core, volts = batch._core, np.full((N, 4), 31.6)
+        given = (core.method, batch._like, batch._blocks.reshape(-1), batch._blocks.shape[1], batch._keys, batch._ticks)
+        together = best(lambda batch=batch, volts=volts: batch._advance(volts, TICKS))
+        single = best(
+            lambda given=given, volts=volts, core=core: kernels.advance(
+                *given, volts, core.step, core.steps, 0, N // kernels.WIDTH, TICKS
+            )
+        )
+        state = resolve(load(scene)).services["plant"].parameters.start.vehicle
+        high = state.motion._replace(position_world=(0.0, 0.0, 2000.0), rotor_speed=(330.0,) * 4)
+        start = state._replace(motion=high)
+        arguments = (core.method, core.vehicle, core.key, start, (31.6,) * 4, core.step, core.steps, 40 * TICKS)
+        alone = best(lambda arguments=arguments: one(*arguments))
+        steps = 1e-6 * core.steps * TICKS
+        print(f"{scene:20} {N * steps / together:18.1f} {N * steps / single:18.1f} {40 * steps / alone:14.1f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+import sys
+
+from benchmarks.federations import main
+
+main(*[int(a) for a in sys.argv[1:]])

@@ -1,0 +1,98 @@
+"""What a fleet takes as it grows: processor time for a simulated second, in one process and in those of services.
+
+    python -m benchmarks.fleet [MOST]
+
+1, 2, 4, ... MOST quadrotors of one type on their sensors, each with all its messages in the log. What a run takes
+before it flies is taken off: a short flight is subtracted from a long one.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks._bars import LAPWING, Row, show
+from benchmarks.growth import taken
+from lapwing.runs.single import fly_single
+from services.table import load, resolve
+
+BRIEF, LONG = 1.0, 11.0  # [s]
+APART = 3.0  # [m]
+ROW = 8  # vehicles side by side
+COMMON = """
+[run]
+duration = 11.0
+[effects.gravity]
+[effects.air_density]
+[effects.rotor_thrust]
+[effects.ground_contact]
+[sensors.imu]
+preset = "mpu6000"
+[sensors.magnetometer]
+[sensors.gps]
+preset = "rtk"
+[sensors.barometer]
+[sensors.sonar]
+preset = "mb1202"
+[autopilot]
+gains = "quad_x"
+[[trajectory.phase]]
+name = "climb"
+z = { kind = "minimum_jerk", to = 3.0, duration = 4.0 }
+[[trajectory.phase]]
+name = "hover"
+duration = 10.0
+"""
+
+
+def main(most=32):
+    counts = [2**k for k in range(10) if 2**k <= min(most, 50)]
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = {n: scene(n, Path(folder, f"fleet_{n}.toml")) for n in counts}
+        log = Path(folder, "log.mcap")
+        fly_single(resolve(load(scenes[1])), log)  # everything is compiled, and loaded
+        single, apart = {}, {}
+        for n in counts:
+            single[n], apart[n] = (
+                per_second(lambda duration, fly=fly, n=n: fly(scenes[n], log, duration)) for fly in (alone, processes)
+            )
+            print(f"{n:3} vehicles: {1e3 * single[n]:7.1f} ms/s in one process, {1e3 * apart[n]:7.1f} in processes;"
+                  f" of each {1e3 * single[n] / n:6.1f} and {1e3 * apart[n] / n:6.1f}", flush=True)  # fmt: skip
+    found = [
+        Row(f"fleet of {most}, one process: a vehicle to one alone", single[most] / most / single[1], "", 1.1),
+        Row(f"fleet of {most}, processes: a vehicle to one alone", apart[most] / most / apart[1], "", 1.1),
+    ]
+    show(found)
+    return found
+
+
+def scene(n, path):
+    """The path of a scene of n vehicles."""
+    entries = [
+        f'[[vehicle]]\nairframe = "quad_x"\nstart = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n' for i in range(n)
+    ]
+    path.write_text(COMMON + "".join(entries))
+    return path
+
+
+def per_second(flown):
+    """Processor time [s] for each simulated second; `flown` flies for a duration [s] and says what that took."""
+    return (flown(LONG) - flown(BRIEF)) / (LONG - BRIEF)
+
+
+def alone(path, log, duration):
+    """Processor time [s] of a flight in this process."""
+    setup = resolve(load(path, [f"run.duration={duration}"]))
+    began = time.process_time()
+    fly_single(setup, log)
+    return time.process_time() - began
+
+
+def processes(path, log, duration):
+    """Processor time [s] of a command and all its processes."""
+    fly = [*LAPWING, "run", str(path), "--log", str(log), "--key-prefix", "benchmark-fleet"]
+    return taken([*fly, "--set", f"run.duration={duration}"])[0]
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

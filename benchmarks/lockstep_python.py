@@ -1,0 +1,82 @@
+"""What the services' own Python takes in a cycle of the lock step: `benchmarks.lockstep` with a bus that does nothing.
+
+    python -m benchmarks.lockstep_python [CYCLES]
+
+Processor time of one thread, so that other work on the machine counts little.
+"""
+
+import sys
+import time
+from types import SimpleNamespace
+
+from benchmarks.lockstep import NONE, PARTS, Constant
+from cosim.graph import Graph, Service
+from cosim.participants import Participants
+from cosim.setup import ServiceSetup, Setup
+from cosim.transfer import PAGE, Outlets, sources
+from services.plant.wire import wires as plant_wires
+
+
+class Idle:
+    """A bus whose messages are there at once, as zeros, and go nowhere."""
+
+    refused = 0
+
+    def __init__(self):
+        self.next = (0, b"")
+
+    def receive(self, senders):
+        return SimpleNamespace(get=lambda timeout: self.next)
+
+    def publisher(self, key):
+        return lambda payload, time_ns: None
+
+    def has_audience(self, keys):
+        return False
+
+
+def prepare(bus, giver, tick, interval_ns):
+    """Let the bundle be there that `giver` takes next, if it takes one up to this tick."""
+    due = [width for _, period, width in giver._bundles._ports if tick % period == 0]
+    bus.next = (tick * interval_ns, bytes(8 * sum(due)))
+
+
+def own(name, cycles):
+    """Seconds a cycle of (taking, stepping, publishing) in the service `name`."""
+    services = {service: ServiceSetup(None, *parts) for service, parts in PARTS.items()}
+    setup = Setup("benchmark", "", 1, 2 * cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    bus = Idle()
+    process = SimpleNamespace(
+        setup=setup, name=name, bus=bus, participants=Participants("bench"), key_prefix="bench",
+        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"),
+    )  # fmt: skip
+    service = Service(name, [Constant(name, 2 * cycles)], plant_wires(setup, NONE) if name == "plant" else [])
+    graph = Graph(setup, [service], 2 * PAGE)
+    givers, outlets = sources(process, graph), Outlets(process, service, graph)
+    taken = [0.0, 0.0, 0.0]
+    for tick in range(cycles):
+        for giver in givers:
+            prepare(bus, giver, giver._newest + 1, setup.interval_ns)
+            began = time.thread_time()
+            giver.take(tick)
+            taken[0] += time.thread_time() - began
+        began = time.thread_time()
+        graph.advance(tick + 1)
+        stepped = time.thread_time()
+        outlets.publish(tick)
+        taken[1] += stepped - began
+        taken[2] += time.thread_time() - stepped
+    return [seconds / cycles for seconds in taken]
+
+
+def main(cycles=4000):
+    total = 0.0
+    for name in PARTS:
+        figures = [seconds * 1e6 for seconds in own(name, cycles)]
+        total += sum(figures)
+        print(f"{name:10}: take {figures[0]:5.1f} us  step {figures[1]:5.1f} us  publish {figures[2]:5.1f} us")
+    print(f"all       : {total:5.1f} us a cycle")
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

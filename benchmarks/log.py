@@ -1,0 +1,146 @@
+"""How many messages a second the recorder takes without losing one, with a fast disk and with a slow one.
+
+    python -m benchmarks.log [SECONDS]
+
+A process hands batches over on the bus as services do, at so many messages a second of wall time; the recorder is a
+process of its own. Counted is what stands in the log.
+"""
+
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from cosim.backlog import Backlog
+from cosim.bundle import pack_batch
+from cosim.bus import ZenohBus, mesh
+from cosim.keys import BATCH_KEY
+from cosim.log import LogReader
+from cosim.log.container import Container
+from cosim.participants import Participants
+from cosim.private import private_endpoints
+from cosim.process import Process
+from cosim.setup import Setup
+from cosim.wire import Page
+from messages import Imu, Odometry, PoseStamped, VehicleState, header
+from messages.records import Record, stamp_columns
+from messages.topics import IMU, ODOM, POSE, TRUTH
+from services.recorder import service as recorder
+
+SOURCE, RECORDER = "source", "recorder"
+PARTICIPANTS = Participants("bench-log")
+MOTORS = dict.fromkeys(("rotor_speed", "motor_voltage", "motor_current", "motor_power"), (0.0,) * 4)
+SAMPLES = {
+    TRUTH: VehicleState(header(0, "world"), **MOTORS),
+    IMU: Imu(header(0, "base_link")),
+    ODOM: Odometry(header(0, "world")),
+    POSE: PoseStamped(header(0, "world")),
+}
+ROWS = (  # messages a second, bytes a second that the disk takes; 0: as it is
+    (5_000, 0),
+    (20_000, 0),
+    (50_000, 0),
+    (50_000, 4_000_000),
+)
+
+
+def setup(rate, seconds):
+    ticks = rate // len(SAMPLES)
+    services = {SOURCE: None}
+    return Setup("bench", "", 1, int(ticks * seconds), ticks, 10**9 // ticks, "sequential", "drone1", services, {}, {})
+
+
+def batch(given, first, stop):
+    """All messages of some ticks; their numbers are noise, as those of a flight nearly are."""
+    ticks = np.arange(first, stop)
+    noise = np.random.default_rng(first)
+    pages = []
+    for topic, sample in SAMPLES.items():
+        record = Record.of(sample)
+        columns = stamp_columns(ticks * given.interval_ns)
+        for name in ("pose.position", "velocity", "acceleration", "rotor_speed", "linear_acceleration"):
+            if record.dtype.names and name in record.dtype.names:
+                columns[name] = noise.normal(size=(len(ticks), *record.dtype[name].shape))
+        pages.append(Page(topic, ticks, record.encode(len(ticks), columns)))
+    return pack_batch(pages, stop)
+
+
+def hand_over(given, endpoints, seconds):
+    """At the rate of the set-up, ten times a second; messages handed over, and seconds it took."""
+    listen, connect = mesh(SOURCE, endpoints)
+    with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(SOURCE)) as bus:
+        process = Process(SOURCE, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        backlog, put = Backlog(process, RECORDER), bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}")
+        process.join()
+        step = -(-given.rate // 10)
+        started, first, end = time.perf_counter(), 0, int(given.rate * seconds)
+        while first < end:
+            stop = min(first + step, end)
+            for tick in range(first, stop):
+                backlog.hold(tick)
+            payload = batch(given, first, stop)
+            time.sleep(max(0.0, started + stop / given.rate - time.perf_counter()))
+            put(payload, (stop - 1) * given.interval_ns)
+            first = stop
+        taken = time.perf_counter() - started
+        put(b"", end * given.interval_ns)
+        time.sleep(1.0)  # what was put is delivered before the session ends
+        return end * len(SAMPLES), taken
+
+
+def record(given, endpoints, log, disk):
+    """The recorder, on a disk that takes so many bytes a second."""
+    if disk:
+        write = Container._write
+
+        def slow(container, data):
+            time.sleep(len(data) / disk)
+            write(container, data)
+
+        Container._write = slow
+    listen, connect = mesh(RECORDER, endpoints)
+    with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(RECORDER)) as bus:
+        process = Process(RECORDER, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        recorder.run(process, SimpleNamespace(log=log, mode="bench", external=None, sources=None))
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+
+def measure(rate, disk, seconds, folder):
+    log = Path(folder, "log.mcap")
+    with private_endpoints([SOURCE, RECORDER]) as endpoints:
+        words = [rate, disk, seconds, log, *endpoints.values()]
+        command = [sys.executable, "-m", "benchmarks.log", "--record", *map(str, words)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+            sent, taken = hand_over(setup(rate, seconds), endpoints, seconds)
+            memory = float(child.communicate()[0])
+    with LogReader(log) as read:
+        recorded = sum(1 for topic, *_ in read.messages() if topic != "/wall_time")
+        waited = read.metadata.get("waited_for_disk", "")
+    size = log.stat().st_size / 1e6
+    at = f"disk of {disk / 1e6:g} MB/s" if disk else "this disk"
+    held = f", the recorder waited {waited} for the disk" if waited else ""
+    print(
+        f"{rate} messages/s for {seconds:g} s, {at}: {sent} handed over in {taken:.1f} s, {recorded} recorded, "
+        f"{sent - recorded} lost; {size:.0f} MB; the recorder's memory at most {memory:.0f} MB{held}",
+        flush=True,
+    )
+
+
+def main(seconds=10.0):
+    with tempfile.TemporaryDirectory() as folder:
+        for rate, disk in ROWS:
+            measure(rate, disk, seconds, folder)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--record"]:
+        rate, disk, seconds, log, *endpoints = sys.argv[2:]
+        table = dict(zip([SOURCE, RECORDER], endpoints, strict=True))
+        record(setup(int(rate), float(seconds)), table, log, int(disk))
+    else:
+        main(*map(float, sys.argv[1:]))

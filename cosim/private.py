@@ -1,0 +1,36 @@
+"""Where the participants of a run on one machine meet: sockets in a folder that only their user can enter."""
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+SCHEME = "unixsock-stream/"
+LONGEST = 107  # bytes of a socket's path, on Linux
+
+
+@contextmanager
+def private_endpoints(names: Iterable[str]) -> Iterator[dict[str, str]]:
+    """A Unix-domain socket for each name, in a new folder with mode 0700 and a name that nobody can guess.
+
+    Raises:
+        ValueError: there is no folder for temporary files.
+    """
+    names = list(names)
+    needed = len("/lapwing-12345678/") + max(map(len, names))
+    try:
+        place = tempfile.gettempdir()
+        if len(place.encode()) + needed > LONGEST:
+            place = "/tmp"
+        folder = tempfile.TemporaryDirectory(prefix="lapwing-", dir=place, ignore_cleanup_errors=True)
+    except OSError as error:
+        raise ValueError(f"no folder for temporary files ({error.strerror}); TMPDIR names one") from None
+    with folder as path:
+        yield {name: f"{SCHEME}{path}/{name}" for name in names}
+
+
+def remove(endpoint: str) -> None:
+    """Remove the folder of a private endpoint, whose maker is gone; leaves any other endpoint alone."""
+    if endpoint.startswith(SCHEME):
+        shutil.rmtree(Path(endpoint.removeprefix(SCHEME)).parent, ignore_errors=True)

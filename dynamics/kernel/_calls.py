@@ -1,0 +1,159 @@
+"""How one kernel calls another in the code that LLVM is given: every argument and the result as one value.
+
+numba takes every tuple apart into its numbers before a call and puts it together again behind it, and does the same
+with a result: for a state of a hundred numbers four hundred instructions at every call, two thirds of all that LLVM
+was given. Once a function is inlined nothing of either way is left.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from llvmlite import ir as llvm
+from numba.core import cgutils, ir, types
+from numba.core.callconv import RETCODE_OK, CPUCallConv, excinfo_t
+from numba.core.imputils import impl_ret_new_ref
+from numba.core.lowering import Lower
+
+WHOLE = ".whole"  # at the end of the names of functions that are called so
+
+
+class _Whole:
+    """Arguments as values of their own types; those that stand for nothing are left out."""
+
+    def __init__(self, context: Any, given: Sequence[types.Type]):
+        self._kinds = [None if isinstance(t, types.Omitted) else context.get_value_type(t) for t in given]
+        self.argument_types = tuple(kind for kind in self._kinds if kind is not None)
+
+    def as_arguments(self, builder: Any, values: Sequence[Any]) -> tuple:
+        """What is passed."""
+        pairs = zip(values, self._kinds, strict=True)
+        return tuple(_converted(builder, value, kind) for value, kind in pairs if kind is not None)
+
+    def from_arguments(self, builder: Any, passed: Sequence[Any]) -> list:
+        """The values of what is passed."""
+        left = iter(passed)
+        return [() if kind is None else next(left) for kind in self._kinds]
+
+    def assign_names(self, passed: Sequence[Any], names: Sequence[str]) -> None:
+        """Names of what is passed, for reading the code."""
+        for value, name in zip(passed, names, strict=False):
+            value.name = name
+
+
+def _converted(builder: Any, value: Any, kind: Any) -> Any:
+    """numba gives what is passed for `*arguments` as a struct, also where the type stands for an array."""
+    if value.type == kind:
+        return value
+    array = llvm.Constant(kind, llvm.Undefined)
+    for i in range(kind.count):
+        array = builder.insert_value(array, builder.extract_value(value, i), i)
+    return array
+
+
+class WholeValues(CPUCallConv):
+    """numba's convention for calls, but for tuples: they are handed over as they are."""
+
+    def _get_arg_packer(self, argtypes: Sequence[types.Type]) -> _Whole:
+        return _Whole(self.context, argtypes)
+
+    def get_return_type(self, ty: types.Type) -> Any:
+        """Of the place for the result."""
+        return self.context.get_value_type(ty).as_pointer()
+
+    def declare(self, module: Any, fndesc: Any) -> Any:
+        """The function of a descriptor in a module."""
+        kind = self.get_function_type(fndesc.restype, fndesc.argtypes)
+        function = cgutils.get_or_insert_function(module, kind, fndesc.mangled_name)
+        self.decorate_function(function, fndesc.args, fndesc.argtypes, noalias=fndesc.noalias)
+        if fndesc.inline:
+            function.attributes.add("alwaysinline")
+        return function
+
+    def call(self, builder: Any, fndesc: Any, values: Sequence[Any]) -> Any:
+        """Call the function of a descriptor; its result. An error goes on to the caller's caller."""
+        function = self.declare(builder.module, fndesc)
+        place = cgutils.alloca_once(builder, self.get_return_type(fndesc.restype).pointee)
+        error = cgutils.alloca_once(builder, llvm.PointerType(excinfo_t), name="excinfo")
+        packer = self._get_arg_packer(fndesc.argtypes)
+        code = builder.call(function, [place, error, *packer.as_arguments(builder, values)])
+        with cgutils.if_unlikely(builder, builder.icmp_signed("!=", code, RETCODE_OK)):
+            self.return_status_propagate(builder, _Failed(code, builder.load(error)))
+        return builder.load(place)
+
+
+class _Failed(NamedTuple):
+    """A call that did not return: what is handed on of numba's `Status`."""
+
+    code: Any
+    excinfoptr: Any
+
+
+def is_whole(fndesc: Any) -> bool:
+    """Whether the function of a descriptor is called by `WholeValues`."""
+    return fndesc.mangled_name.endswith(WHOLE)
+
+
+def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
+    """Let code that numba writes call an inner function, which it knows by its entry from Python."""
+    if not is_whole(fndesc):
+        context.insert_user_function(entry, fndesc, [library])
+        return
+
+    def call(context: Any, builder: Any, signature: Any, values: Sequence[Any]) -> Any:
+        result = WholeValues(context).call(builder, fndesc, values)
+        return impl_ret_new_ref(context, builder, fndesc.restype, result)
+
+    call.libs = (library,)  # type: ignore[attr-defined]
+    context._defns[entry].append(call, fndesc.argtypes)  # of several for the same arguments the last one counts
+
+
+class KernelLower(Lower):
+    """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
+
+    def incref(self, typ: types.Type, val: Any) -> None:
+        if self._is_counted(typ):
+            super().incref(typ, val)
+
+    def decref(self, typ: types.Type, val: Any) -> None:
+        if self._is_counted(typ):
+            super().decref(typ, val)
+
+    def _is_counted(self, typ: types.Type) -> bool:
+        return self.context.data_model_manager[typ].contains_nrt_meminfo()
+
+
+class InnerLower(KernelLower):
+    """Writes an inner function, to be called by `WholeValues` unless it needs what only numba's own way can do."""
+
+    def __init__(self, context: Any, library: Any, fndesc: Any, interp: Any, **more: Any):
+        special = isinstance(fndesc.restype, types.Optional) or interp.generator_info is not None
+        if not special and not any(isinstance(t, types.RecursiveCall) for t in fndesc.typemap.values()):
+            fndesc.mangled_name += WHOLE
+        super().__init__(context, library, fndesc, interp, **more)
+
+    @property
+    def call_conv(self) -> CPUCallConv:
+        """Of the function itself."""
+        return WholeValues(self.context) if is_whole(self.fndesc) else super().call_conv
+
+    def setup_function(self, fndesc: Any) -> None:
+        """Begin the function."""
+        if not is_whole(fndesc):
+            super().setup_function(fndesc)
+            return
+        self.function = WholeValues(self.context).declare(self.module, fndesc)
+        if hasattr(self.func_ir.func_id.func, "__apart__"):
+            self.function.attributes.add("noinline")
+        self.entry_block = self.function.append_basic_block("entry")
+        self.builder = llvm.IRBuilder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def lower_inst(self, inst: Any) -> None:
+        """Write one instruction."""
+        if isinstance(inst, ir.Return) and is_whole(self.fndesc):
+            self.call_conv.return_value(self.builder, self.loadvar(inst.value.name))
+        else:
+            super().lower_inst(inst)

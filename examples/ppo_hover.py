@@ -1,0 +1,122 @@
+"""Learns to hover by proximal policy optimisation (PPO of skrl, on JAX): 256 vehicles of `lapwing.gym` at once.
+
+    pip install lapwing[learn]
+    python examples/ppo_hover.py [STEPS] [SEED]
+
+Prints the mean return of whole episodes and how far from the target they end, before and after; 500 is the most that
+ten seconds could give.
+"""
+
+import sys
+import time
+
+import flax.linen as nn
+import gymnasium
+import jax.numpy as jnp
+import numpy as np
+from skrl.agents.jax.ppo import PPO, PPO_CFG
+from skrl.envs.wrappers.jax import wrap_env
+from skrl.memories.jax import RandomMemory
+from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
+from skrl.resources.preprocessors.jax import RunningStandardScaler
+from skrl.trainers.jax import SequentialTrainer
+from skrl.utils import set_seed
+
+import lapwing.gym  # noqa: F401 (registers the environments)
+
+VEHICLES, ROLLOUT, EPISODE = 256, 32, 500  # EPISODE in actions of 20 ms
+FIRST = -1.0  # logarithm of the actions' standard deviation at first
+
+
+class Policy(GaussianMixin, Model):
+    """Actions of an observation, and how much to try around them."""
+
+    def __init__(self, observation_space, action_space, **options):
+        Model.__init__(self, observation_space=observation_space, action_space=action_space, **options)
+        GaussianMixin.__init__(self)
+
+    @nn.compact
+    def __call__(self, inputs, role):
+        """(mean action, logarithm of the standard deviation)."""
+        x = inputs["observations"]
+        for _ in range(2):
+            x = nn.tanh(nn.Dense(64)(x))
+        mean = nn.Dense(4, kernel_init=nn.initializers.orthogonal(0.01))(x)
+        return mean, {"log_std": self.param("log_std", lambda _: FIRST * jnp.ones(4))}
+
+
+class Value(DeterministicMixin, Model):
+    """What is to be expected from an observation on."""
+
+    def __init__(self, observation_space, action_space, **options):
+        Model.__init__(self, observation_space=observation_space, action_space=action_space, **options)
+        DeterministicMixin.__init__(self)
+
+    @nn.compact
+    def __call__(self, inputs, role):
+        """The expected return."""
+        x = inputs["observations"]
+        for _ in range(2):
+            x = nn.tanh(nn.Dense(64)(x))
+        return nn.Dense(1)(x), {}
+
+
+def learner(environments):
+    """A PPO agent for these environments."""
+    spaces = environments.observation_space, environments.action_space
+    models = {"policy": Policy(*spaces), "value": Value(*spaces)}
+    for role, model in models.items():
+        model.init_state_dict(role=role)
+    settings = PPO_CFG(
+        rollouts=ROLLOUT,
+        learning_epochs=5,
+        mini_batches=8,
+        learning_rate=1e-3,
+        value_loss_scale=1.0,
+        time_limit_bootstrap=True,
+        value_preprocessor=RunningStandardScaler,
+        value_preprocessor_kwargs={"size": 1},
+    )
+    settings.experiment.write_interval = settings.experiment.checkpoint_interval = 0
+    memory = RandomMemory(memory_size=ROLLOUT, num_envs=environments.num_envs)
+    return PPO(
+        models=models, memory=memory, observation_space=spaces[0], action_space=spaces[1], cfg=settings
+    )  # fmt: skip
+
+
+def judged(agent, seed=10**6, vehicles=64):
+    """Mean return of one episode of each vehicle with the mean actions, and mean distance at its end [m]."""
+    environments = gymnasium.make_vec("lapwing/Hover-v0", vehicles, "vector_entry_point")
+    observed, _ = environments.reset(seed=seed)
+    total, over, away = np.zeros(vehicles), np.zeros(vehicles, bool), np.full(vehicles, np.nan)
+    for _ in range(EPISODE):
+        _, outputs = agent.policy.act({"observations": jnp.asarray(observed)}, role="policy")
+        observed, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
+        total += np.where(over, 0.0, reward)
+        away = np.where(over, away, np.linalg.norm(observed[:, :3], axis=1))
+        over |= terminated | truncated
+    return total.mean(), away.mean()
+
+
+def main(steps=2000, seed=1):
+    """Learn for so many steps of 20 ms of all vehicles; (return, distance [m]) before and after."""
+    set_seed(seed)
+    environments = wrap_env(gymnasium.make_vec("lapwing/Hover-v0", VEHICLES, "vector_entry_point"), verbose=False)
+    agent = learner(environments)
+    before = judged(agent)
+    print(f"before: return {before[0]:6.1f}, {before[1]:.2f} m from the target at the end", flush=True)
+    began, processor = time.monotonic(), time.process_time()
+    SequentialTrainer(
+        env=environments,
+        agents=agent,
+        cfg={"timesteps": steps, "headless": True, "disable_progressbar": None, "close_environment_at_exit": False},
+    ).train()
+    took = time.process_time() - processor
+    after = judged(agent)
+    print(f"after:  return {after[0]:6.1f}, {after[1]:.2f} m from the target at the end")
+    print(f"{steps * VEHICLES} steps, {took:.0f} s of processor time, {time.monotonic() - began:.0f} s")
+    return before, after
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""Standard output that may be full or closed: an error of its own, which nobody takes for one of the log's."""
+
+import io
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+
+class OutputError(Exception):
+    """Standard output cannot be written.
+
+    Attributes:
+        closed: whoever read it has gone, as `lapwing ... | head` does.
+    """
+
+    def __init__(self, error: OSError):
+        super().__init__(f"standard output: cannot be written: {(error.strerror or str(error)).lower()}")
+        self.closed = isinstance(error, BrokenPipeError)
+
+
+class _Raw(io.FileIO):
+    _lost = False
+
+    def write(self, data: Any) -> int:
+        """Write, or say once what hinders it; what is left in buffers goes nowhere."""
+        if self._lost:
+            return len(data)
+        try:
+            return super().write(data) or 0
+        except OSError as error:
+            self._lost = True
+            raise OutputError(error) from None
+
+
+@contextmanager
+def checked_output() -> Iterator[None]:
+    """Let standard output raise `OutputError` where it cannot be written, at the latest at the end of the context."""
+    before = sys.stdout
+    try:
+        raw = _Raw(before.fileno(), "w", closefd=False)
+    except (AttributeError, OSError):  # there is none, or it is no file
+        yield
+        return
+    before.flush()
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(raw),
+        before.encoding,
+        before.errors,
+        line_buffering=bool(before.line_buffering),
+        write_through=bool(getattr(before, "write_through", False)),
+    )
+    try:
+        yield
+    except BaseException:  # which says more than that it could not all be said
+        with suppress(OutputError):
+            sys.stdout.flush()
+        raise
+    else:
+        sys.stdout.flush()
+    finally:
+        sys.stdout = before

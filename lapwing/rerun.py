@@ -1,0 +1,66 @@
+"""A log in Rerun, a viewer of its own program: converted, with a blueprint that lays out what is in it."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from cosim.log import LogReader
+
+APPLICATION = "lapwing"
+MISSING = "--rerun: Rerun is not installed; pip install lapwing[view]"
+PLOTTED = ("battery", "sonar", "baro", "imu")  # topics that Rerun draws as curves
+
+
+def program() -> str | None:
+    """The path of Rerun's program: of this environment, or of the search path; None where there is none."""
+    return shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
+
+
+def open_in_rerun(log: Path) -> None:
+    """Write a recording of Rerun's beside a log, start the viewer on it, and leave it.
+
+    Raises:
+        ValueError: no log, or Rerun is not installed.
+    """
+    with LogReader(log) as recorded:
+        topics = set(recorded.topics())
+    found = program()
+    if found is None or importlib.util.find_spec("rerun") is None:
+        raise ValueError(MISSING)
+    target = log.with_suffix(".rrd")
+    convert(log, topics, target)
+    subprocess.Popen([found, "--bind", "127.0.0.1", str(target)], start_new_session=True)
+
+
+def convert(log: Path, topics: set[str], target: Path) -> None:
+    """Write a log with these topics as a recording of Rerun's that begins with its blueprint."""
+    import rerun
+
+    recording = rerun.RecordingStream(APPLICATION)
+    recording.save(target, default_blueprint=blueprint(topics))
+    recording.log_file_from_path(log)
+    recording.flush()
+    recording.disconnect()
+
+
+def blueprint(topics: set[str]) -> Any:
+    """Space beside curves, map and events, of those topics that there are."""
+    import rerun.blueprint as layout
+
+    vehicle = next((topic.split("/")[1] for topic in sorted(topics) if topic.endswith("/truth")), "")
+
+    def there(name: str) -> str | None:
+        topic = f"/{vehicle}/{name}"
+        return topic if topic in topics else None
+
+    views: list[Any] = [layout.TimeSeriesView(origin=t, name=name) for name in PLOTTED if (t := there(name))]
+    if place := there("gps/fix"):
+        views.append(layout.MapView(origin=place, name="map"))
+    if told := there("events"):
+        views.append(layout.TextLogView(origin=told, name="events"))
+    shown = [topic for topic in ("/tf", there("pose"), there("mag")) if topic in topics]
+    space = layout.Spatial3DView(origin="/", contents=shown, name="in space")
+    return layout.Blueprint(layout.Horizontal(space, layout.Vertical(*views)), collapse_panels=True)

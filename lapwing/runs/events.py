@@ -1,0 +1,31 @@
+"""The events of a flight as a topic of its log, so that every viewer shows them."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from cosim.log.append import append
+from messages import Log, stamp
+from messages.topics import EVENTS
+from studies.events import Event
+from studies.flight import Flight
+
+SERIOUS = ("failsafe", "fault", "restart", "slack", "warning")  # kinds that viewers are to show as warnings
+
+
+def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
+    """Time [ns] and payload of each event, in order."""
+    found = []
+    for event in events:
+        time_ns = max(0, round(event.time * 1e9))
+        level = Log.WARN if event.kind in SERIOUS else Log.INFO
+        found.append((time_ns, Log(stamp(time_ns), level, event.kind, event.text).encode()))
+    return found
+
+
+def add_events(log: Path, flight: Flight) -> None:
+    """Write the events of a recorded flight into its log, which has its end and does not tell of them.
+
+    Raises:
+        ValueError: the log cannot be written.
+    """
+    append(log, EVENTS.key(flight.vehicle), Log, event_messages(flight.events))

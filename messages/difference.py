@@ -1,0 +1,42 @@
+"""Where two messages of one type differ."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+
+class FieldDifference(NamedTuple):
+    """The first field in which two messages differ."""
+
+    field: str  # dotted; "" where all fields that both have are the same, and the lengths differ
+    one: Any
+    other: Any
+
+    @property
+    def by(self) -> float | None:
+        """The other value minus the one, None where they are no numbers."""
+        numbers = isinstance(self.one, int | float) and isinstance(self.other, int | float)
+        return self.other - self.one if numbers else None
+
+
+def first_difference(message: Any, one: bytes, other: bytes) -> FieldDifference | None:
+    """The first field that is not the same in two encoded messages of a class; None where they are the same bytes.
+
+    Raises:
+        ValueError: one of them is no message of the class.
+    """
+    if one == other:
+        return None
+    for (field, a), (_, b) in zip(leaves(message.decode(one)), leaves(message.decode(other)), strict=False):
+        if repr(a) != repr(b):
+            return FieldDifference(field, a, b)
+    return FieldDifference("", f"{len(one)} bytes", f"{len(other)} bytes")
+
+
+def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """(dotted name, value) of everything in a message."""
+    if not isinstance(value, tuple):
+        yield path, value
+        return
+    names = getattr(value, "_fields", range(len(value)))
+    for name, part in zip(names, value, strict=True):
+        yield from leaves(part, f"{path}.{name}" if path else str(name))

@@ -1,0 +1,53 @@
+"""What the autopilot is told of the vehicle of a scene."""
+
+import math
+
+from cosim.scene import Scene
+from dynamics.atmosphere import density
+from dynamics.kernel import uncompiled
+from dynamics.vehicles.multirotor import STANDARD_DENSITY
+from services.autopilot.law import Airframe, lift, moments
+from services.autopilot.motor import Motor
+from services.common.environment import environment
+from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height
+
+
+def _density(scene: Scene) -> float:
+    """[kg/m^3] of the air at home, as far as the scene has it depend on the altitude."""
+    around = environment(scene)
+    if "air_density" not in scene[Effects].tables:
+        return STANDARD_DENSITY
+    return float(uncompiled(density)(around.atmosphere, around.home.height))
+
+
+def known_airframe(scene: Scene) -> Airframe:
+    """What the autopilot is told of the vehicle: nominal numbers, in the air of home."""
+    frame = airframe(scene)
+    rotor = rotor_constants(scene)
+    torque_per_thrust = rotor.torque / rotor.thrust
+    thrust_coefficient = (_density(scene) if rotor.with_density else 1.0) * rotor.thrust
+    weight = frame.mass.total * gravity(scene) / len(frame.rotors.position)
+    slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
+    spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0
+    x, y, z = zip(*frame.rotors.position, strict=True)
+    axis = frame.rotors.tilted_axis
+    engine = frame.motor
+    known = Airframe(
+        frame.mass.total,
+        frame.mass.inertia,
+        x,
+        y,
+        frame.rotors.reaction_sign,
+        torque_per_thrust,
+        Motor(thrust_coefficient, engine.gear_ratio, engine.speed_constant, engine.time_constant),
+        engine.max_voltage,
+        start_height(scene),
+        gravity(scene),
+        rotor_z=z if axis else (),
+        rotor_axis=axis,
+    )
+    if not spins_up:
+        return known
+    # of tilted rotors the thrust turns, too, and of their spinning up only the part about z
+    torque = moments(known)[2] / lift(known) if axis else torque_per_thrust
+    return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

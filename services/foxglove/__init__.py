@@ -1,0 +1,1 @@
+"""Serves the Foxglove WebSocket protocol: topics as they are, with the simulation's time."""

@@ -1,0 +1,80 @@
+"""The server that Foxglove and Lichtblick connect to: payloads go on as they are, with the simulation's time."""
+
+import re
+from typing import Any, Self
+
+from messages import TYPES
+
+BACKLOG = 16384  # messages kept for a client; the oldest go where it is too slow
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """Host and port.
+
+    Raises:
+        ValueError: not of the form HOST:PORT.
+    """
+    found = re.fullmatch(r"\[?([\w.:-]+?)\]?:(\d{1,5})", text)
+    if found is None or int(found[2]) > 65535:
+        raise ValueError(f"--foxglove {text}: expected HOST:PORT, for example 127.0.0.1:8765")
+    return found[1], int(found[2])
+
+
+class Server:
+    """A context manager; serves what is put."""
+
+    def __init__(self, address: str):
+        """Begin to listen.
+
+        Raises:
+            ValueError: no address, it cannot be listened on, or foxglove-sdk is not installed.
+        """
+        host, port = parse_address(address)
+        try:
+            import foxglove
+            from foxglove.websocket import Capability
+        except ImportError:
+            raise ValueError("--foxglove: foxglove-sdk is not installed; pip install lapwing[foxglove]") from None
+        self._foxglove: Any = foxglove
+        self._context = foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        self._time_ns = -1
+        try:
+            self._server = foxglove.start_server(
+                name="lapwing",
+                host=host,
+                port=port,
+                capabilities=[Capability.Time],
+                context=self._context,
+                message_backlog_size=BACKLOG,
+            )
+        except Exception as fault:  # the library's own, of whatever class
+            raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
+        self.port: int = self._server.port
+
+    def declare(self, topic: str, type_name: str) -> None:
+        """Tell clients of a topic before its first message; types that are not ours have no channel."""
+        if topic in self._channels or type_name not in TYPES:
+            return
+        text = TYPES[type_name].schema_text.encode()
+        schema = self._foxglove.Schema(name=type_name, encoding="ros2msg", data=text)
+        channel = self._foxglove.Channel(topic, schema=schema, message_encoding="cdr", context=self._context)
+        self._channels[topic] = channel
+
+    def put(self, topic: str, time_ns: int, payload: bytes) -> None:
+        """A message of a declared topic."""
+        if time_ns != self._time_ns:
+            self._time_ns = time_ns
+            self._server.broadcast_time(time_ns)
+        self.log(topic, time_ns, payload)
+
+    def log(self, topic: str, time_ns: int, payload: bytes) -> None:
+        """A message that comes late: the simulation's time stays."""
+        if topic in self._channels:
+            self._channels[topic].log(payload, log_time=time_ns)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.stop()

@@ -1,0 +1,44 @@
+"""The process that shows a run while it flies: it reads the services' batches, which slows nobody down."""
+
+from typing import Any
+
+from cosim.bundle import unpack_batch
+from cosim.keys import BATCH_KEY
+from cosim.process import POLL, Process
+from cosim.watch import WATCHER
+from messages.topics import EVENTS
+from services.foxglove.server import Server
+
+
+def run(process: Process, given: Any) -> None:
+    """Serve until the flight has ended, or until asked to stop.
+
+    Raises:
+        ValueError: the address cannot be listened on.
+    """
+    setup = process.setup
+    with Server(given.foxglove) as server:
+        events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
+        watcher = dict.fromkeys(events, process.participants.mark(WATCHER))
+        arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
+        for topic in events.values():
+            server.declare(topic, EVENTS.message.type_name)
+        process.join()
+        while not process.stopping:
+            news = arrived.get_with_key(POLL)
+            if news is None:
+                continue
+            key, time_ns, payload = news
+            if not payload:
+                return
+            if key in events:
+                server.log(events[key], time_ns, payload)
+                continue
+            messages = []
+            for page in unpack_batch(payload)[1]:
+                topic = page.topic.key(setup.vehicle)
+                server.declare(topic, page.topic.message.type_name)
+                times = page.ticks * setup.interval_ns
+                messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, page.payloads, strict=True)]
+            for time_ns, topic, message in sorted(messages, key=lambda m: m[0]):
+                server.put(topic, time_ns, message)

@@ -1,0 +1,73 @@
+"""What ground stations are told of the motors: which output drives which, where it sits, and which way it turns.
+
+As PX4 describes them (MAVLink's component_metadata/actuators.schema.json): QGroundControl draws its page of actuators
+from it. Nothing there can be changed, and the motors cannot be run one by one.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from services.mavlink.frames import swap_body
+from services.mavlink.px4_facts import FIRST_MOTOR, MULTIROTOR, output_function
+from services.mavlink.vehicle import Rotor
+
+VERSION = 2  # of the format
+_STOPPED, _FULL = 0.0, 1.0
+
+
+def actuators(rotors: Sequence[Rotor]) -> dict[str, Any]:
+    """The description of the motors, as JSON."""
+    numbers = range(1, len(rotors) + 1)
+    channel = {"name": output_function("${i}"), "label": "Function", "function": "function"}
+    channels = [{"label": f"Channel {n}", "param-index": n} for n in numbers]
+    functions: dict[str, Any] = {"0": {"label": "Disabled"}}
+    for n in numbers:
+        functions[str(FIRST_MOTOR + n - 1)] = {"label": f"Motor {n}", "exclude-from-actuator-testing": True}
+    return {
+        "version": VERSION,
+        "outputs_v1": [
+            {"label": "Simulation", "subgroups": [{"per-channel-parameters": [channel], "channels": channels}]}
+        ],
+        "functions_v1": functions,
+        "mixer_v1": {
+            "actuator-types": {
+                "DEFAULT": {"values": {"min": _STOPPED, "max": _FULL}},
+                "motor": {
+                    "function-min": FIRST_MOTOR,
+                    "function-max": FIRST_MOTOR + len(rotors) - 1,
+                    "label-index-offset": 1,
+                    "values": {"min": _STOPPED, "max": _FULL, "default": _STOPPED},
+                },
+            },
+            "config": [_geometry(rotors)],
+        },
+    }
+
+
+def _geometry(rotors: Sequence[Rotor]) -> dict[str, Any]:
+    """Positions forward, right and down, as PX4 has them."""
+    x, y, z = zip(*(swap_body(rotor.position_body) for rotor in rotors), strict=True)
+    turns = [float(rotor.counterclockwise) for rotor in rotors]
+    values = {
+        "posx": ("Position X", x),
+        "posy": ("Position Y", y),
+        "posz": ("Position Z", z),
+        "spin-dir": ("Direction CCW", turns),
+    }
+    return {
+        "option": f"CA_AIRFRAME=={MULTIROTOR}",
+        "type": "multirotor",
+        "title": "Multirotor",
+        "actuators": [
+            {
+                "group-label": "Motors",
+                "actuator-type": "motor",
+                "required": True,
+                "count": len(rotors),
+                "per-item-parameters": [
+                    {"label": label, "function": function, "value": list(value)}
+                    for function, (label, value) in values.items()
+                ],
+            }
+        ],
+    }

@@ -1,0 +1,75 @@
+"""A multirotor that carries a load on a cable, under the same effects and commands as `reduced`."""
+
+from types import ModuleType
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from cosim.scene import Scene, Section
+from cosim.setup import ServiceSetup
+from dynamics.errors import KeyedError
+from dynamics.vector import Vec3
+from dynamics.vehicles import multirotor_slung
+from dynamics.vehicles.multirotor_slung import Sling
+from services.common.environment import environment
+from services.common.vehicle import Vehicle, VehicleAirframe, active, airframe
+from services.plant.config import Solver
+from services.plant.cores.slung_load import SlungLoadView
+from services.plant.models import reduced
+from services.plant.models._common import bodies_port, multirotor_plant, needs
+
+NAME = "slung_load"
+FASTEST = 1.0  # frequency of the cable times the step: explicit methods of order 4 are exact to 1e-2 a turn
+
+
+class SlungLoad(Section):
+    """The cable and its load; the autopilot is told of neither."""
+
+    TABLE: ClassVar[str] = NAME
+    OPTIONAL: ClassVar[bool] = True
+    mass: float = Field(gt=0.0)  # [kg] of the load, not part of the vehicle's
+    length: float = Field(gt=0.0)  # [m] of the cable without tension
+    stiffness: float = Field(default=2000.0, gt=0.0)  # [N/m] of the cable
+    damping_ratio: float = Field(default=0.1, ge=0.0, lt=2.0)  # ratio, of the load on the taut cable
+    hook: Vec3 = Field(default=(0.0, 0.0, 0.0), strict=False)  # [m] body, where it is fastened
+    drag_area: float = Field(default=0.0, ge=0.0)  # [m^2] of the load, drag coefficient times area
+
+    def check(self, scene: Scene) -> None:
+        """There is a vehicle to carry it, and the step is short enough for the cable."""
+        if scene[Vehicle].model != NAME:
+            raise KeyedError(
+                NAME, f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "{NAME}"'
+            )
+        fastest = multirotor_slung.frequency(_sling(scene), airframe(scene).mass.total)
+        if scene[Solver].step * fastest > FASTEST:
+            message = f"the load on the taut cable swings along it with {fastest:.0f} rad/s"
+            raise KeyedError("solver.step", message, f"at most {FASTEST / fastest:.1g} s, or a softer cable")
+
+
+def _sling(scene: Scene) -> Sling:
+    s = scene[SlungLoad]
+    reduced_mass = 1.0 / (1.0 / s.mass + 1.0 / airframe(scene).mass.total)
+    damping = 2.0 * s.damping_ratio * (s.stiffness * reduced_mass) ** 0.5
+    hook = tuple(a - b for a, b in zip(s.hook, scene[VehicleAirframe].loaded.mass.centre, strict=True))
+    return Sling(s.mass, s.length, s.stiffness, damping, hook, s.drag_area, environment(scene).terrain)  # type: ignore[arg-type]
+
+
+def check(scene: Scene) -> None:
+    """As of the reduced model; and there is a load."""
+    needs(scene, NAME)
+    reduced.check(scene)
+
+
+def described(scene: Scene) -> tuple[ModuleType, Any]:
+    """As `reduced.described`."""
+    return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
+
+
+def resolve(scene: Scene) -> ServiceSetup:
+    """The plant of a multirotor with its load, which is told of as a body."""
+    found = multirotor_plant(scene, *described(scene))
+    plant = found.parameters
+    parameters = plant._replace(
+        model=NAME, bodies=SlungLoadView(plant.core.vehicle.layout), wiring=plant.wiring._replace(bodies=("load",))
+    )
+    return found._replace(parameters=parameters, ports=(*found.ports, bodies_port(scene, 1)))

@@ -1,0 +1,100 @@
+"""What other nodes may ask of the vehicle: topics, and what each message is for the autopilot.
+
+Frames and units are those of ROS and ours: ENU, FLU, SI.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
+from messages import Actuators, Bool, OperatorCommand, OperatorInput, PoseStamped, Setpoint, String, TwistStamped
+
+SOURCE = "ros2"
+WORLD = "world"
+_NONE = (math.nan,) * 3
+Wish = tuple[str, tuple[float, ...]]  # kind and values of an OperatorCommand
+
+
+class Accepted(NamedTuple):
+    """A topic on which commands are taken."""
+
+    name: str  # behind the vehicle's
+    message: Any
+    wish: Callable[[Any], Wish]
+
+
+def _pose(m: Any) -> Wish:
+    _check_frame(m)
+    q = m.pose.orientation
+    yaw = to_roll_pitch_yaw(Quaternion(q.w, q.x, q.y, q.z))[2]
+    return "offboard_position", (*m.pose.position, *_NONE, *_NONE, yaw, math.nan)
+
+
+def _velocity(m: Any) -> Wish:
+    _check_frame(m)
+    return "offboard_position", (*_NONE, *m.twist.linear, *_NONE, math.nan, m.twist.angular.z)
+
+
+def _setpoint(m: Any) -> Wish:
+    _check_frame(m)
+    return "offboard_position", (*m.position, *m.velocity, *m.acceleration, m.yaw, m.yaw_rate)
+
+
+def _motors(m: Any) -> Wish:
+    return "offboard_motors", tuple(m.motor_voltage)
+
+
+def _check_frame(m: Any) -> None:
+    if m.header.frame_id not in ("", WORLD):
+        raise ValueError(f"frame {m.header.frame_id}: expected {WORLD}")
+
+
+ACCEPTED = (
+    Accepted("command/arm", Bool, lambda m: ("arm" if m.data else "disarm", ())),
+    Accepted("command/mode", String, lambda m: (m.data, ())),
+    Accepted("command/pose", PoseStamped, _pose),
+    Accepted("command/velocity", TwistStamped, _velocity),
+    Accepted("command/setpoint", Setpoint, _setpoint),
+    Accepted("command/motors", Actuators, _motors),
+)
+OPERATOR = "command/operator"  # takes an OperatorInput, with every command that there is
+
+
+class Commands:
+    """Turns messages into commands of the autopilot, and counts."""
+
+    def __init__(self, vehicle: str):
+        """Of a vehicle."""
+        self._accepted = {f"/{vehicle}/{a.name}": a for a in ACCEPTED}
+        self._operator = f"/{vehicle}/{OPERATOR}"
+        self.messages = {topic: a.message for topic, a in self._accepted.items()} | {self._operator: OperatorInput}
+        self.taken, self.refused = 0, 0
+        self.why = ""  # the last message was refused
+        self._numbers = itertools.count(1)
+
+    def read(self, topic: str, payload: bytes) -> tuple[Any, ...]:
+        """The commands of a message; none where it is refused."""
+        try:
+            found = tuple(self._read(topic, payload))
+        except ValueError as error:
+            self.refused, self.why = self.refused + 1, f"{topic}: {error}"
+            return ()
+        self.taken += len(found)
+        return found
+
+    def _read(self, topic: str, payload: bytes) -> Iterable[Any]:
+        if topic == self._operator:
+            given = OperatorInput.decode(payload).commands
+            return [command._replace(source=f"{SOURCE}/{command.source}") for command in given]
+        accepted = self._accepted[topic]
+        kind, values = accepted.wish(accepted.message.decode(payload))
+        return [OperatorCommand(kind, SOURCE, next(self._numbers), tuple(values))]
+
+    def report(self) -> str:
+        """What there is to tell at the end; "" where nothing came."""
+        if not self.taken and not self.refused:
+            return ""
+        refused = f", {self.refused} messages refused, the last: {self.why}" if self.refused else ""
+        return f"{self.taken} commands taken{refused}"

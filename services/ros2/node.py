@@ -1,0 +1,118 @@
+"""A node of a ROS 2 graph: a Zenoh session of its own, with what rmw_zenoh expects of one."""
+
+import ipaddress
+import re
+from collections.abc import Callable
+from typing import Any, Self
+
+from cosim.bus import Subscription, ZenohBus
+from cosim.errors import BusError
+from messages import TYPES
+from services.ros2.names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
+
+ROUTER = "127.0.0.1:7447"  # where nodes of rmw_zenoh look for their router
+# Nodes are told of one another, as by rmw_zenoh's own router, and then talk to one another directly.
+_SETTINGS = {"scouting/gossip/enabled": True, "transport/unicast/open_timeout": 3000}
+
+
+def parse_router(text: str, insecure: bool) -> tuple[str, bool]:
+    """The Zenoh endpoint HOST:PORT of a router, and whether it is on this machine.
+
+    Raises:
+        ValueError: not of this form, or another machine, where nobody proves who he is, without `insecure`.
+    """
+    found = re.fullmatch(r"\[?([\w.:-]+?)\]?:(\d{1,5})", text)
+    if found is None or int(found[2]) > 65535:
+        raise ValueError(f"--ros2-router {text}: expected HOST:PORT, for example {ROUTER}")
+    local = _is_loopback(found[1])
+    if not local and not insecure:
+        raise ValueError(f"--ros2-router {text}: is not this machine, and anybody there could command: add --insecure")
+    host = f"[{found[1]}]" if ":" in found[1] else found[1]
+    return f"tcp/{host}:{found[2]}", local
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+class Asked:
+    """What other nodes have published and was not taken yet."""
+
+    def __init__(self, arrived: Subscription, topics: dict[str, str]):
+        """Of a subscription; the topic of each key."""
+        self._arrived, self._topics = arrived, topics
+
+    def get(self) -> tuple[str, bytes] | None:
+        """Topic and payload of the next message; None where there is none."""
+        found = self._arrived.get_with_key(timeout=0.0)
+        return found and (self._topics[found[0]], found[2])
+
+
+class Node:
+    """Publishes and subscribes in a graph; a context manager."""
+
+    def __init__(self, domain: int, router: str = ROUTER, insecure: bool = False):
+        """Join a graph by its router; where none is on this machine, be the router.
+
+        Args:
+            domain: ROS_DOMAIN_ID of the graph.
+            router: HOST:PORT.
+            insecure: it may be on another machine.
+
+        Raises:
+            ValueError: the router is no address, or cannot be reached.
+        """
+        endpoint, local = parse_router(router, insecure)
+        self._domain, self._entities = domain, 0
+        self._bus = _open(endpoint, local)
+        self._puts: dict[str, Callable[[bytes, int], None]] = {}
+        self._bus.declare_alive(node_token(domain, self._bus.session_id))
+
+    def declare(self, topic: str, type_name: str) -> None:
+        """Publish a topic, "/drone1/imu"; types that are not ours are left out."""
+        if topic in self._puts or type_name not in TYPES:
+            return
+        endpoint = Endpoint(topic, type_name)
+        token = self._token(endpoint, PUBLISHER)
+        # A node that is too slow misses messages, as with rmw_zenoh's own publishers; it does not hold up the run.
+        self._puts[topic] = self._bus.publisher(endpoint.key(self._domain), identifier(token), drops=True)
+        self._bus.declare_alive(token)
+
+    def put(self, topic: str, time_ns: int, payload: bytes) -> None:
+        """A message of a declared topic, stamped with the simulation time [ns]."""
+        if topic in self._puts:
+            self._puts[topic](payload, time_ns)
+
+    def subscribe(self, messages: dict[str, Any]) -> "Asked":
+        """Receive what other nodes publish; message class by topic."""
+        endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]
+        topics = {endpoint.key(self._domain): endpoint.topic for endpoint in endpoints}
+        asked = Asked(self._bus.subscribe(*topics), topics)
+        for endpoint in endpoints:
+            self._bus.declare_alive(self._token(endpoint, SUBSCRIPTION))
+        return asked
+
+    def _token(self, endpoint: Endpoint, kind: str) -> str:
+        self._entities += 1
+        return endpoint.token(self._domain, self._bus.session_id, self._entities, kind)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bus.close()
+
+
+def _open(endpoint: str, local: bool) -> ZenohBus:
+    if local:
+        try:
+            return ZenohBus([endpoint], mode="router", security=_SETTINGS)
+        except BusError:  # somebody listens there already: a router, if all is well
+            pass
+    try:
+        return ZenohBus(connect=[endpoint], mode="client", security=_SETTINGS)
+    except BusError as error:
+        raise ValueError(f"--ros2: {error}; expected a Zenoh router there (--ros2-router HOST:PORT)") from None

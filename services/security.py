@@ -1,0 +1,48 @@
+"""What each participant of a run may publish, from the process table and the topics of its services; and the settings
+of its links that follow."""
+
+from pathlib import Path
+from typing import Any
+
+from cosim.access import by_certificate, door
+from cosim.certificates import tls
+from cosim.keys import ENCODER
+from cosim.setup import Setup
+from cosim.watch import WATCHER
+from services.processes import PROCESSES, create
+
+
+def names() -> list[str]:
+    """Everybody who can take part in a run."""
+    makers = [f"{process.name}{ENCODER}" for process in PROCESSES if process.lock_step]
+    return [*(process.name for process in PROCESSES), *makers, WATCHER]
+
+
+def says(setup: Setup, key_prefix: str) -> dict[str, list[str]]:
+    """The key expressions that each may publish on, by name."""
+    found = {name: [f"{key_prefix}/*/{name}"] for name in names()}
+    for name in setup.services:
+        topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
+        found[name] += topics
+        found[f"{name}{ENCODER}"] += [*topics, f"{key_prefix}/*/{name}"]
+    return found
+
+
+def settings(setup: Setup, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
+    """Zenoh's settings for the links of a participant of a run on several hosts; none without a folder of certificates.
+
+    Raises:
+        ValueError: its certificate cannot be used.
+    """
+    if not keys:
+        return {}
+    return {**tls(Path(keys), name), **by_certificate(key_prefix, says(setup, key_prefix))}
+
+
+def door_settings(name: str, key_prefix: str, keys: str) -> dict[str, Any]:
+    """Zenoh's settings for whoever lets clients into a run on one machine.
+
+    Raises:
+        ValueError: its certificate cannot be used.
+    """
+    return {**(tls(Path(keys), name) if keys else {}), **door(key_prefix, bool(keys))}

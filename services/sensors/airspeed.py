@@ -1,0 +1,102 @@
+"""Airspeed sensor, a pitot tube: the dynamic pressure of the air that comes along it (theory.md, eq. (3.39))."""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Lt
+
+from cosim.schedule import Port
+from cosim.wire import Fields, Wire
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotate_back
+from dynamics.noise import TURN_ON, Key, normal, normal3
+from messages import FluidPressure, header
+from messages import topics as topic
+from messages.records import stamp_columns
+from services.sensors import errors
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.truth import Truth
+
+CHANNELS = ("pressure",)
+
+
+class Airspeed(NamedTuple):
+    """Parameters of a tube along the body's x axis."""
+
+    noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
+    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
+    scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
+    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
+    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
+
+
+class AirspeedReading(NamedTuple):
+    """One reading of a differential pressure."""
+
+    pressure: float = 0.0  # [Pa]
+    variance: float = 0.0  # [Pa^2], of the white noise
+    valid: bool = False
+
+
+class AirspeedState(NamedTuple):
+    """State of a tube."""
+
+    scale: float
+    turn_on: float  # [Pa]
+    line: Line  # the first of the three
+
+
+READING = AirspeedReading()
+
+
+def blank() -> AirspeedState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return AirspeedState(0.0, 0.0, BLANK)
+
+
+@leaf
+def _true_pressure(truth: Truth) -> float:
+    """[Pa]; from behind, the openings feel as much suction."""
+    along = rotate_back(truth.attitude, truth.air_velocity_world)[0]
+    return 0.5 * truth.air_density * along * abs(along)
+
+
+@kernel
+def initial(p: Airspeed, key: Key, truth: Truth) -> AirspeedState:
+    """State before the first sample."""
+    draw = normal3(key, TURN_ON, 0)
+    scale, turn_on = 1.0 + p.scale_error * draw[0], p.turn_on_pa * draw[1]
+    return AirspeedState(scale, turn_on, new_line((scale * _true_pressure(truth) + turn_on, 0.0, 0.0)))
+
+
+@kernel
+def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> tuple[AirspeedState, AirspeedReading]:
+    """Next state and reading; arguments as of `imu.sample`."""
+    noise = errors.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 0)
+    measured = s.scale * _true_pressure(truth) + s.turn_on + noise
+    measured = errors.quantise(errors.limit(measured, p.range_pa), p.resolution_pa)
+    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
+    variance = errors.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
+    return AirspeedState(s.scale, s.turn_on, line), AirspeedReading(arrived[0], variance, valid)
+
+
+def _fields(r: AirspeedReading, time_ns: np.ndarray) -> Fields:
+    """Differential pressure; no reading: NaN."""
+    pressure = np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan)
+    return {**stamp_columns(time_ns), "fluid_pressure": pressure, "variance": r.variance}
+
+
+def wires(frame: str, port: Port, p: Airspeed) -> list[Wire]:
+    """Its topic."""
+    return [Wire(topic.AIRSPEED, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))]
+
+
+# Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Zero point (0.2 Pa) and span (3 % of the
+# value) could not be verified. Noise and resolution: chosen.
+SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
+
+PRESETS = {"sdp33": SDP33, "ideal": Airspeed()}

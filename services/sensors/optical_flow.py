@@ -1,0 +1,123 @@
+"""Optical flow: how fast the ground turns past a camera that looks down (theory.md, eq. (3.41))."""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Lt
+
+from cosim.schedule import Port
+from cosim.wire import Fields, Wire
+from dynamics.kernel import kernel, leaf
+from dynamics.lie.quaternion import rotate, rotate_back
+from dynamics.noise import TURN_ON, Key, normal3
+from dynamics.vector import Vec3
+from messages import OpticalFlow as OpticalFlowMessage
+from messages import header
+from messages import topics as topic
+from messages.records import stamp_columns
+from services.common.ports import OpticalFlowReading
+from services.sensors import errors
+from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.sensors.rangefinder import to_ground
+from services.sensors.truth import Truth
+
+CHANNELS = ("flow", "rate")
+
+
+class OpticalFlow(NamedTuple):
+    """Parameters of a camera at the body's origin that looks along -z of the body."""
+
+    noise_rad_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [rad/s/sqrt(Hz)] one-sided density of the flow
+    gyro_noise_dps_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [deg/s/sqrt(Hz)] one-sided density of its gyroscopes
+    scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: focal length
+    flow_max: Annotated[float, Gt(0)] = math.inf  # [rad/s] faster, it loses the texture
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m] nearer, it is out of focus
+    range_max: Annotated[float, Gt(0)] = math.inf  # [m] farther, there is no texture
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
+
+
+class OpticalFlowState(NamedTuple):
+    """State of a camera."""
+
+    scale: float
+    flow: Line  # the third is the distance
+    rate: Line  # the first two of the three
+
+
+READING = OpticalFlowReading()
+
+
+def blank() -> OpticalFlowState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return OpticalFlowState(0.0, BLANK, BLANK)
+
+
+@leaf
+def _true_flow(truth: Truth) -> Vec3:
+    """(flow about x, about y [rad/s], distance [m])."""
+    distance = to_ground(truth.terrain, truth.position_world, rotate(truth.attitude, (0.0, 0.0, -1.0)))
+    v, omega = rotate_back(truth.attitude, truth.velocity_world), truth.omega_body
+    inverse = 1.0 / max(distance, 1e-6)
+    return omega[0] + v[1] * inverse, omega[1] - v[0] * inverse, distance
+
+
+@kernel
+def initial(p: OpticalFlow, key: Key, truth: Truth) -> OpticalFlowState:
+    """State before the first sample."""
+    scale, true = 1.0 + p.scale_error * normal3(key, TURN_ON, 0)[0], _true_flow(truth)
+    flow = (scale * true[0], scale * true[1], true[2])
+    return OpticalFlowState(scale, new_line(flow), new_line(truth.omega_body))
+
+
+@kernel
+def sample(
+    p: OpticalFlow, s: OpticalFlowState, key: Key, tick: int, truth: Truth
+) -> tuple[OpticalFlowState, OpticalFlowReading]:
+    """Next state and reading; arguments as of `imu.sample`."""
+    true, first, second = _true_flow(truth), normal3(key, tick, 0), normal3(key, tick, 1)
+    noise = errors.white_deviation(p.noise_rad_per_s_per_sqrt_hz, p.rate)
+    gyro_noise = errors.white_deviation(math.radians(p.gyro_noise_dps_per_sqrt_hz), p.rate)
+    flow = (s.scale * true[0] + noise * first[0], s.scale * true[1] + noise * first[1], true[2])
+    omega = truth.omega_body
+    rate = (omega[0] + gyro_noise * second[0], omega[1] + gyro_noise * second[1], 0.0)
+    flow_line, flow, seen = carry(p.faults, s.flow, p.latency_samples, 0, key, tick, flow)
+    rate_line, rate, turning = carry(p.faults, s.rate, p.latency_samples, 1, key, tick, rate)
+    sharp = p.range_min <= flow[2] <= p.range_max and max(abs(flow[0]), abs(flow[1])) <= p.flow_max
+    distance = flow[2] if sharp else math.inf
+    valid = seen and turning and sharp and distance < math.inf
+    reading = OpticalFlowReading((flow[0], flow[1]), (rate[0], rate[1]), distance, noise * noise, valid)
+    return OpticalFlowState(s.scale, flow_line, rate_line), reading
+
+
+def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
+    """Flow and rate; no texture: NaN."""
+    valid = (np.asarray(r.valid) != 0.0)[:, None]
+    return {
+        **stamp_columns(time_ns),
+        "flow": np.where(valid, r.flow, math.nan),
+        "rate": r.rate,
+        "distance": r.distance,
+        "variance": r.variance,
+    }
+
+
+def wires(frame: str, port: Port, p: OpticalFlow) -> list[Wire]:
+    """Its topic."""
+    return [Wire(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))]
+
+
+# PixArt PMW3901MB: 7.4 rad/s at the most by its data sheet (as discuss.px4.io/t/19364 cites it), from 80 mm on. Noise,
+# focal length and the range of texture: chosen.
+PMW3901 = OpticalFlow(
+    noise_rad_per_s_per_sqrt_hz=0.01,
+    gyro_noise_dps_per_sqrt_hz=0.01,
+    scale_error=0.02,
+    flow_max=7.4,
+    range_min=0.08,
+    range_max=20.0,
+)
+
+PRESETS = {"pmw3901": PMW3901, "ideal": OpticalFlow()}

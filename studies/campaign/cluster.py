@@ -1,0 +1,49 @@
+"""The workers of a Dask cluster, however it was made: by `dask worker`, by dask-jobqueue, by dask-kubernetes.
+
+Dask hands a task of a worker that is lost to another one, and hands tasks to workers that join late. Each worker checks
+before its first task that it flies what the campaign was begun with (`runs.fly_runs`).
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from cosim.launcher import RunFailed
+
+LOST = 3  # workers that a task may lose before it is given up
+PATIENCE = 10.0  # [s] for the scheduler to answer
+
+
+def dask(address: str) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
+    """The workers of the scheduler at an address, tcp://host:8786.
+
+    Raises:
+        ValueError: Dask is not installed, or nobody answers at this address.
+    """
+    try:
+        from distributed import Client, as_completed
+        from distributed.client import FutureCancelledError
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        raise ValueError("--cluster: Dask is not installed; pip install lapwing[cluster]") from None
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as fault:
+        raise ValueError(f"--cluster {address}: no Dask scheduler answers there: {fault}") from None
+
+    def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
+        with client:
+            futures = {client.submit(call, *task, pure=False): place for place, task in enumerate(tasks)}
+            try:
+                for future in as_completed(list(futures), loop=client.loop):
+                    yield futures[future], future.result()
+                    future.release()  # its rows need stay nowhere
+            except KilledWorker:
+                message = "a task has lost one worker after the other, perhaps for want of memory"
+                raise RunFailed(f"{message}; the same command goes on where it stopped") from None
+            except (FutureCancelledError, OSError, TimeoutError):
+                message = f"the scheduler at {address} is lost"
+                raise RunFailed(f"{message}; the same command goes on where it stopped") from None
+            finally:
+                client.cancel(list(futures))
+
+    return run

@@ -1,0 +1,205 @@
+"""The plots of a campaign's report."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from studies.campaign.results import Results
+from studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
+from studies.figures import FIGURES
+from studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
+from studies.report.style import AXIS_COLOURS, BOUND, FLOWN, QUIET, REFERENCE
+from studies.report.thin import every
+from studies.tracking import DEGREE
+
+ACROSS = 3  # panels beside each other
+BINS = 10  # of a parameter
+KEYS = 9  # parameters that are drawn
+MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
+PARALLEL = 300  # runs drawn as lines over all parameters
+_LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
+
+
+def shown(name: str) -> tuple[str, float]:
+    """Label of a figure and the factor to its unit there: angles in degrees, shares in per cent."""
+    unit = FIGURES[name]
+    if unit == "rad":
+        return f"{name} [°]", 1.0 / DEGREE
+    return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
+
+
+def required(found: Results) -> dict[str, float]:
+    """The limits of figures that the scene's `[success]` sets."""
+    texts = found.folder.about["success"]
+    return {match[1]: float(match[2]) for text in texts if (match := _LIMIT.fullmatch(text.strip()))}
+
+
+def errors(found: Results) -> Plot:
+    """Root-mean-square errors, beside what is published."""
+    caption = "Share of the runs with a smaller root-mean-square error of the reference against the truth."
+    return _distributions(found, [name for name in found.figures if name.startswith("rmse.")], caption)
+
+
+def others(found: Results) -> Plot:
+    """All other figures that differ between runs."""
+    names = [name for name in found.figures if not name.startswith("rmse")]
+    return _distributions(found, names, "Share of the runs with a smaller value.")
+
+
+def _distributions(found: Results, names: list[str], caption: str) -> Plot:
+    if not names:
+        raise NotRecordedError("every run has the same")
+    limits, panels = required(found), []
+    for k, name in enumerate(names):
+        label, scale = shown(name)
+        values = scale * np.sort(found[name][np.isfinite(found[name])])
+        share = np.arange(1, len(values) + 1) / len(values)
+        marks: list[Mark] = [Line(values, share, "runs")]
+        if name in found.published:
+            marks.append(_upright(scale * found.published[name], found.source, REFERENCE))
+        if name in limits:
+            marks.append(_upright(scale * limits[name], "required", BOUND))
+        place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS}
+        panels.append(Panel(tuple(marks), "share" if k % ACROSS == 0 else "", label, timed=False, **place))
+    return _grid(panels, caption)
+
+
+def touchdown(found: Results) -> Plot:
+    """Where the vehicle touches down, and the ellipses of a normal distribution."""
+    points = np.column_stack([found["touchdown.x"], found["touchdown.y"]])
+    good = found["success"].astype(bool)[np.isfinite(points).all(axis=1)]
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) < 3:
+        raise NotRecordedError("fewer than three runs touch down")
+    if not np.ptp(points, axis=0).any():
+        raise NotRecordedError("every run touches down at the same place")
+    marks = [_dots(points[good], "success", FLOWN), _dots(points[~good], "failure", BOUND)]
+    for share, dash in ((0.5, "dash"), (0.95, "solid")):
+        x, y = ellipse(points, share).T
+        marks.append(Line(x, y, f"{share:.0%} of a normal distribution", REFERENCE, 1.1, dash))
+    half = np.median(np.linalg.norm(points - points.mean(axis=0), axis=1))
+    (x, y), (dx, dy) = points.mean(axis=0), points.std(axis=0, ddof=1)
+    caption = (
+        f"Last touch-down of {len(points)} runs: mean ({x:.3f}, {y:.3f}) m, standard deviation "
+        f"{dx:.3f} m along x and {dy:.3f} m along y; half of them within {half:.3f} m of the mean."
+    )
+    drawn = tuple(mark for mark in marks if len(mark.x))
+    return Plot((Panel(drawn, "y [m]", "x [m]", timed=False, equal=True),), caption, 5.0)
+
+
+def success(found: Results) -> Plot:
+    """Probability of success over each parameter."""
+    panels, good = [], found["success"].astype(bool)
+    for k, key in enumerate(_parameters(found)):
+        x, middles, groups = found.number(key), [], []
+        for inside in _bins(x):
+            middles.append(float(x[inside].mean()))
+            groups.append(interval(int(good[inside].sum()), int(inside.sum())))
+        at, rows = np.array(middles), np.array(groups).T
+        marks: tuple[Mark, ...] = (
+            Band(at, rows[1], rows[2], "95 % interval", FLOWN),
+            Line(at, rows[0], "successes", marker="circle"),
+        )
+        label = "probability of success" if k % ACROSS == 0 else ""
+        place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS, "y_range": (-0.02, 1.02)}
+        panels.append(Panel(marks, label, key, x_ticks=_texts(found, key), timed=False, **place))
+    return _grid(panels, "Share of successes among the runs of each part of a parameter's range, of equal counts.")
+
+
+def matters(found: Results) -> Plot:
+    """Which parameter matters: rank correlations, and Sobol indices where they can be had."""
+    keys = _parameters(found)
+    aims = [name for name in ("success", *MATTERS) if name == "success" or name in found.figures]
+    aims = [name for name in aims if np.ptp(found[name].astype(float)) > 0.0]
+    if not aims:
+        raise NotRecordedError("every run came to the same")
+    x = np.column_stack([found.number(key) for key in keys])
+    kinds = ["rank correlation", *(["first-order Sobol index"] if has_sobol() and len(x) >= 50 else [])]
+    panels = []
+    for row, aim in enumerate(aims):
+        y = found[aim].astype(float)
+        there = np.isfinite(y)
+        correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
+        indices = sobol(x[there], y[there], keys) if len(kinds) > 1 else []
+        for column, values in enumerate([correlated, indices][: len(kinds)]):
+            bars = tuple(
+                Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
+                for key, v in zip(keys, values, strict=True)
+                if np.isfinite(v.value)
+            )
+            place: dict[str, Any] = {
+                "row": row,
+                "column": column,
+                "x_range": (-1.05, 1.05) if column == 0 else (-0.05, 1.05),
+            }
+            panels.append(Panel(bars, "", kinds[column], title=aim, timed=False, **place))
+    caption = f"How each parameter goes with what {len(x)} runs came to: Spearman's rank correlation"
+    caption += (
+        "; beside it the share of the variance that the parameter explains alone (SALib, RBD-FAST)."
+        if len(kinds) > 1
+        else ". Sobol indices need 50 runs and SALib: pip install lapwing[campaign]."
+    )
+    height = len(aims) * (1.1 + 0.26 * len(keys)) + 0.6
+    return Plot(tuple(panels), caption, height, (1.0,) * len(aims), (1.0,) * len(kinds))
+
+
+def parallel(found: Results) -> Plot:
+    """Every run as a line over all parameters and what matters, each scaled to its range."""
+    names = [*_parameters(found), *(name for name in MATTERS if name in found.figures)]
+    columns, ticks = [], []
+    for name in names:
+        values, (label, scale) = found.number(name), shown(name) if name in FIGURES else (name, 1.0)
+        low, high = np.nanmin(values), np.nanmax(values)
+        columns.append((values - low) / (high - low if high > low else 1.0))
+        texts = _texts(found, name)
+        ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
+        ticks.append(f"{label}\n{ends[0]} to {ends[1]}")
+    rows, good = np.column_stack(columns), found["success"].astype(bool)
+    marks = []
+    for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
+        if chosen.any():
+            lines = every(rows[chosen], PARALLEL)
+            broken = np.column_stack([lines, np.full(len(lines), np.nan)])
+            x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
+            marks.append(Line(x, broken.ravel(), name, colour, 0.7))
+    panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
+    return Plot((panel,), f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures.", 4.2)
+
+
+def _parameters(found: Results) -> list[str]:
+    """The parameters that differ between the runs."""
+    keys = [key for key in found.folder.plan.keys if len(np.unique(found[key])) > 1]
+    if not keys:
+        raise NotRecordedError("no parameter varies; --vary KEY=DISTRIBUTION lets one")
+    return keys[:KEYS]
+
+
+def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
+    """Runs of each part of a parameter's range, shape (n,) of bool: of each value, or parts of equal counts."""
+    values = np.unique(x)
+    if len(values) <= BINS:
+        yield from (x == value for value in values)
+        return
+    edges = np.quantile(x, np.linspace(0.0, 1.0, BINS + 1))
+    place = np.searchsorted(edges[1:-1], x, side="right")
+    yield from (place == k for k in np.unique(place))
+
+
+def _texts(found: Results, name: str) -> tuple[str, ...]:
+    """The values of a parameter of texts, in the order of their numbers."""
+    return tuple(np.unique(found[name])) if found[name].dtype == object else ()
+
+
+def _dots(points: np.ndarray, name: str, colour: str) -> Line:
+    return Line(points[:, 0], points[:, 1], name, colour, marker="circle", size=3.0, joined=False)
+
+
+def _upright(x: float, name: str, colour: str) -> Line:
+    return Line(np.array([x, x]), np.array([0.0, 1.0]), name, colour, 1.1, "dash")
+
+
+def _grid(panels: list[Panel], caption: str) -> Plot:
+    rows = -(-len(panels) // ACROSS)
+    return Plot(tuple(panels), caption, 0.9 + 2.3 * rows, (1.0,) * rows, (1.0,) * min(len(panels), ACROSS))

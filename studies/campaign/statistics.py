@@ -1,0 +1,99 @@
+"""Statistics of campaigns: intervals, spreads, and which parameter matters."""
+
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+SURE = 0.95  # of every interval
+
+
+class Interval(NamedTuple):
+    """An estimate with its interval of 95 %."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """How far the farther end is from the estimate."""
+        return max(self.high - self.value, self.value - self.low)
+
+
+class Spread(NamedTuple):
+    """How a figure is distributed over the runs."""
+
+    median: float
+    low: float  # 5 % of the runs are below
+    high: float  # 5 % are above
+    worst: float
+    run: int  # of the worst
+
+
+def interval(k: int, n: int) -> Interval:
+    """Probability of what happened k times in n, by Clopper and Pearson: it holds at least as often as it says."""
+    if n == 0:
+        return Interval(float("nan"), 0.0, 1.0)
+    found = stats.binomtest(k, n).proportion_ci(SURE, method="exact")
+    return Interval(k / n, float(found.low), float(found.high))
+
+
+def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread | None:
+    """Distribution of a figure, NaN left out; the worst is the greatest, or the `least`. None without a number."""
+    there = np.isfinite(values)
+    if not there.any():
+        return None
+    numbers, runs = values[there], runs[there]
+    low, median, high = np.quantile(numbers, [0.05, 0.5, 0.95])
+    worst = int(numbers.argmin() if least else numbers.argmax())
+    return Spread(float(median), float(low), float(high), float(numbers[worst]), int(runs[worst]))
+
+
+def paired(a: np.ndarray, b: np.ndarray) -> Interval:
+    """Mean of b - a over pairs, with Student's interval; NaN without two pairs."""
+    difference = (b - a)[np.isfinite(a) & np.isfinite(b)]
+    if len(difference) < 2:
+        return Interval(float("nan"), float("nan"), float("nan"))
+    mean, error = float(difference.mean()), float(stats.sem(difference))
+    reach = float(stats.t.ppf(0.5 + 0.5 * SURE, len(difference) - 1)) * error
+    return Interval(mean, mean - reach, mean + reach)
+
+
+def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
+    """Spearman's correlation of two columns (n,), with the interval of Fisher's transformation."""
+    if len(x) < 4 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return Interval(float("nan"), float("nan"), float("nan"))
+    rho = float(stats.spearmanr(x, y).statistic)
+    reach = float(stats.norm.ppf(0.5 + 0.5 * SURE)) * np.sqrt((1.0 + 0.5 * rho * rho) / (len(x) - 3.0))
+    z = np.arctanh(np.clip(rho, -1.0 + 1e-12, 1.0 - 1e-12))
+    return Interval(rho, float(np.tanh(z - reach)), float(np.tanh(z + reach)))
+
+
+def has_sobol() -> bool:
+    """Whether Sobol indices can be computed here."""
+    return find_spec("SALib") is not None
+
+
+def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
+    """First-order Sobol indices of the columns of x (n, k) for y (n,), from any sample of independent columns.
+
+    By SALib's RBD-FAST: Plischke, "An effective algorithm for computing global sensitivity indices (EASI)", 2010.
+    """
+    from SALib.analyze import rbd_fast
+
+    bounds = [[float(low), float(high)] for low, high in zip(x.min(axis=0), x.max(axis=0), strict=True)]
+    problem = {"num_vars": len(names), "names": names, "bounds": bounds}
+    with np.errstate(invalid="ignore", divide="ignore"):  # a resample in which every run came to the same
+        found = rbd_fast.analyze(problem, x, y, seed=1, conf_level=SURE)
+    pairs = zip(found["S1"], found["S1_conf"], strict=True)
+    return [Interval(float(s), float(s - c), float(s + c)) for s, c in pairs]
+
+
+def ellipse(points: np.ndarray, share: float, n: int = 90) -> np.ndarray:
+    """The ellipse (n, 2) that holds this share of a normal distribution with mean and covariance of points (k, 2)."""
+    values, axes = np.linalg.eigh(np.cov(points.T))
+    radius = np.sqrt(stats.chi2.ppf(share, 2) * np.clip(values, 0.0, None))
+    angle = np.linspace(0.0, 2.0 * np.pi, n)
+    return points.mean(axis=0) + (radius * np.column_stack([np.cos(angle), np.sin(angle)])) @ axes.T

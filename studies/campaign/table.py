@@ -1,0 +1,103 @@
+"""The table of a campaign on disk: a line for each run, as CSV, or as Parquet where pyarrow is installed."""
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Row = Mapping[str, Any]
+
+
+def has_parquet() -> bool:
+    """Whether Parquet can be written here."""
+    return find_spec("pyarrow") is not None
+
+
+def write_csv(path: Path, kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> None:
+    """Write rows as CSV: numbers as Python's repr, exact; nothing where there is no number.
+
+    Args:
+        path: of the file.
+        kinds: type of each column: int, float, bool or str.
+        pages: rows, some at a time.
+    """
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(kinds)
+        for page in pages:
+            writer.writerows([_text(row.get(name), kind) for name, kind in kinds.items()] for row in page)
+
+
+def read_csv(path: Path, kinds: Mapping[str, type]) -> list[dict[str, Any]]:
+    """The rows of a file of `write_csv`.
+
+    Raises:
+        ValueError: it is none, or has other columns.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            head, *lines = csv.reader(file)
+        if head != list(kinds):
+            raise ValueError("has other columns")
+        return [
+            {name: _value(cell, kind) for (name, kind), cell in zip(kinds.items(), line, strict=True)} for line in lines
+        ]
+    except (OSError, ValueError, csv.Error) as fault:
+        raise ValueError(f"{path}: is no table of this campaign: {fault}") from None
+
+
+def write_parquet(
+    path: Path, kinds: Mapping[str, type], pages: Iterable[Iterable[Row]], metadata: Mapping[str, str]
+) -> None:
+    """Write rows as Parquet, a row group for each page, with metadata in its schema; needs pyarrow."""
+    import pyarrow
+    from pyarrow import parquet
+
+    of = {int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_(), str: pyarrow.string()}
+    schema = pyarrow.schema([(name, of[kind]) for name, kind in kinds.items()], metadata=dict(metadata))
+    with parquet.ParquetWriter(path, schema) as writer:
+        for page in pages:
+            plain = [{name: _plain(row.get(name), kind) for name, kind in kinds.items()} for row in page]
+            writer.write_table(pyarrow.Table.from_pylist(plain, schema=schema))
+
+
+def arrays(kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> dict[str, np.ndarray]:
+    """The columns of a table, shape (n,) each; texts as objects."""
+    found: dict[str, list[np.ndarray]] = {name: [] for name in kinds}
+    for page in pages:
+        rows = list(page)
+        for name, kind in kinds.items():
+            values = [_plain(row.get(name), kind) for row in rows]
+            found[name].append(np.array(values, object if kind is str else kind))
+    return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in found.items()}
+
+
+def _plain(value: Any, kind: type) -> Any:
+    """A value as its column has it: what is no text in a column of texts as JSON."""
+    if kind is str:
+        return value if isinstance(value, str) else "" if value is None else json.dumps(value)
+    return math.nan if value is None else kind(value)
+
+
+def _text(value: Any, kind: type) -> str:
+    plain = _plain(value, kind)
+    if isinstance(plain, bool):
+        return "true" if plain else "false"
+    return "" if isinstance(plain, float) and math.isnan(plain) else str(plain)
+
+
+def _value(cell: str, kind: type) -> Any:
+    if kind is bool:
+        return cell == "true"
+    return math.nan if kind is float and not cell else kind(cell)
+
+
+def bits(kinds: Mapping[str, type], rows: Iterable[Row]) -> Iterator[bytes]:
+    """The rows as bytes, for a digest over them."""
+    for row in rows:
+        yield "\x1f".join(_text(row.get(name), kind) for name, kind in kinds.items()).encode() + b"\n"

@@ -1,0 +1,135 @@
+"""The figures of a flight: numbers by name, for a scene's `[success]` and for the rows of campaigns."""
+
+import hashlib
+import math
+from typing import Any
+
+import numpy as np
+
+from cosim.scene import Scene
+from dynamics.kernel import kernel, leaf
+from services.common.success import Success
+from studies import tracking
+from studies.flight import Flight
+from studies.saturation import saturation
+from studies.touches import touches
+from studies.tracking import AXES, plain
+
+SURE = 3.0  # standard deviations of its own that the estimate is given
+
+FIGURES: dict[str, str] = {
+    "verdict": "",  # how it ended: landed, crashed, timed out, ...
+    "told": "",  # the same as a sentence
+    "time": "s",  # of the last touch-down, of the crash, or of the end
+    "duration": "s",
+    **{f"rmse.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the truth
+    **{f"rmse_estimate.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the estimate
+    "max_distance": "m",  # from the reference
+    "overshoot": "m",  # beyond the least and greatest of the reference along x, y or z
+    "max_tilt": "rad",  # from the vertical
+    "saturation": "",  # share of the time in the air with a motor at a limit of its voltage
+    "energy": "J",  # electrical
+    "touchdown.x": "m",  # at the last touch-down
+    "touchdown.y": "m",
+    "touchdown.tilt": "rad",
+    "touchdown.speed": "m/s",  # downwards, at the hardest touch
+    **{f"inside.{axis}": "" for axis in "xyz"},  # share of the time with the truth within 3 sigma of the estimate
+}
+"""Name and unit of every figure, in the order of the columns of a campaign's table."""
+
+
+def check_success(scene: Scene) -> None:
+    """Every figure that the scene's `[success]` names is one of these. Raises SceneError where one is not."""
+    with scene.located():
+        scene[Success].check_names(FIGURES)
+
+
+def figures(flight: Flight) -> dict[str, Any]:
+    """The figures of a flight by name; NaN where it says nothing of one."""
+    truth, verdict, armed = flight.truth, flight.verdict, flight.armed
+    n, t = len(armed), truth.times
+    found: dict[str, Any] = dict.fromkeys(FIGURES, math.nan)
+    found |= {"verdict": verdict.kind, "told": str(verdict), "time": verdict.time, "duration": float(t[-1])}
+    cosine = 1.0 - 2.0 * (truth.orientation[:, :2] ** 2).sum(axis=1)
+    tilt = np.arccos(cosine.clip(-1.0, 1.0))
+    found |= {"max_tilt": float(tilt.max()), "energy": flight.energy}
+    last = max((touch.start for touch in touches(truth)), default=0)
+    if last:
+        x, y, _ = map(float, truth.position[last])
+        found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": float(tilt[last])}
+        found |= {"touchdown.speed": verdict.touchdown}
+    if n == 0:
+        return found
+    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    if highest is not None:
+        limits = saturation(truth, armed, highest)
+        found["saturation"] = limits.share(limits.lasted)
+    if not armed.any():
+        return found
+    found |= {f"rmse.{axis}": value for axis, value in flight.rmse.items()}
+    flown, armed = plain(truth.position[:n]), plain(armed, bool)
+    distance, overshoot = _farthest(flight.reference, flown, armed)
+    found |= {"max_distance": distance, "overshoot": max(0.0, overshoot)}
+    return found | _of_estimate(flight, flown, armed)
+
+
+@kernel
+def _farthest(reference: Any, position: Any, armed: Any) -> tuple[float, float]:
+    """Greatest distance from the reference [m], and farthest beyond its extremes along any axis [m], while armed."""
+    away = 0.0
+    for row in range(len(armed)):
+        if armed[row]:
+            squares = 0.0
+            for i in range(3):
+                squares += (reference[row, i] - position[row, i]) ** 2
+            away = _greater(away, squares)
+    beyond = -np.inf
+    for i in range(3):
+        high, low, highest, lowest = -np.inf, -np.inf, -np.inf, -np.inf  # of the position; of the reference; -x for low
+        for row in range(len(armed)):
+            if armed[row]:
+                high, low = _greater(high, position[row, i]), _greater(low, -position[row, i])
+                highest, lowest = _greater(highest, reference[row, i]), _greater(lowest, -reference[row, i])
+        beyond = _greater(beyond, _greater(high - highest, low - lowest))
+    return np.sqrt(away), beyond
+
+
+@leaf
+def _greater(a: float, b: float) -> float:
+    """The greater number; NaN if one is."""
+    return a if a >= b or a != a else b
+
+
+def _of_estimate(flight: Flight, flown: np.ndarray, armed: np.ndarray) -> dict[str, float]:
+    """What only an estimate at every tick tells, beside the position flown (n, 3)."""
+    n = len(armed)
+    if not flight.has("estimate") or len(flight.estimate) < n:
+        return {}
+    estimate = flight.estimate
+    position = plain(estimate.position[:n])
+    errors = tracking.errors(flight.reference, position, estimate.attitude[:n], armed)
+    inside = _inside(position, flown, plain(estimate.position_std[:n]), armed)
+    return {
+        **{f"rmse_estimate.{axis}": value for axis, value in tracking.rmse(errors).items()},
+        **{f"inside.{axis}": float(share) for axis, share in zip("xyz", inside, strict=True)},
+    }
+
+
+@kernel
+def _inside(estimate: Any, position: Any, deviation: Any, armed: Any) -> tuple[float, float, float]:
+    """Share of the rows while armed with the position within 3 sigma of the estimate, along x, y, z."""
+    rows, x, y, z = 0, 0, 0, 0
+    for row in range(len(armed)):
+        if armed[row]:
+            rows += 1
+            x += abs(estimate[row, 0] - position[row, 0]) <= SURE * deviation[row, 0]
+            y += abs(estimate[row, 1] - position[row, 1]) <= SURE * deviation[row, 1]
+            z += abs(estimate[row, 2] - position[row, 2]) <= SURE * deviation[row, 2]
+    return x / rows, y / rows, z / rows
+
+
+def end_state(flight: Flight) -> str:
+    """Digest of the true state at the last tick: two flights that share it went the same way, to the bit."""
+    truth = flight.truth
+    numbers = [truth.times[-1:], truth.position[-1], truth.orientation[-1], truth.velocity[-1], truth.rotor_speed[-1]]
+    return hashlib.blake2b(np.concatenate(numbers).astype("<f8").tobytes(), digest_size=8).hexdigest()

@@ -1,0 +1,56 @@
+"""A flight while it goes on: what is new, as a flight of its own, and the events in it."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from cosim.setup import Setup
+from cosim.wire import Page
+from messages.history import history
+from messages.topics import ACTUATORS, BODIES, SETPOINT, STATUS, TRUTH, Topic
+from studies.events import Event
+from studies.flight import Flight
+from studies.origin import Origin
+from studies.topic_view import TopicView
+
+TAKEN = (TRUTH, BODIES, SETPOINT, ACTUATORS, STATUS)
+AFTERWARDS = ("motors",)  # kinds of events that are known only when they are over
+
+
+class LiveFlight:
+    """Takes the messages of a run as its services hand them over, in whatever order they come."""
+
+    def __init__(self, setup: Setup):
+        """Of a run that is about to begin."""
+        self._setup = setup
+        self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
+
+    def take(self, pages: Iterable[Page]) -> None:
+        """What a service has handed over."""
+        interval = self._setup.interval_ns
+        for page in pages:
+            if page.topic in self._said:
+                rows = zip(page.ticks, page.payloads, strict=True)
+                self._said[page.topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
+
+    def step(self, until_ns: int) -> Flight | None:
+        """What has come up to an instant since the step before, begun with the newest message before it.
+
+        None where the truth tells nothing new.
+        """
+        views: dict[str, TopicView] = {}
+        for topic, said in self._said.items():
+            now = [message for message in said if message[0] <= until_ns]
+            if now:
+                times, payloads = zip(*now, strict=True)
+                columns = history(topic.message, payloads)
+                views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
+                del said[: len(now) - 1]  # the newest begins the next step
+        if "truth" not in views or len(views["truth"]) < 2:
+            return None
+        return Flight(views, Origin.of_setup(self._setup))
+
+
+def new_events(flight: Flight, after: float) -> list[Event]:
+    """What happened in a step after the time `after` [s]."""
+    return [event for event in flight.events if event.time > after and event.kind not in AFTERWARDS]

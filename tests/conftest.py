@@ -1,0 +1,40 @@
+"""Files marked `long` are begun first, so that none of them is left alone at the end; how much memory was needed."""
+
+import resource
+
+import pytest
+
+_PEAK = "peak_memory_mb"
+_peaks = pytest.StashKey[dict[str, float]]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before any worker has ended."""
+    config.stash[_peaks] = {}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the order otherwise."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A worker hands its figure over."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0  # in kB on Linux
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput[_PEAK] = peak
+    elif not session.config.stash[_peaks]:
+        session.config.stash[_peaks]["one process"] = peak
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node) -> None:
+    """One that has crashed has none."""
+    if found := getattr(node, "workeroutput", {}).get(_PEAK):
+        node.config.stash[_peaks][node.gateway.id] = found
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """One line."""
+    peaks = terminalreporter.config.stash[_peaks]
+    terminalreporter.write_line(f"peak memory: {', '.join(f'{k} {v:.0f} MB' for k, v in sorted(peaks.items()))}")

@@ -1,0 +1,158 @@
+"""What no participant of a run has said is counted, and changes nothing."""
+
+import json
+import os
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cosim.bus import ZenohBus, mesh
+from cosim.child import PARTICIPANT
+from cosim.keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, STEP_KEY
+from cosim.log import LogReader
+from cosim.participants import Participants, new_secret
+from cosim.private import private_endpoints
+from messages.attachment import pack
+from services.common.operator import OPERATOR_KEY
+
+SCENE = "scenes/hover.toml"
+PREFIX = "test-strangers"
+
+
+def test_marks_are_of_the_run_and_of_the_participant():
+    run, other = Participants(PREFIX, new_secret(), ["autopilot"]), Participants(PREFIX, new_secret())
+    assert len({run.mark("plant"), run.mark("sensors"), other.mark("plant"), Participants("x").mark("plant")}) == 4
+    assert len(run.mark("plant")) == 16
+    assert run.senders(STEP_KEY, ["autopilot", "plant"]) == {
+        f"{PREFIX}/_step/autopilot": None,
+        f"{PREFIX}/_step/plant": run.mark("plant"),
+    }
+    # its messages are made by a process of ours
+    assert run.senders(BATCH_KEY, ["autopilot"]) == {f"{PREFIX}/_batch/autopilot": run.mark("autopilot_messages")}
+
+
+def arrivals(subscription):
+    found = []
+    while (message := subscription.get(timeout=0.5)) is not None:
+        found.append(message)
+    return found
+
+
+def test_only_the_sender_is_received():
+    mine, key = Participants(PREFIX, new_secret()), f"{PREFIX}/_step/plant"
+    with private_endpoints(["a", "b", "c"]) as ends, ZenohBus(*mesh("a", ends)) as bus:
+        received = bus.receive(mine.senders(STEP_KEY, ["plant"]))
+        first_comer = bus.receive({f"{PREFIX}/free": None})
+        with (
+            ZenohBus(*mesh("b", ends), mark=mine.mark("plant")) as plant,
+            ZenohBus([ends["c"]], [ends["a"]]) as stranger,
+        ):
+            zenoh = stranger._session
+            for bus_ in (plant, stranger):
+                bus_.declare_alive(f"{PREFIX}/{ALIVE_KEY}/{'plant' if bus_ is plant else 'stranger'}")
+            assert not bus.wait_alive([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in ("plant", "stranger")], 10.0)
+            stranger.publisher(key)(b"", 0)
+            zenoh.put(key, b"")
+            zenoh.put(key, b"hello", attachment=b"short")
+            zenoh.put(f"{PREFIX}/**", b"hello", attachment=pack(1, 0, bytes(16)))
+            zenoh.delete(key)
+            plant.publisher(key)(b"bundle", 4)
+            assert arrivals(received) == [(4, b"bundle")]
+            assert bus.refused >= 5
+            plant.publisher(f"{PREFIX}/free")(b"one", 1)
+            assert first_comer.get(2.0) == (1, b"one")
+            stranger.publisher(f"{PREFIX}/free")(b"two", 2)
+            assert arrivals(first_comer) == []
+
+
+def test_sockets_are_in_a_folder_of_the_users_own():
+    with private_endpoints(["plant"]) as ends:
+        folder = Path(ends["plant"].removeprefix("unixsock-stream/")).parent
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        assert folder.stat().st_uid == os.getuid()
+    assert not folder.exists()
+
+
+def test_a_long_name_of_the_folder_for_temporary_files_is_no_obstacle(monkeypatch, tmp_path):
+    long = tmp_path / ("x" * 90)
+    long.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(long))
+    with private_endpoints(["autopilot_messages"]) as ends, ZenohBus(list(ends.values())):
+        pass
+
+
+def fly(tmp_path, *more):
+    command = [sys.executable, "-m", "lapwing", "run", SCENE, "--key-prefix", PREFIX]
+    command += ["--log", str(tmp_path / "log.mcap"), "--json", str(tmp_path / "run.json"), *more]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, stdout=pipe, stderr=pipe, text=True, env={**os.environ, "TMPDIR": str(tmp_path), "COLUMNS": "200"}
+    )
+
+
+def listening(pid):
+    """The TCP ports that a process listens on."""
+    inodes = set()
+    for entry in os.scandir(f"/proc/{pid}/fd"):
+        try:
+            inodes.add(os.readlink(entry.path).removeprefix("socket:[").removesuffix("]"))
+        except OSError:
+            continue
+    rows = [line.split() for table in ("tcp", "tcp6") for line in Path(f"/proc/net/{table}").read_text().splitlines()]
+    return [row[1] for row in rows if row[3] == "0A" and row[9] in inodes]
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="finds ports in /proc")
+def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path):
+    """Even of one who is the same user and knows where the sockets are."""
+    (tmp_path / "calm").mkdir()
+    short = ["--set", "run.duration=3"]
+    calm = fly(tmp_path / "calm", *short)
+    assert calm.wait(200) == 0
+    run = fly(tmp_path, *short, "--speed", "1")
+    names = {"plant", "autopilot", "trajectory", "recorder", "mission"}
+    while not (sockets := {s.name: s for s in tmp_path.glob("lapwing-*/*") if s.is_socket()}).keys() >= names:
+        assert run.poll() is None, run.communicate()
+        time.sleep(0.05)
+    children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+    participants = [pid for pid in children if PARTICIPANT in Path(f"/proc/{pid}/cmdline").read_text()]
+    assert len(participants) == 4
+    assert not any(listening(pid) for pid in [run.pid, *participants])
+
+    ends = [f"unixsock-stream/{socket}" for socket in sockets.values()]
+    with ZenohBus(connect=ends) as stranger:
+        keys = [f"{PREFIX}/{OPERATOR_KEY}/mavlink"]
+        keys += [f"{PREFIX}/{key}/{name}" for key in (STEP_KEY, BATCH_KEY, ENDED_KEY, DIVERGED_KEY) for name in names]
+        while run.poll() is None:
+            for key in [*keys, f"{PREFIX}/**"]:
+                for payload in (b"", b"hello"):
+                    stranger.publisher(key)(payload, 0)
+                    stranger._session.put(key, payload)
+            time.sleep(0.05)
+    said, wrong = run.communicate()
+    assert (run.returncode, wrong) == (0, "")
+    assert "messages that no participant of this run has sent" in said
+    assert (
+        json.loads((tmp_path / "run.json").read_text())["digest"]
+        == (json.loads((tmp_path / "calm/run.json").read_text())["digest"])
+    )
+
+
+def test_a_flight_that_somebodys_program_ends_early_has_failed(tmp_path):
+    with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
+        run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
+        program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
+        others = ("plant", "trajectory", "recorder", "autopilot_messages")
+        assert not program.wait_alive([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in others], 120.0)
+        program.publisher(f"{PREFIX}/{STEP_KEY}/autopilot")(b"", 0)
+        _, said = run.communicate(timeout=120)
+    assert run.returncode == 1
+    assert said.startswith("lapwing: the run ended before its time, at t = ")
+    assert "autopilot ended before the run did" in said
+    assert said.count("\n") == 1
+    with LogReader(tmp_path / "log.mcap") as log:
+        assert log.metadata["failure"] == "autopilot ended before the run did"

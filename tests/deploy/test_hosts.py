@@ -1,0 +1,79 @@
+"""The files for two hosts and for Kubernetes: sound, complete, and as closed as the containers of one host."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from cosim.watch import WATCHER
+from lapwing.runs.joined import parse_peers
+from services import processes
+from services.table import load, resolve
+
+ROOT = Path(__file__).parents[2]
+SET = {"DYNAMICS": "10.0.0.1", "FLIGHT": "10.0.0.2"}
+
+
+def composed(name):
+    """The services of a compose file, its variables set."""
+    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+    text = (ROOT / "deploy" / "hosts" / name).read_text()
+    text = re.sub(r"\$\{(\w+)(?::-([^}]*))?\}", lambda m: SET.get(m[1], m[2]), text)
+    return yaml.safe_load(text)["services"]
+
+
+def manifests(scene):
+    spec = importlib.util.spec_from_file_location("kubernetes", ROOT / "deploy" / "kubernetes.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.manifests(scene, "lapwing:latest")
+
+
+def peers_of(command):
+    return parse_peers(command[command.index("--peers") + 1])
+
+
+def test_two_hosts_have_every_service_once_and_one_table():
+    plant, others = composed("dynamics.yml"), composed("flight.yml")
+    tables = [peers_of(service["command"]) for service in (plant | others).values()]
+    assert all(table == tables[0] for table in tables)
+    assert len(set(tables[0].values())) == len(tables[0])
+    assert set(tables[0]) == {*plant, *others}
+    assert not {*plant} & {*others}
+    for scene in (ROOT / "scenes").glob("*.toml"):
+        assert {WATCHER, *processes.needed(resolve(load(scene)))} <= set(tables[0])
+
+
+def test_each_service_of_two_hosts_listens_at_its_host_with_its_own_certificate():
+    for address, services in (("10.0.0.1", composed("dynamics.yml")), ("10.0.0.2", composed("flight.yml"))):
+        for name, service in services.items():
+            assert service["command"][2] == name or name == WATCHER
+            assert peers_of(service["command"])[name].startswith(f"tls/{address}:")
+            assert f"../../keys/{name}:/app/keys/{name}:ro" in service["volumes"]
+            assert service["read_only"]
+
+
+def test_kubernetes_takes_the_manifests():
+    kubernetes = pytest.importorskip("kubernetes_validate", reason="kubernetes-validate is not installed")
+    for each in manifests("delivery_mission"):
+        kubernetes.validate(each, "1.32", strict=True)
+
+
+def test_kubernetes_has_a_pod_and_a_name_for_each_process_that_a_scene_needs():
+    needed = {WATCHER, *processes.needed(resolve(load("cooperative_load")))}
+    found = {(each["kind"], each["metadata"]["name"]): each for each in manifests("cooperative_load")}
+    for name in needed:
+        spec = found["Pod", name]["spec"]
+        (container,) = spec["containers"]
+        table = peers_of(container["args"])
+        assert set(table) == needed
+        (port,) = found["Service", name]["spec"]["ports"]
+        assert table[name] == f"tls/{name}:{port['port']}"
+        selector, labels = found["Service", name]["spec"]["selector"], found["Pod", name]["metadata"]["labels"]
+        assert selector.items() <= labels.items()
+        for each in (container, *spec["initContainers"]):
+            assert each["securityContext"]["readOnlyRootFilesystem"]
+            assert not each["securityContext"]["allowPrivilegeEscalation"]
+            assert {mount["name"] for mount in each["volumeMounts"]} <= {volume["name"] for volume in spec["volumes"]}
+    assert {kind for kind, _ in found} == {"Namespace", "NetworkPolicy", "PersistentVolumeClaim", "Pod", "Service"}

@@ -1,0 +1,129 @@
+"""The lower rotor of a coaxial pair against momentum theory's published factors, by hand, and in flight."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import lapwing
+from dynamics import effects
+from dynamics.kernel import uncompiled
+from dynamics.lie.quaternion import exp
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.inflow import thrust_in_wake
+
+share = uncompiled(thrust_in_wake)
+GAP = 0.10  # [m]
+
+
+def stacked(drone, aside=0.0, gap=GAP):
+    """Each rotor with a second one above it, which turns the other way."""
+    r = drone.rotors
+    hubs = tuple((x + dx, y, z) for x, y, _ in r.position for dx, z in ((0.0, 0.0), (aside, gap)))
+    spins = tuple(way for spin in r.spin_direction for way in (spin, "cw" if spin == "ccw" else "ccw"))
+    return drone.model_copy(update={"rotors": r.model_copy(update={"position": hubs, "spin_direction": spins})})
+
+
+def through(pitch, thrust):
+    """Air through the lower rotor, over what it induces by itself: what its blades tell of its thrust."""
+    return pitch - (pitch - 1.0) * thrust
+
+
+@pytest.mark.parametrize("pitch", [1.2, 1.55, 2.0, 3.5])
+def test_induced_power_at_equal_thrusts_is_1_28_times_that_of_both_alone(pitch):
+    """Leishman, on coaxial rotors: 1.281; the lower one alone takes (sqrt 17 - 1) / 2 = 1.562 times the upper's."""
+    wash = brentq(lambda w: w * w - share(pitch, w), 1e-3, pitch)  # thrust over thrust is the square of the wash
+    lower = through(pitch, share(pitch, wash)) / wash
+    assert lower == pytest.approx(0.5 * (math.sqrt(17.0) - 1.0), rel=1e-9)
+    assert 0.5 * (1.0 + lower) == pytest.approx(1.281, abs=5e-4)
+
+
+def test_at_equal_torques_the_upper_rotor_carries_more():
+    """From u = v + w: T u = T_u v and conservation of momentum and energy, (1 + u)^2 = 2 u^3; T_u / T = u = 1.4376."""
+    u = brentq(lambda u: 2.0 * u**3 - (1.0 + u) ** 2, 1.0, 2.0)
+    pitch = 1.7
+    wash = brentq(lambda w: w**3 - share(pitch, w) * through(pitch, share(pitch, w)), 1e-3, 1.4)
+    assert wash**2 / share(pitch, wash) == pytest.approx(u, rel=1e-9)
+
+
+def test_without_a_wake_nothing_changes_and_one_as_fast_as_the_blades_takes_all():
+    assert share(1.5, 0.0) == 1.0
+    assert share(1.5, 1.5 - 1e-9) == pytest.approx(0.0, abs=1e-6)
+    assert share(1.5, 2.0) == 0.0
+
+
+def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.0, 0.0, 0.0)):
+    p = multirotor.parameters(frame, effects.from_scene(tables, frame))
+    state = multirotor.initial_state(p, (0.0, 0.0, 50.0), exp(turn), 0.0, velocity)
+    motion = state.motion._replace(rotor_speed=speeds)
+    drive = multirotor.MultirotorDrive(p, p.body, state.memory, (0.0,) * 8)
+    rotors = uncompiled(multirotor.evaluate)(drive, 0.0, motion)[1]
+    return np.array(rotors.thrust), np.array(rotors.torque)
+
+
+def test_the_lower_rotor_loses_thrust_and_the_upper_does_not(drone):
+    """Thrust and induced power of the lower rotor meet the momentum theory of its disc; its profile power stays."""
+    frame = stacked(drone)
+    plain, drag = loads(frame, {"rotor_thrust": {}})
+    thrust, torque = loads(frame, {"rotor_thrust": {}, "coaxial_wash": {}})
+    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, frame)
+    assert thrust[1::2] == pytest.approx(plain[1::2], rel=1e-15)
+    assert torque[1::2] == pytest.approx(drag[1::2], rel=1e-15)
+    t = thrust[0] / plain[0]
+    assert t == pytest.approx(share(e.pitch, 1.0), rel=1e-12)
+    area, rho, v = math.pi * e.radius**2, 1.225, e.flow * 300.0
+    u = through(e.pitch, t) * v
+    w = (thrust[0] + 2.0 * rho * area * v * v) / (rho * area * u)  # far below: momentum
+    power = 0.5 * rho * area * u * w * w - 2.0 * rho * area * v**3  # what its disc adds to the flow: energy
+    assert thrust[0] * u == pytest.approx(power, rel=1e-9)
+    assert (torque - drag)[0] * 300.0 == pytest.approx(thrust[0] * u - plain[0] * v, rel=1e-9)
+
+
+def test_a_lost_upper_propeller_has_no_wake(drone):
+    tables = {"rotor_thrust": {}, "coaxial_wash": {}}
+    stopped = loads(stacked(drone), tables, speeds=(300.0, 0.0) * 4)[0]
+    assert stopped[::2] == pytest.approx(loads(stacked(drone), {"rotor_thrust": {}})[0][::2])
+
+
+def test_fast_flight_carries_the_wake_away(drone):
+    frame, tables = stacked(drone), {"rotor_thrust": {}, "coaxial_wash": {}}
+    found = [loads(frame, tables, (v, 0.0, 0.0))[0][0] for v in (0.0, 10.0, 20.0, 60.0)]
+    assert np.all(np.diff(found) >= 0.0)
+    assert found[-1] == pytest.approx(loads(frame, {"rotor_thrust": {}})[0][0])
+
+
+@pytest.mark.parametrize(
+    ("frame", "tables", "message"),
+    [
+        (lambda d: d, {}, "effects.coaxial_wash: no rotor stands under another one"),
+        (lambda d: stacked(d, aside=0.2), {}, "effects.coaxial_wash: no rotor stands under another one"),
+        (lambda d: stacked(d, gap=0.7), {}, "effects.coaxial_wash: no rotor stands under another one"),
+        (stacked, {"induced_velocity": {}}, "effects.coaxial_wash: is not made to stand beside effects.induced"),
+    ],
+)
+def test_refused(drone, frame, tables, message):
+    with pytest.raises(ValueError, match=message):
+        effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}, **tables}, frame(drone))
+
+
+def test_goes_with_rotor_thrust(drone):
+    with pytest.raises(ValueError, match=r"effects.coaxial_wash: goes with effects\.rotor_thrust"):
+        effects.from_scene({"coaxial_wash": {}}, stacked(drone))
+
+
+def test_eight_rotors_in_four_pairs_hover_and_land(drone):
+    """Twice the vehicle on twice the rotors; the upper ones carry more, as much as the theory says of their speeds."""
+    frame = stacked(drone)
+    rotors = {"position": [list(p) for p in frame.rotors.position], "spin_direction": list(frame.rotors.spin_direction)}
+    flight = lapwing.fly(
+        "hover",
+        {"airframe.mass.total": 12.0, "airframe.mass.payload": 0.0, "airframe.mass.inertia": [0.54, 0.52, 0.84],
+         "airframe.rotors.position": rotors["position"], "airframe.rotors.spin_direction": rotors["spin_direction"],
+         "effects.coaxial_wash": {}},
+    )  # fmt: skip
+    assert flight.landed
+    thrust = flight.truth.rotor_thrust[(flight.truth.times > 5.0) & (flight.truth.times < 6.0)].mean(axis=0)
+    assert thrust.sum() == pytest.approx(12.0 * 9.80665, rel=5e-3)
+    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, frame)
+    assert thrust[::2].sum() / thrust[1::2].sum() == pytest.approx(share(e.pitch, 1.0), rel=0.02)

@@ -1,0 +1,114 @@
+"""Against momentum theory: blades and disc give the same thrust in hover, climb and forward flight."""
+
+import math
+
+import numpy as np
+import pytest
+from effects_helpers import NO_FACTORS, NO_LOADS
+from scipy.optimize import brentq
+
+from dynamics import effects
+from dynamics.effects.induced_velocity import follow, induced_velocity
+from dynamics.effects.rotor_thrust import rotor_thrust
+from dynamics.errors import KeyedError
+
+SPEED, DENSITY = 300.0, 1.2
+
+
+def make(drone):
+    e, static = effects.from_scene({"rotor_thrust": {}, "induced_velocity": {}}, drone)
+    return e, static
+
+
+def settled(e, s, rotors, seconds=1.0, interval=0.004):
+    memory = e.initial_memory()
+    for tick in range(round(seconds / interval)):
+        memory = follow.py_func(e, memory, s, rotors(), (0, 0), tick, interval)
+    return memory
+
+
+def loads(e, static, memory, s):
+    before = rotor_thrust.py_func(static, (), s, NO_FACTORS, NO_LOADS)
+    return before, induced_velocity.py_func(e, memory, s, NO_FACTORS, before)
+
+
+def test_nothing_changes_in_hover(drone, situation, rotors):
+    e, static = make(drone)
+    s = situation()
+    memory = settled(e, s, rotors)
+    before, after = loads(e, static, memory, s)
+    assert memory[0] == pytest.approx(math.sqrt(before.thrust[0] / (2 * DENSITY * e.area)))
+    assert np.array(after) == pytest.approx(np.array(before))
+
+
+@pytest.mark.parametrize("velocity", [(0, 0, 2), (0, 0, 5), (8, 0, 0), (3, -4, 1), (12, 0, -1)])
+def test_blades_and_disc_agree(drone, situation, rotors, velocity):
+    """T = slope rho w (P w - V - v) = 2 rho A v sqrt(V_xy^2 + (V + v)^2), solved independently."""
+    e, static = make(drone)
+    s = situation(velocity=velocity)
+    across, climb = math.hypot(*velocity[:2]), velocity[2]
+
+    def difference(v):
+        blades = e.slope * SPEED * (drone.propeller.pitch / (2 * math.pi) * SPEED - climb - v)
+        return blades - 2 * e.area * v * math.hypot(across, climb + v)
+
+    v = brentq(difference, 0.0, 20.0)
+    memory = settled(e, s, rotors)
+    before, after = loads(e, static, memory, s)
+    assert memory == pytest.approx([v] * 4, rel=1e-6)
+    thrust = 2 * DENSITY * e.area * v * math.hypot(across, climb + v)
+    assert after.thrust == pytest.approx([thrust] * 4, rel=1e-6)
+    static_power = before.torque[0] * SPEED - before.thrust[0] * e.hover * SPEED  # profile
+    assert after.torque[0] * SPEED == pytest.approx(static_power + thrust * (climb + v), rel=1e-6)
+
+
+def test_translational_lift_and_descent(drone, situation, rotors):
+    """Forward flight thins the flow: more thrust for less power; slow descent thickens it more than climb thins it."""
+    e, static = make(drone)
+    thrust, torque = [], []
+    for velocity in ((0, 0, 0), (10, 0, 0), (0, 0, 2), (0, 0, -2)):
+        s = situation(velocity=velocity)
+        _, after = loads(e, static, settled(e, s, rotors), s)
+        thrust.append(after.thrust[0])
+        torque.append(after.torque[0])
+    assert thrust[1] > 1.2 * thrust[0]
+    assert torque[1] / thrust[1] < torque[0] / thrust[0]
+    assert abs(thrust[3] - thrust[0]) < 0.5 * abs(thrust[2] - thrust[0])
+
+
+def test_the_flow_follows_as_the_apparent_mass_says(drone, situation, rotors):
+    """About hover m v' = -(4 rho A v_h + slope rho w) (v - v_h), with 0.637 of a sphere of air."""
+    e, _ = make(drone)
+    s = situation()
+    hover = e.hover * SPEED
+    mass = 0.637 * 4 / 3 * math.pi * (0.5 * drone.propeller.diameter) ** 3
+    rate = (4 * e.area * hover + e.slope * SPEED) / mass
+    for interval in (0.001, 0.01):
+        memory = (hover + 0.01,) * 4
+        for tick in range(round(0.01 / interval)):
+            memory = follow.py_func(e, memory, s, rotors(), (0, 0), tick, interval)
+        assert memory[0] - hover == pytest.approx(0.01 * math.exp(-rate * 0.01), rel=0.01)
+
+
+def test_each_hub_has_its_own_speed(drone, situation, rotors):
+    e, static = make(drone)
+    s = situation(omega=(1.0, 0.0, 0.0))
+    _, after = loads(e, static, settled(e, situation(), rotors), s)
+    assert after.thrust[0] < after.thrust[2]  # the left side goes up
+    assert after.thrust[0] == pytest.approx(after.thrust[1])
+
+
+def test_a_rotor_at_rest(drone, situation, rotors):
+    e, static = make(drone)
+    s = situation(speed=(0.0,) * 4, velocity=(3, 0, -2))
+    memory = settled(e, s, rotors)
+    assert np.isfinite(memory).all()
+    assert loads(e, static, memory, s)[1] == ((0.0,) * 4, (0.0,) * 4)
+
+
+def test_it_excludes_rotor_inflow_and_a_pitch_too_small(drone):
+    with pytest.raises(KeyedError, match=r"both are a flow through the rotors"):
+        effects.from_scene({"rotor_inflow": {}, "induced_velocity": {}}, drone)
+    flat = drone.model_copy(update={"propeller": drone.propeller.model_copy(update={"pitch": 0.02})})
+    with pytest.raises(KeyedError, match=r"effects.induced_velocity: the propeller's pitch must be at least"):
+        effects.from_scene({"induced_velocity": {}}, flat)

@@ -1,0 +1,87 @@
+"""Against the definitions of the coefficients, and against what is wrong with a table."""
+
+import math
+
+import numpy as np
+import pytest
+from effects_helpers import NO_FACTORS, NO_LOADS
+
+from dynamics import effects
+from dynamics.effects.rotor_table import embed, rotor_table
+from dynamics.errors import KeyedError
+
+SPEED, D = 300.0, 0.5588
+N = SPEED / (2 * math.pi)
+UIUC = "J CT CP eta\n0.000  0.1000  0.0400  0.000\n0.200  0.0800  0.0380  0.421\n0.400  0.0500  0.0300  0.667"
+GRID = "angle,J,CT,CP\n0,0,0.1,0.04\n0,0.2,0.08,0.038\n90,0,0.1,0.04\n90,0.2,0.12,0.036\n"
+
+
+def make(drone, tmp_path, text=UIUC, **table):
+    (tmp_path / "prop.csv").write_text(text)
+    table = {"file": "prop.csv", **table}
+    embed(table, tmp_path)
+    (e,) = effects.from_scene({"rotor_table": table}, drone)
+    return e
+
+
+def loads(e, s):
+    return rotor_table.py_func(e, (), s, NO_FACTORS, NO_LOADS)
+
+
+def test_the_definitions_of_the_coefficients(drone, situation, tmp_path):
+    """T = C_T rho n^2 D^4, P = C_P rho n^3 D^5 at rest, at J = 0.2 and between rows."""
+    e = make(drone, tmp_path)
+    for j, ct, cp in ((0.0, 0.1, 0.04), (0.2, 0.08, 0.038), (0.3, 0.065, 0.034), (0.9, 0.05, 0.03), (-0.3, 0.1, 0.04)):
+        found = loads(e, situation(velocity=(3.0, 0, j * N * D)))
+        assert found.thrust == pytest.approx([ct * 1.2 * N**2 * D**4] * 4)
+        assert np.array(found.torque) * SPEED == pytest.approx([cp * 1.2 * N**3 * D**5] * 4)
+    assert e.thrust_constant * SPEED**2 == pytest.approx(0.1 * N**2 * D**4)
+
+
+def test_torque_coefficients_commas_and_comments(drone, situation, tmp_path):
+    text = "# static row first\nJ, CT, CQ\n" + f"0,0.1,{0.04 / (2 * math.pi)}\n0.2,0.08,{0.038 / (2 * math.pi)}\n"
+    by_power, by_torque = make(drone, tmp_path), make(drone, tmp_path, text)
+    s = situation(velocity=(0, 0, 0.1 * N * D))
+    assert np.array(loads(by_torque, s)) == pytest.approx(np.array(loads(by_power, s)))
+
+
+def test_a_grid_over_the_angle_of_the_air(drone, situation, tmp_path):
+    """At 0.1 across the axis halfway to 0.12; at 45 degrees the mean of the two rows."""
+    e = make(drone, tmp_path, GRID)
+    v = 0.1 * N * D
+    for velocity, ct in (((v, 0, 0), 0.11), ((0, 0, v), 0.09), ((v / math.sqrt(2), 0, v / math.sqrt(2)), 0.10)):
+        assert loads(e, situation(velocity=velocity)).thrust == pytest.approx([ct * 1.2 * N**2 * D**4] * 4)
+
+
+def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situation, tmp_path):
+    e = make(drone, tmp_path)
+    turning = loads(e, situation(velocity=(0, 0, 5.0), omega=(1.0, 0.0, 0.0))).thrust
+    assert turning[0] < turning[2]
+    assert loads(e, situation(speed=(0.0,) * 4, velocity=(1, 2, 3))) == ((0.0,) * 4, (0.0,) * 4)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("J CT CP\n0 0.1 0.04\n0.2 0.08\n", "line 3 has 2 columns; expected 3|expected 3 as its first line"),
+        ("J,CT,CP\n0,0.1,0.04\n0.2,,0.03\n", "line 3: '0.2,,0.03' has a hole"),
+        ("J CT CP\n0 0.1 0.04\n0.2 nan 0.03\n", "has a hole"),
+        ("J CT eta\n0 0.1 0.04\n", "names 0 columns CP or CQ"),
+        ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.1 0.1 0.04\n", "growing numbers, got 0.1 after 0.2"),
+        ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.6 0.1 0.04\n", "nothing between J = 0.2 and 0.6"),
+        ("J CT CP\n0.1 0.1 0.04\n0.2 0.09 0.04\n", r"J = 0 \(at rest\) among them, got J from 0.1 to 0.2"),
+        ("J CT CP\n0 -0.1 0.04\n0.2 0.09 0.04\n", "above 0 there, got -0.1 at J = 0"),
+        ("J CT CP\n0 10.1 0.04\n0.2 0.09 0.04\n", "at least -1 and at most 1, got 10.1"),
+        ("angle J CT CP\n0 0 .1 .1\n0 .1 .1 .1\n90 0 .1 .1\n", "the J at 90 deg are not those at 0 deg"),
+        ("", "the file is empty"),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_one_line(drone, tmp_path, text, said):
+    with pytest.raises(KeyedError, match=said) as caught:
+        make(drone, tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_it_stands_for_the_other_rotors(drone):
+    with pytest.raises(KeyedError, match=r"effects.rotor_table: stands for effects.rotor_thrust"):
+        effects.from_scene({"rotor_thrust": {}, "rotor_table": {}}, drone)

@@ -1,0 +1,63 @@
+"""Von Karman turbulence against its published spectra, in closed form and as it is drawn."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from dynamics import effects
+from dynamics.effects._turbulence import intensity
+from dynamics.effects.wind_von_karman import PARTS, draw
+from dynamics.kernel import kernel
+from dynamics.noise import stream_key
+
+KEY = stream_key(5, "drone1", "effects")
+
+
+def published(x):
+    """MIL-F-8785C, section 3.7.1.1: (along, across) one-sided over x = L omega / V, for unit deviation and L / V."""
+    square = (1.339 * x) ** 2
+    along = 2.0 / math.pi / (1.0 + square) ** (5 / 6)
+    return along, (1.0 + 8.0 / 3.0 * square) / (1.0 + square) ** (11 / 6) / math.pi
+
+
+def test_the_sum_of_its_parts_is_von_karmans():
+    x = np.logspace(-2, math.log10(300.0), 200)
+    along = sum(2.0 / math.pi * c**2 * r / (r**2 + x**2) for r, c in PARTS)
+    across = sum(c**2 * r * (r**2 + 3.0 * x**2) / (r**2 + x**2) ** 2 for r, c in PARTS) / math.pi
+    for ours, theirs in zip((along, across), published(x), strict=True):
+        assert ours / theirs == pytest.approx(np.ones(len(x)), abs=0.021)
+    assert sum(c**2 for _, c in PARTS) == pytest.approx(1.0, abs=0.005)
+
+
+@kernel
+def series(e, memory, s, rotors, key, interval, out):
+    for tick in range(out.shape[0]):
+        memory = draw(e, memory, s, rotors, key, tick, interval)
+        out[tick, 0], out[tick, 1], out[tick, 2] = memory[1]
+
+
+def test_spectra(drone, situation, rotors):
+    table = {"wind_speed": 7.0, "airspeed": 8.0, "altitude": 20.0}
+    (e,) = effects.from_scene({"wind_von_karman": table}, drone)
+    interval, (sigma, scale) = 0.02, intensity(7.0, 20.0)
+    wind = np.empty((2**19, 3))
+    series(e, e.initial_memory(), situation(), rotors(), KEY, interval, wind)
+    frequency, power = welch(wind, fs=1 / interval, nperseg=2**13, axis=0)
+    omega = 2 * math.pi * frequency
+    band = (omega > 0.05) & (omega < 0.2 / interval)
+    omega, power = omega[band], power[band] / (2 * math.pi)  # per rad/s, one-sided
+    for axis in range(3):
+        lag = scale[axis] / 8.0
+        ratio = power[:, axis] / (sigma[axis] ** 2 * lag * published(lag * omega)[axis > 0])
+        octaves = [part.mean() for part in np.array_split(ratio, 12)]
+        assert octaves == pytest.approx(np.ones(12), abs=0.12)
+    assert wind.std(axis=0) == pytest.approx(sigma, rel=0.05)
+    assert np.corrcoef(wind.T) == pytest.approx(np.eye(3), abs=0.06)
+
+
+def test_excludes_dryden(drone):
+    table = {"wind_speed": 7.0}
+    with pytest.raises(ValueError, match=r"excludes effects\.wind_dryden, both are a turbulence"):
+        effects.from_scene({"wind_von_karman": table, "wind_dryden": table}, drone)

@@ -1,0 +1,50 @@
+"""The atmosphere against published tables, and against the hydrostatic balance that it is."""
+
+import pytest
+
+from dynamics.atmosphere import Atmosphere, density, density_slope, pressure, pressure_altitude, temperature
+
+STANDARD, WARM = Atmosphere(), Atmosphere(99_000.0, 20.0)
+
+# U.S. Standard Atmosphere 1976, table I, by geometric altitude [m]: [K], [Pa], [kg/m^3]
+TABLE = [
+    (0.0, 288.150, 101_325.0, 1.2250),
+    (1000.0, 281.651, 89_876.0, 1.1117),
+    (2000.0, 275.154, 79_501.0, 1.0066),
+    (3000.0, 268.659, 70_121.0, 0.90925),
+    (5000.0, 255.676, 54_048.0, 0.73643),
+    (8000.0, 236.215, 35_651.0, 0.52579),
+    (10_000.0, 223.252, 26_499.0, 0.41351),
+    (12_000.0, 216.650, 19_399.0, 0.31194),
+    (15_000.0, 216.650, 12_112.0, 0.19476),
+    (20_000.0, 216.650, 5529.3, 0.088910),
+]
+
+
+@pytest.mark.parametrize(("altitude", "kelvin", "pascal", "rho"), TABLE)
+def test_published_table(altitude, kelvin, pascal, rho):
+    assert temperature(STANDARD, altitude) == pytest.approx(kelvin, abs=2e-3)
+    assert pressure(STANDARD, altitude) == pytest.approx(pascal, rel=5e-5)
+    assert density(STANDARD, altitude) == pytest.approx(rho, rel=1e-4)
+
+
+@pytest.mark.parametrize("air", [STANDARD, WARM])
+@pytest.mark.parametrize("altitude", [0.0, 280.0, 5000.0, 15_000.0])
+def test_pressure_carries_the_air_above(air, altitude):
+    """dp/dz = -rho g, whatever the day."""
+    slope = (pressure(air, altitude + 1.0) - pressure(air, altitude - 1.0)) / 2.0
+    gravity = 9.80665 * (6_356_766.0 / (6_356_766.0 + altitude)) ** 2
+    assert slope == pytest.approx(-density(air, altitude) * gravity, rel=1e-6)
+
+
+@pytest.mark.parametrize("air", [STANDARD, WARM])
+@pytest.mark.parametrize("altitude", [-300.0, 0.0, 280.0, 3000.0, 10_900.0, 11_500.0, 19_000.0])
+def test_altitude_from_pressure_and_back(air, altitude):
+    assert pressure_altitude(air, pressure(air, altitude)) == pytest.approx(altitude, abs=1e-6)
+    slope = (density(air, altitude + 1.0) - density(air, altitude - 1.0)) / 2.0
+    assert density_slope(air, altitude) == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_warm_day_is_thin_and_a_high_pressure_dense():
+    assert density(WARM, 0.0) == pytest.approx(99_000.0 / (287.05287 * 308.15), rel=1e-12)
+    assert temperature(WARM, 15_000.0) == pytest.approx(236.65)

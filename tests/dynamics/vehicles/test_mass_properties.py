@@ -1,0 +1,78 @@
+"""Products of inertia and a centre of mass off the origin, against the same body described along other axes."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import lapwing
+from dynamics import effects
+from dynamics.effects._types import FullMassProperties, body_of
+from dynamics.integrators import get
+from dynamics.lie.quaternion import Quaternion
+from dynamics.noise import stream_key
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import Airframe, Mass, load_airframe
+from services.common.sections import SHIPPED
+
+DRONE = load_airframe(SHIPPED / "vehicles/delivery_drone.toml")
+RK4 = get("rk4_renormalised").Method()
+KEY = stream_key(1, "drone1", "effects")
+TURN = Rotation.from_euler("zyx", [0.4, -0.3, 0.7])  # from the principal axes to the body's
+PRINCIPAL = np.diag(DRONE.mass.inertia)
+MATRIX = TURN.as_matrix() @ PRINCIPAL @ TURN.as_matrix().T
+PRODUCTS = (MATRIX[0, 1], MATRIX[0, 2], MATRIX[1, 2])
+
+
+def tumbled(inertia, products, attitude, omega):
+    mass = DRONE.mass.model_copy(update={"inertia": tuple(inertia), "products": tuple(products)})
+    frame = DRONE.model_copy(update={"mass": mass})
+    p = multirotor.parameters(frame, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, frame))
+    q = Quaternion(*np.roll(attitude.as_quat(), 1).tolist())
+    state = multirotor.initial_state(p, (0.0, 0.0, 50.0), q, 0.0, (0.0, 0.0, 0.0), tuple(map(float, omega)))
+    m = multirotor.advance(RK4, p, KEY, 0, state, (0.0,) * 4, 1e-3, 1500).motion
+    return Rotation.from_quat(np.roll(m.attitude, -1)), np.array(m.omega_body)
+
+
+def test_a_body_tumbles_the_same_along_whatever_axes_it_is_described():
+    omega = np.array([3.0, 0.2, -1.0])
+    attitude, rate = tumbled(np.diag(PRINCIPAL), (0.0, 0.0, 0.0), Rotation.identity(), omega)
+    turned, turned_rate = tumbled(np.diag(MATRIX), PRODUCTS, TURN.inv(), TURN.apply(omega))
+    assert (turned.inv() * attitude * TURN.inv()).magnitude() < 1e-9
+    assert turned_rate == pytest.approx(TURN.apply(rate), abs=1e-9)
+
+
+def test_the_inverse_is_the_inverse_and_without_products_nothing_changes():
+    full = body_of(2.0, tuple(np.diag(MATRIX)), PRODUCTS)
+    product = np.reshape(full.inertia, (3, 3)) @ np.reshape(full.inverse_inertia, (3, 3))
+    assert product == pytest.approx(np.eye(3), abs=1e-12)
+    assert not isinstance(body_of(2.0, DRONE.mass.inertia), FullMassProperties)
+
+
+@pytest.mark.parametrize(
+    ("products", "message"),
+    [((0.4, 0.0, 0.0), "products: .* principal moment"), ((0.0, 0.0, 0.15), "triangle inequality")],
+)
+def test_a_matrix_that_no_body_has_is_refused(products, message):
+    with pytest.raises(ValueError, match=message):
+        Mass(total=1.0, payload=0.0, inertia=(0.27, 0.26, 0.42), products=products)
+
+
+def test_positions_are_moved_to_the_centre_of_mass_once():
+    mass = DRONE.mass.model_copy(update={"centre": (0.017, 0.0, -0.01)})
+    moved = DRONE.model_copy(update={"mass": mass}).about_centre
+    assert moved.rotors.position[0] == pytest.approx((0.35171491 - 0.017, 0.35171491, 0.01))
+    assert moved.contact.feet[1] == pytest.approx((-0.217, 0.25, -0.34))
+    assert moved.about_centre is moved
+    assert DRONE.about_centre is DRONE
+    assert isinstance(moved, Airframe)
+
+
+def test_in_hover_the_rotors_share_the_weight_by_their_distance_from_the_centre_of_mass():
+    """The least thrusts that carry W without a torque: F = W / 4 (1 + (c . r) / l^2), r from the hubs' centre."""
+    c, arm = 0.017, 0.35171491
+    flight = lapwing.fly("hover", {"airframe.mass.centre": [c, 0.0, 0.0], "run.duration": 5.5})
+    thrust = flight.truth.rotor_thrust[flight.truth.times > 5.0].mean(axis=0)
+    weight = DRONE.mass.total * 9.80665
+    tilted = [1.0 + sign * c / arm for sign in (1.0, -1.0, -1.0, 1.0)]
+    assert thrust == pytest.approx(0.25 * weight * np.array(tilted), rel=2e-3)
+    assert abs(flight.truth.position[flight.truth.times > 5.0, 0]).max() < 0.01

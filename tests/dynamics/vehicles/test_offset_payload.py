@@ -1,0 +1,202 @@
+"""A payload with a place: parallel axes, momentum when it goes, and a flight that lets it go."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import lapwing
+from dynamics import effects
+from dynamics.effects._types import body_of
+from dynamics.effects.payload import RELEASED
+from dynamics.integrators import get
+from dynamics.lie.quaternion import Quaternion
+from dynamics.noise import stream_key
+from dynamics.validation import fault
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.airframe import Airframe, CarriedBox, load_airframe
+from services.table import load, resolve
+
+DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+BARE = DRONE.mass.model_copy(
+    update={"total": 8.0, "payload": 0.0, "centre": (0.01, -0.02, 0.03), "products": (0.01, -0.005, 0.002)}
+)
+BOX = CarriedBox(mass=2.0, position=(0.12, 0.05, -0.20), size=(0.30, 0.20, 0.10))
+FRAME = DRONE.model_copy(update={"mass": BARE, "payload": BOX})
+RK4, KEY, STEP = get("rk4_renormalised").Method(), stream_key(1, "drone1", "effects"), 1e-3
+
+
+def points_of(mass, inertia, centre):
+    """Six point masses (m, r) with this mass, centre and inertia matrix."""
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia  # integral of r r^T dm
+    values, axes = np.linalg.eigh(second)
+    arms = [sign * np.sqrt(3.0 * v / mass) * a for v, a in zip(values, axes.T, strict=True) for sign in (1, -1)]
+    return [(mass / 6.0, centre + arm) for arm in arms]
+
+
+def test_mass_centre_and_inertia_are_those_of_the_points_of_both_bodies():
+    """Against a sum over point masses that know no theorem; the box by hand: m (b^2 + c^2) / 12."""
+    box = 2.0 / 12.0 * np.diag([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2])
+    points = points_of(8.0, BARE.matrix, np.array(BARE.centre)) + points_of(2.0, box, np.array(BOX.position))
+    masses, places = np.array([m for m, _ in points]), np.array([r for _, r in points])
+    centre = masses @ places / masses.sum()
+    arms = places - centre
+    inertia = sum(m * (a @ a * np.eye(3) - np.outer(a, a)) for m, a in zip(masses, arms, strict=True))
+    joint = FRAME.loaded.mass
+    assert joint.total == pytest.approx(masses.sum())
+    assert joint.centre == pytest.approx(centre)
+    assert joint.matrix == pytest.approx(inertia, abs=1e-12)
+    loaded = FRAME.loaded
+    assert loaded.loaded is loaded
+
+
+def flying(tables):
+    frame = FRAME.loaded.about_centre
+    p = multirotor.parameters(frame, effects.from_scene(tables, frame))
+    attitude = Quaternion(*map(float, Rotation.from_rotvec([0.2, -0.4, 0.3]).as_quat(scalar_first=True)))
+    return p, multirotor.initial_state(p, (1.0, 2.0, 50.0), attitude, 0.0, (3.0, -1.0, 0.5), (2.0, -3.0, 1.0))
+
+
+def released(state):
+    return state._replace(memory=tuple(RELEASED if len(m) == 1 else m for m in state.memory))
+
+
+def momenta(mass, inertia, centre, motion):
+    """(linear, angular about the world's origin) momentum of a body, its centre of mass off the motion's position."""
+    R = Rotation.from_quat(motion.attitude, scalar_first=True)
+    omega = R.apply(motion.omega_body)
+    arm = R.apply(centre)
+    linear = mass * (motion.velocity_world + np.cross(omega, arm))
+    own = R.apply(inertia @ motion.omega_body)
+    return linear, np.cross(np.array(motion.position_world) + arm, linear) + own
+
+
+def test_when_it_goes_both_keep_their_momentum():
+    """In free space: the vehicle's is constant after the release, and with the box's the one before."""
+    p, state = flying({"payload": {}})
+    (effect,) = p.effects
+    for tick in range(200):
+        state = multirotor.advance(RK4, p, KEY, tick, state, (0.0,) * 4, STEP, 1)
+    before = momenta(10.0, FRAME.loaded.mass.matrix, np.zeros(3), state.motion)
+    box = momenta(2.0, BOX.inertia, np.subtract(BOX.position, FRAME.loaded.mass.centre), state.motion)
+    empty = effect.empty
+    matrix = np.reshape(empty.inertia, (3, 3))
+    assert matrix == pytest.approx(BARE.matrix, abs=1e-12)
+    assert empty.centre_body == pytest.approx(np.subtract(BARE.centre, FRAME.loaded.mass.centre))
+    state = released(state)
+    for tick in range(200, 700):
+        state = multirotor.advance(RK4, p, KEY, tick, state, (0.0,) * 4, STEP, 1)
+    after = momenta(8.0, matrix, np.array(empty.centre_body), state.motion)
+    assert after[0] + box[0] == pytest.approx(before[0], abs=1e-9)
+    assert after[1] + box[1] == pytest.approx(before[1], abs=1e-6)
+
+
+def test_while_it_is_carried_it_is_a_plain_body():
+    p, state = flying({"payload": {}, "gravity": {}, "rotor_thrust": {}})
+    plain, other = flying({"gravity": {}, "rotor_thrust": {}})
+    m = FRAME.loaded.mass
+    plain = plain._replace(body=body_of(m.total, m.inertia, m.products))
+    for tick in range(100):
+        state = multirotor.advance(RK4, p, KEY, tick, state, (30.0, 31.0, 32.0, 29.0), STEP, 1)
+        other = multirotor.advance(RK4, plain, KEY, tick, other, (30.0, 31.0, 32.0, 29.0), STEP, 1)
+    assert np.array(state.motion.position_world) == pytest.approx(other.motion.position_world, abs=1e-10)
+    assert np.array(state.motion.omega_body) == pytest.approx(other.motion.omega_body, abs=1e-10)
+
+
+def test_an_empty_vehicle_is_the_vehicle_described_without_the_box():
+    """After the release it flies as the bare airframe does whose state is that of its own centre of mass."""
+    tables = {"gravity": {}, "rotor_thrust": {}, "h_force": {"coefficient": 1e-4}, "gyroscopic_torque": {}}
+    p, state = flying({**tables, "payload": {}})
+    state = released(state)
+    bare = DRONE.model_copy(update={"mass": BARE}).about_centre
+    q = multirotor.parameters(bare, effects.from_scene(tables, bare))
+    c = np.subtract(BARE.centre, FRAME.loaded.mass.centre)
+
+    def at_centre(m):
+        R = Rotation.from_quat(m.attitude, scalar_first=True)
+        return m.position_world + R.apply(c), m.velocity_world + R.apply(np.cross(m.omega_body, c))
+
+    position, velocity = (tuple(map(float, v)) for v in at_centre(state.motion))
+    other = multirotor.initial_state(q, position, state.motion.attitude, 0.0, velocity, state.motion.omega_body)
+    for tick in range(500):
+        state = multirotor.advance(RK4, p, KEY, tick, state, (30.0, 31.0, 32.0, 29.0), STEP, 1)
+        other = multirotor.advance(RK4, q, KEY, tick, other, (30.0, 31.0, 32.0, 29.0), STEP, 1)
+    assert at_centre(state.motion)[0] == pytest.approx(np.array(other.motion.position_world), abs=1e-8)
+    assert at_centre(state.motion)[1] == pytest.approx(np.array(other.motion.velocity_world), abs=1e-7)
+    assert np.array(state.motion.omega_body) == pytest.approx(np.array(other.motion.omega_body), abs=1e-7)
+
+
+def test_a_flight_lets_a_payload_go_that_hangs_ahead():
+    """The front rotors carry more with it; without it all carry the rest about the vehicle's own centre."""
+    ahead, arm, g = 0.1, 0.35171491, 9.80665
+    box = {"mass": 2.0, "position": [ahead, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
+    flight = lapwing.fly(
+        "hover",
+        {"airframe.mass.total": 8.0224, "airframe.mass.payload": 0.0, "airframe.payload": box,
+         "effects.payload.release_time": 5.0, "run.duration": 20.0,
+         "trajectory.phase": [
+             {"name": "climb", "z": {"kind": "minimum_jerk", "to": 2.0, "duration": 3.0}},
+             {"name": "hover", "duration": 9.0},
+             {"name": "descend", "z": {"kind": "minimum_jerk", "to": 0.0, "duration": 3.0}},
+             {"name": "land", "duration": 2.0},
+         ]},
+    )  # fmt: skip
+    assert flight.landed
+    t, thrust = flight.truth.times, flight.truth.rotor_thrust
+    with_it, without = thrust[(t > 4.5) & (t < 5.0)].mean(axis=0), thrust[(t > 11.0) & (t < 12.0)].mean(axis=0)
+    signs = np.array([1.0, -1.0, -1.0, 1.0])  # front left, rear left, rear right, front right
+    c = 2.0 * ahead / 10.0224
+    assert with_it == pytest.approx(0.25 * 10.0224 * g * (1.0 + signs * c / arm), rel=5e-3)
+    assert without == pytest.approx(np.full(4, 0.25 * 8.0224 * g), rel=1e-2)
+
+
+def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
+    box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
+    scene = load(
+        "hover",
+        {"airframe.mass.total": 8.0224, "airframe.mass.payload": 0.0, "airframe.payload": box,
+         "effects.payload.release_time": 0.1},
+    )  # fmt: skip
+    batch = lapwing.Batch(scene, 2)
+    for _ in range(50):
+        found = batch.step(motor_voltages=np.full((2, 4), 36.0))
+    core, state = resolve(scene).services["plant"].parameters.core, resolve(scene).services["plant"].parameters.start
+    x = state.vehicle
+    for tick in range(50):
+        x = multirotor.advance(core.method, core.vehicle, core.key, tick, x, (36.0,) * 4, core.step, core.steps)
+    assert found.position_world[1].tolist() == list(x.motion.position_world)
+    assert found.omega_body[1].tolist() == list(x.motion.omega_body)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"vehicle.mass": 9.0}, r"vehicle\.mass: airframe\.payload is part of it"),
+        ({"vehicle.model": "multibody"}, "payload: the five bodies have no place for one"),
+    ],
+)
+def test_refused_in_a_scene(overrides, message):
+    box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
+    with pytest.raises(ValueError, match=message):
+        resolve(load("hover", {"airframe.mass.payload": 0.0, "airframe.payload": box, **overrides}))
+
+
+@pytest.mark.parametrize(
+    ("mass", "payload", "table", "message"),
+    [
+        ({"payload": 1.0}, {}, {}, "mass.payload: expected 0, got 1 beside a table"),
+        ({}, {"mass": -1.0}, {}, "payload.mass: expected a number above 0, got -1.0"),
+        ({}, {}, {"mass": 1.0}, "effects.payload.mass: stands beside the table airframe.payload; expected one of them"),
+        ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload.size: stands beside the table airframe.payload"),
+    ],
+)
+def test_refused(tmp_path, mass, payload, table, message):
+    whole = FRAME.model_dump(exclude_none=True)
+    whole["mass"] |= mass
+    whole["payload"] |= payload
+    with pytest.raises(ValueError) as caught:
+        effects.from_scene({"payload": table}, Airframe.model_validate(whole).loaded.about_centre)
+    error = caught.value
+    text = str(fault(error, Airframe) if hasattr(error, "errors") else error)
+    assert text.startswith(message)

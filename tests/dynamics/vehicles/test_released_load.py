@@ -1,0 +1,44 @@
+"""A load that is let go: nothing jumps, the load falls freely, a quadrotor follows its thrust and turns as it did."""
+
+import numpy as np
+import pytest
+
+from dynamics.integrators import get, rate, simulate
+from dynamics.lie.quaternion import NO_ROTATION, exp
+from dynamics.lie.ts2 import Swing
+from dynamics.tree import unflatten
+from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from dynamics.vehicles.released_load import release
+
+MASS, G, THRUST = 0.7, 9.81, 9.0
+INERTIA, MOMENT, SPIN = (0.08, 0.09, 0.13), (0.0, 0.0, 0.02), (0.0, 0.0, 0.3)
+
+
+def let_go():
+    """Both quadrotors turn about their axes, the second is tilted by a quarter turn about x."""
+    drive = LiftCommand((THRUST, THRUST), (MOMENT, MOMENT))
+    p = CooperativeLoadParameters((MASS, MASS), (INERTIA, INERTIA), (0.6, 0.8), 0.4, G, drive)
+    links = (Swing((0.0, 0.0, -1.0), (2.0, 0.0, 0.0)), Swing((1.0, 0.0, 0.0), (0.0, 0.0, 3.0)))
+    tilted = exp((np.pi / 2, 0.0, 0.0))
+    return release(p, CooperativeLoadState((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (NO_ROTATION, tilted), (SPIN,) * 2, links))
+
+
+def test_every_body_goes_on_from_where_it_was():
+    _, x = let_go()
+    assert x.quad_position == (pytest.approx((1.0, 2.0, 3.6)), pytest.approx((0.2, 2.0, 3.0)))
+    # less the link's length times omega x q: (2, 0, 0) x (0, 0, -1) = (0, 2, 0) and (0, 0, 3) x (1, 0, 0) = (0, 3, 0)
+    assert x.quad_velocity == (pytest.approx((0.1, -1.0, 0.3)), pytest.approx((0.1, -2.2, 0.3)))
+
+
+def test_free_fall_thrust_and_spin():
+    p, x = let_go()
+    assert rate(p, 0.0, x).load_velocity == pytest.approx((0.0, 0.0, -G))
+    _, rows = simulate(get("rk4_renormalised"), p, x, 1e-3, 1000, every=1000)
+    end = unflatten(x, tuple(map(float, rows[-1])))
+    fallen = np.array(x.load_position) + x.load_velocity - np.array((0.0, 0.0, G / 2))
+    assert end.load_position == pytest.approx(fallen, abs=1e-11)
+    for i, axis in enumerate([(0.0, 0.0, 1.0), (0.0, -1.0, 0.0)]):
+        pushed = THRUST / MASS * np.array(axis) - (0.0, 0.0, G)
+        exact = np.array(x.quad_position[i]) + x.quad_velocity[i] + pushed / 2
+        assert end.quad_position[i] == pytest.approx(exact, abs=1e-11)
+        assert end.omega_body[i] == pytest.approx((0.0, 0.0, 0.3 + 0.02 / 0.13), abs=1e-12)

@@ -1,0 +1,20 @@
+"""The learning example learns; how well is seen in docs/benchmarks.md."""
+
+import math
+
+import pytest
+
+pytest.importorskip("skrl", reason="the extra learn is not installed")
+pytest.importorskip("jax", reason="the extra learn is not installed")
+
+pytestmark = pytest.mark.long
+
+
+def test_a_few_updates_change_the_policy(monkeypatch):
+    from examples import ppo_hover
+
+    monkeypatch.setattr(ppo_hover, "VEHICLES", 8)
+    monkeypatch.setattr(ppo_hover, "EPISODE", 50)
+    before, after = ppo_hover.main(2 * ppo_hover.ROLLOUT)
+    assert all(map(math.isfinite, (*before, *after)))
+    assert before != after

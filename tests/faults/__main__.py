@@ -1,0 +1,41 @@
+"""Runs with faults at random instants under random participants.
+
+    python -m tests.faults --seed S --trials N [--jobs J] [--kinds KIND ...]
+
+Each trial is made from one seed (S, S+1, ...), and is carried out again by `--seed THAT --trials 1`. Exit code 1
+where one has another end than it should.
+"""
+
+import argparse
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+
+from tests.faults.trial import draw, fly
+
+
+def main() -> None:
+    """Fly them, and count."""
+    parser = argparse.ArgumentParser(description="Runs with faults at random instants under random participants.")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--trials", type=int, default=10)
+    parser.add_argument("--jobs", type=int, default=1, help="trials at once")
+    parser.add_argument("--kinds", nargs="+", help="leave out all others")
+    given = parser.parse_args()
+    trials = [draw(given.seed + k, given.kinds) for k in range(given.trials)]
+    counts: Counter = Counter()
+    longest: dict[str, float] = {}
+    with ThreadPoolExecutor(given.jobs) as pool:
+        for trial, outcome in zip(trials, pool.map(fly, trials), strict=True):
+            counts[trial.kind, not outcome.wrong] += 1
+            longest[trial.kind] = max(longest.get(trial.kind, 0.0), outcome.seconds)
+            words = "; ".join(outcome.wrong) or "ok"
+            where = f"{trial.seed:6d} {trial.scene:18s} {trial.kind:14s} {outcome.victim:10s} {trial.delay:4.1f} s"
+            print(f"{where}  exit code {outcome.code:3d} after {outcome.seconds:4.1f} s  {words}", flush=True)
+    for kind in sorted(longest):
+        right, wrong = counts[kind, True], counts[kind, False]
+        print(f"{kind}: {right} of {right + wrong} as they should be, the longest end {longest[kind]:.1f} s")
+    raise SystemExit(any(not right for _, right in counts))
+
+
+if __name__ == "__main__":
+    main()

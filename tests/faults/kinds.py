@@ -1,0 +1,98 @@
+"""What is done to a run, and what must come of it."""
+
+import os
+import re
+import signal
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import NamedTuple
+
+LAUNCHER = "launcher"
+PAUSE = 1.0  # [s] that a flight must wait for
+FROZEN = 30.0  # [s] after which a launcher that was frozen is let go on
+
+
+FULL = "full disk"
+RESTARTED = ("restart", "restart frozen")  # of services that are to be started again: killed, and stopped
+INTERRUPT = "Ctrl-C"  # at any moment; where the seed is odd nothing is compiled yet
+
+
+class Kind(NamedTuple):
+    """A kind of fault."""
+
+    strike: Callable[[int], None]  # at a process
+    # what is wrong with an end: (victim, exit code, standard error); "" if nothing
+    ends: Callable[[str, int, str], str]
+
+
+def kill(pid: int) -> None:
+    _send(pid, signal.SIGKILL)
+
+
+def freeze(pid: int) -> None:
+    _send(pid, signal.SIGSTOP)
+
+
+def pause(pid: int) -> None:
+    _send(pid, signal.SIGSTOP)
+    time.sleep(PAUSE)
+    _send(pid, signal.SIGCONT)
+
+
+def starve(pid: int) -> None:
+    """For a while the process gets a tenth of the time."""
+    for _ in range(20):
+        _send(pid, signal.SIGSTOP)
+        time.sleep(0.09 * PAUSE)
+        _send(pid, signal.SIGCONT)
+        time.sleep(0.01 * PAUSE)
+
+
+def interrupt(pid: int) -> None:
+    _send(pid, signal.SIGINT)
+
+
+def nothing(pid: int) -> None:
+    """What is done is not done to a process (trial.py)."""
+
+
+def _send(pid: int, number: int) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, number)
+
+
+def _flies_on(victim: str, code: int, said: str) -> str:
+    return "" if (code, said) == (0, "") else f"expected a flight to its end, got exit code {code}: {said}"
+
+
+def _named(pattern: str) -> Callable[[str, int, str], str]:
+    def check(victim: str, code: int, said: str) -> str:
+        wanted = pattern.replace("VICTIM", victim)
+        if code == 1 and re.fullmatch(rf"lapwing: {wanted}.*\n", said):
+            return ""
+        return f"expected exit code 1 and {wanted!r}, got {code}: {said!r}"
+
+    return check
+
+
+def _no_space(victim: str, code: int, said: str) -> str:
+    right = code == 2 and said.startswith("lapwing: ") and "no space left" in said.lower() and said.count("\n") == 1
+    return "" if right else f"expected exit code 2 and that there is no space left, got {code}: {said!r}"
+
+
+def _interrupted(victim: str, code: int, said: str) -> str:
+    right = (code, said) == (130, "lapwing: ended by SIGINT\n")
+    return "" if right else f"expected exit code 130 and one line, got {code}: {said!r}"
+
+
+KINDS = {
+    "kill": Kind(kill, _named(r"VICTIM ended unexpectedly \(signal 9\)")),
+    "freeze": Kind(freeze, _named("VICTIM: (no answer|stopped) for")),
+    "pause": Kind(pause, _flies_on),
+    "starve": Kind(starve, _flies_on),
+    FULL: Kind(nothing, _no_space),
+    RESTARTED[0]: Kind(kill, _flies_on),
+    RESTARTED[1]: Kind(freeze, _flies_on),
+    INTERRUPT: Kind(interrupt, _interrupted),
+}

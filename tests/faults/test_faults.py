@@ -1,0 +1,34 @@
+"""A few of the runs with faults; `python -m tests.faults` has as many as one likes."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.faults.trial import Trial, draw, fly
+
+FEW = {
+    "a service waits for a frozen one that goes on": Trial(0, "hover", "pause", 0.0, 4.0),
+    "frozen before it has joined": Trial(0, "hover", "freeze", 0.5, 0.2),
+    "the launcher stays frozen": Trial(0, "hover", "freeze", 1.0, 4.0),
+    "the sensors are killed and started again": Trial(0, "delivery_mission", "restart", 0.7, 6.0),
+    "the plant is stopped and started again": Trial(0, "cooperative_load", "restart frozen", 0.99, 4.0),
+    "interrupted while it starts": Trial(0, "gyrostat_attitude", "Ctrl-C", 1.0, 0.4),
+    "interrupted while it compiles": Trial(1, "gyrostat_attitude", "Ctrl-C", 1.0, 3.0),
+    "the disk is full": Trial(0, "hover", "full disk", 0.0, 3.0),
+}
+
+
+@pytest.mark.parametrize("trial", FEW.values(), ids=FEW)
+def test_a_fault_has_the_end_that_it_should(trial):
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("finds processes in /proc")
+    if trial.kind == "full disk" and os.geteuid() != 0:
+        pytest.skip("mounts a small disk, as root")
+    outcome = fly(trial)
+    assert not outcome.wrong, outcome
+
+
+def test_a_seed_makes_the_same_trial():
+    assert draw(7) == draw(7)
+    assert len({draw(seed).kind for seed in range(40)}) >= 4

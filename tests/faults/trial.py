@@ -1,0 +1,225 @@
+"""One run with one fault, and what is wrong with its end."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import studies.fly
+from cosim.child import PARTICIPANT
+from cosim.log import LogReader
+from services.table import load
+from tests.faults import cut
+from tests.faults.kinds import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
+
+SCENES = {  # overrides that make a flight of a few seconds
+    "hover": ["run.duration=5"],
+    "delivery_mission": ["run.duration=5"],
+    "cooperative_load": ["run.duration=5"],
+    "gyrostat_attitude": ["run.duration=5"],
+}
+LATEST = 9.0  # [s] after the start of its first process at which a run is struck
+TIMEOUT = 60.0  # [s] for a run to end after that, and for its processes
+DISK = 1 << 24  # [bytes] of a disk that is filled
+RECOVERED = 0.5  # [s] before the fault up to which a log must be whole
+
+
+class Trial(NamedTuple):
+    """What is done: made from a seed."""
+
+    seed: int
+    scene: str
+    kind: str
+    place: float  # which of the participants, in [0, 1); 1: the launcher
+    delay: float  # [s] after the first process has started; of Ctrl-C after the launcher has
+
+
+class Outcome(NamedTuple):
+    """What came of it."""
+
+    victim: str
+    code: int
+    said: str
+    seconds: float  # from the fault to the end of the last process
+    wrong: list[str]
+
+
+def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
+    """The trial of a seed, of one of these kinds."""
+    chance = random.Random(seed)
+    every = [*KINDS, *cut.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
+    kind = chance.choice(kinds or every)
+    launcher = kind != FULL and kind not in RESTARTED and chance.random() < 0.2
+    place = 1.0 if kind == INTERRUPT or launcher else chance.random()
+    return Trial(seed, chance.choice(sorted(SCENES)), kind, place, chance.uniform(0.2, LATEST))
+
+
+def fly(trial: Trial) -> Outcome:
+    """Carry a trial out in a folder of its own."""
+    folder = Path(tempfile.mkdtemp(prefix="faults-"))
+    disk = folder / "disk"
+    disk.mkdir()
+    full = trial.kind == FULL
+    try:
+        if trial.kind in cut.KINDS:
+            victim = cut.HOSTS[min(int(trial.place * len(cut.HOSTS)), len(cut.HOSTS) - 1)]
+            return Outcome(victim, *cut.fly(victim, trial.kind, trial.delay / 2, folder))
+        if full:
+            subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", disk], check=True)
+        return _fly(trial, folder, disk / "log.mcap")
+    finally:
+        if full:
+            subprocess.run(["umount", "--lazy", disk], check=False)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _fly(trial: Trial, folder: Path, log: Path) -> Outcome:
+    overrides = list(SCENES[trial.scene])
+    if trial.kind in RESTARTED:
+        overrides.append(f"run.restart={json.dumps(list(undisturbed(trial.scene).services))}")
+    sets = [part for override in overrides for part in ("--set", override)]
+    command = [sys.executable, "-m", "lapwing", "run", trial.scene, *sets, "--speed", "1", "--log", str(log)]
+    at_once = trial.kind == INTERRUPT
+    cold = {"LAPWING_CACHE": str(folder / "cache")} if at_once and trial.seed % 2 else {}
+    with (folder / "said").open("w+") as said:
+        launcher = subprocess.Popen(
+            [*command, "--set", "success.require=[]", "--report", str(folder / "report.html")],
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            env={**os.environ, "TMPDIR": str(folder), **cold},
+            cwd=Path(__file__).parents[2],
+        )
+        while not at_once and not _children(launcher.pid) and launcher.poll() is None:
+            time.sleep(0.05)
+        time.sleep(trial.delay)
+        children = _children(launcher.pid)
+        everybody = {**children, LAUNCHER: launcher.pid}
+        names = sorted(children)
+        if trial.kind in RESTARTED:
+            names = [name for name in names if name in undisturbed(trial.scene).services]
+        victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
+        late = launcher.poll() is not None
+        if trial.kind == FULL:
+            victim = "recorder"
+            _fill(log.with_name("filler"))
+        elif trial.kind not in RESTARTED or victim != LAUNCHER:  # all that can be started again have ended
+            KINDS[trial.kind].strike(everybody[victim])
+        struck = time.monotonic()
+        wrong = []
+        if (victim, trial.kind) == (LAUNCHER, "freeze"):
+            _gone(_children(launcher.pid) | children, FROZEN)
+            os.kill(launcher.pid, signal.SIGCONT)
+        try:
+            launcher.wait(TIMEOUT)
+        except subprocess.TimeoutExpired:
+            wrong.append(f"the launcher has not ended after {TIMEOUT:g} s")
+            launcher.kill()
+            launcher.wait()
+        left = _gone(children, TIMEOUT)
+        seconds = time.monotonic() - struck
+        wrong += [f"{name} is left" for name in left]
+        for name in left:
+            with suppress(ProcessLookupError):
+                os.kill(children[name], signal.SIGKILL)
+        said.seek(0)
+        text = said.read()
+    code = launcher.returncode
+    wrong += _wrong_end(trial, victim, code, text, late)
+    wrong += _wrong_log(trial, victim, log, text, late)
+    if trial.kind in RESTARTED and not wrong:
+        wrong += _wrong_digest(trial.scene, log)
+    if stuck := [path.name for path in folder.glob("lapwing-*")]:
+        wrong.append(f"left behind: {', '.join(stuck)}")
+    return Outcome(victim, code, text.strip(), seconds, wrong)
+
+
+def _wrong_end(trial: Trial, victim: str, code: int, said: str, late: bool) -> list[str]:
+    over = (code, said) == (0, "")  # it was at its end when it was struck
+    if "Traceback" in said:
+        return [f"a traceback: {said}"]
+    if victim == LAUNCHER and trial.kind == "kill":
+        return [] if code == -signal.SIGKILL or (late and over) else [f"exit code {code}"]
+    if victim == LAUNCHER and trial.kind == "freeze":
+        return [] if code in (0, 1) else [f"exit code {code}: {said}"]
+    found = KINDS[trial.kind].ends(victim, code, said)
+    return [found] if found and not over else []
+
+
+def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> list[str]:
+    """The log opens, and holds what was flown up to shortly before the fault."""
+    _, _, stated = said.partition("at t = ")
+    flown = float(stated.split()[0].rstrip(":;,")) if stated else 0.0
+    if victim == "recorder":  # the others fly on until somebody waits, and the time is theirs
+        flown = min(flown, RECOVERED)
+    if flown < RECOVERED and not (trial.kind == INTERRUPT and log.exists()):
+        return []  # there may be none
+    try:
+        with LogReader(log) as read:
+            last = max((time_ns for _, _, time_ns, _ in read.messages()), default=0) * 1e-9
+    except ValueError as error:
+        return [str(error)]
+    return [] if last >= flown - RECOVERED else [f"the log ends at {last:.3f} s, struck at {flown:.3f} s"]
+
+
+class Undisturbed(NamedTuple):
+    """A run to which nothing is done."""
+
+    services: tuple[str, ...]
+    digest: str
+
+
+@cache
+def undisturbed(scene: str) -> Undisturbed:
+    """The run of a scene of a trial."""
+    flight = studies.fly.fly(load(scene, SCENES[scene]))
+    return Undisturbed(tuple(flight.setup.services), flight.digest)
+
+
+def _wrong_digest(scene: str, log: Path) -> list[str]:
+    with LogReader(log) as read:
+        found, wanted = read.digest(), undisturbed(scene).digest
+    return [] if found == wanted else [f"digest {found}, expected {wanted}"]
+
+
+def _fill(path: Path) -> None:
+    """Leave no space on a disk."""
+    with suppress(OSError), path.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+
+
+def _children(pid: int) -> dict[str, int]:
+    """Process ids of the participants, by name."""
+    found = {}
+    with suppress(OSError):
+        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            with suppress(OSError):
+                words = Path(f"/proc/{child}/cmdline").read_text().split("\0")
+                if PARTICIPANT in words:
+                    found[words[words.index(PARTICIPANT) + 1]] = int(child)
+    return found
+
+
+def _gone(pids: dict[str, int], seconds: float) -> list[str]:
+    """Who is still there after so many seconds."""
+    deadline = time.monotonic() + seconds
+    while (left := [name for name, pid in pids.items() if _running(pid)]) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return left
+
+
+def _running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -1,0 +1,52 @@
+"""Damaged bytes for everything that reads bytes from outside.
+
+    python -m tests.fuzz --inputs N [--seed S] [TARGET ...]
+
+Exit code 1 where something else than a ValueError came of an input, or one took longer than a second of processor time.
+"""
+
+import argparse
+import random
+import resource
+import time
+
+from tests.fuzz.mutate import mutated
+from tests.fuzz.targets import TARGETS
+
+SLOW = 1.0  # [s] of processor time for one input
+
+
+def main() -> None:
+    """Try, and count."""
+    parser = argparse.ArgumentParser(description="Damaged bytes for everything that reads bytes from outside.")
+    parser.add_argument("--inputs", type=int, default=1000, help="for each target")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
+    given = parser.parse_args()
+    wrong = 0
+    for name in given.targets or TARGETS:
+        target, chance = TARGETS[name](), random.Random(f"{name} {given.seed}")
+        for seed in target.seeds:  # what is loaded once is not counted
+            target.read(seed)
+        refused, slowest, begun = 0, 0.0, time.process_time()
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for number in range(given.inputs):
+            data, started = mutated(chance, target.seeds), time.process_time()
+            try:
+                target.read(data)
+            except ValueError:
+                refused += 1
+            except Exception as error:
+                wrong += 1
+                print(f"{name}: input {number}: {type(error).__name__}: {error!s:.100}: {data[:60]!r}", flush=True)
+            slowest = max(slowest, time.process_time() - started)
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+        wrong += slowest > SLOW
+        rate = given.inputs / (time.process_time() - begun)
+        shares = f"{refused} refused, {given.inputs - refused} taken"
+        print(f"{name}: {given.inputs} inputs, {shares}, slowest {1e3 * slowest:.0f} ms, +{grown:.0f} MB, {rate:.0f}/s")
+    raise SystemExit(wrong > 0)
+
+
+if __name__ == "__main__":
+    main()

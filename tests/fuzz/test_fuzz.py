@@ -1,0 +1,33 @@
+"""Nothing but a ValueError comes of damaged bytes; `python -m tests.fuzz` tries more of them."""
+
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.fuzz.mutate import mutated
+from tests.fuzz.targets import TARGETS
+
+made = cache(lambda name: TARGETS[name]())
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_damaged_bytes_are_refused_or_read(name):
+    target = made(name)
+
+    @settings(max_examples=60, deadline=None, database=None, derandomize=True)
+    @given(st.randoms(use_true_random=False))
+    def attempt(chance):
+        try:
+            target.read(mutated(chance, target.seeds))
+        except ValueError:
+            return
+
+    attempt()
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_sound_bytes_are_read(name):
+    for seed in made(name).seeds:
+        made(name).read(seed)

@@ -1,0 +1,120 @@
+"""Hosts of a network of our own: namespaces, joined by a switch that delays frames, loses them, and cuts hosts off.
+
+The switch is a thread that hands Ethernet frames from one TAP device to another, so that the hosts' own TCP meets what
+is done to them; nothing of the kernel is needed but namespaces and TAP devices.
+"""
+
+import fcntl
+import heapq
+import os
+import random
+import select
+import shutil
+import struct
+import subprocess
+import threading
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+_TUN = Path("/dev/net/tun")
+_TUNSETIFF, _TAP, _NO_HEADER = 0x400454CA, 0x0002, 0x1000
+_LARGEST = 65535  # [bytes] of a frame
+
+
+def why_not() -> str:
+    """Why there can be no such network here; "" where there can."""
+    if os.geteuid() != 0:
+        return "network namespaces need root"
+    if not shutil.which("ip") or not os.access(_TUN, os.W_OK):
+        return f"network namespaces need the program ip and {_TUN}"
+    name = f"lapwing-{os.getpid()}"
+    if subprocess.run(["ip", "netns", "add", name], capture_output=True, check=False).returncode:
+        return "no network namespace may be made here"
+    subprocess.run(["ip", "netns", "delete", name], check=True)
+    return ""
+
+
+class Network:
+    """Hosts by name, each with an address; `with` makes them, and removes them with all that still runs there.
+
+    Attributes:
+        addresses: of the hosts.
+        delay: (shortest, longest) time [s] that a frame takes.
+        loss: the part of the frames that are lost.
+        cut_off: hosts that nothing reaches, and from which nothing comes.
+    """
+
+    def __init__(self, hosts: Iterable[str], delay: tuple[float, float] = (0.0, 0.0), loss: float = 0.0, seed: int = 1):
+        self.addresses = {name: f"10.211.0.{k}" for k, name in enumerate(hosts, 1)}
+        self.delay, self.loss, self.cut_off = delay, loss, set[str]()
+        self._chance = random.Random(seed)
+        self._devices: dict[int, str] = {}  # the host of a device, by its descriptor
+        self._stack = ExitStack()
+        self._wake, self._stop = os.pipe()
+
+    def command(self, host: str, *words: str) -> list[str]:
+        """A command line, to be carried out on a host."""
+        return ["ip", "netns", "exec", self._namespace(host), *words]
+
+    def _namespace(self, host: str) -> str:
+        return f"lapwing-{os.getpid()}-{host}"
+
+    def __enter__(self) -> "Network":
+        self._stack.callback(lambda: [os.close(fd) for fd in (self._wake, self._stop)])
+        try:
+            for k, (host, address) in enumerate(self.addresses.items()):
+                self._add(host, address, f"lw{os.getpid()}-{k}")
+        except BaseException:
+            self._stack.close()
+            raise
+        switch = threading.Thread(target=self._run)
+        switch.start()
+        self._stack.callback(lambda: (os.write(self._stop, b"."), switch.join()))
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+
+    def _add(self, host: str, address: str, device: str) -> None:
+        namespace = self._namespace(host)
+        _ip("netns", "add", namespace)
+        self._stack.callback(_ip, "netns", "delete", namespace)
+        descriptor = os.open(_TUN, os.O_RDWR | os.O_NONBLOCK)
+        self._stack.callback(os.close, descriptor)
+        fcntl.ioctl(descriptor, _TUNSETIFF, struct.pack("16sH", device.encode(), _TAP | _NO_HEADER))
+        _ip("link", "set", device, "netns", namespace)
+        for words in (("address", "add", f"{address}/24", "dev", device), ("link", "set", device, "up")):
+            _ip("-netns", namespace, *words)
+        _ip("-netns", namespace, "link", "set", "lo", "up")
+        self._devices[descriptor] = host
+
+    def _run(self) -> None:
+        """Hand frames on: each waits in a heap until its time has come."""
+        waiting: list[tuple[float, int, int, bytes]] = []  # (due, number, descriptor it came from, frame)
+        latest: dict[int, float] = {}  # frames of one host keep their order
+        number = 0
+        while True:
+            left = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
+            ready, _, _ = select.select([self._wake, *self._devices], [], [], left)
+            if self._wake in ready:
+                return
+            now = time.monotonic()
+            for device in ready:
+                frame = os.read(device, _LARGEST)
+                if self._devices[device] in self.cut_off or self._chance.random() < self.loss:
+                    continue
+                due = max(now + self._chance.uniform(*self.delay), latest.get(device, 0.0))
+                latest[device], number = due, number + 1
+                heapq.heappush(waiting, (due, number, device, frame))
+            while waiting and waiting[0][0] <= time.monotonic():
+                _, _, source, frame = heapq.heappop(waiting)
+                for device, host in self._devices.items():
+                    if device != source and host not in self.cut_off:
+                        os.write(device, frame)  # a host leaves alone what is for another
+
+
+def _ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)

@@ -1,0 +1,67 @@
+"""A flight whose participants are spread over the hosts of a network."""
+
+import subprocess
+import sys
+import time
+
+from cosim.watch import WATCHER
+
+SLOWEST = 120.0  # [s] for a run to begin, and to end
+_GROWN = 8  # sizes of a log that is being written, some of which are of its head
+
+
+class Run:
+    """Every participant as a process of its own; `with` ends them all.
+
+    Attributes:
+        log: its log.
+        participants: the processes, by name.
+    """
+
+    def __init__(self, network, places, overrides, keys, folder):
+        """Of the scene `delivery_mission`: `places` is the host of each participant, `keys` their certificates."""
+        peers = {name: f"tls/{network.addresses[host]}:{7447 + k}" for k, (name, host) in enumerate(places.items())}
+        table = ",".join(f"{name}={endpoint}" for name, endpoint in peers.items())
+        sets = [word for override in overrides for word in ("--set", override)]
+        self.log = folder / "log.mcap"
+        self.participants = {}
+        for name, host in places.items():
+            command = ["run"] if name == WATCHER else ["service", name]
+            more = ["--speed", "1"] if name == "plant" else []
+            if name in (WATCHER, "recorder"):
+                more = ["--log", str(self.log)]
+            words = [*command, "delivery_mission", *sets, "--peers", table, "--keys", str(keys), *more]
+            self.participants[name] = subprocess.Popen(
+                network.command(host, sys.executable, "-m", "lapwing", *words),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in self.participants.values():
+            process.kill()
+            process.communicate()
+
+    def flies(self):
+        """Wait until the log has grown again and again; says whether it has."""
+        sizes, deadline = set(), time.monotonic() + SLOWEST
+        while len(sizes) < _GROWN and time.monotonic() < deadline:
+            sizes.add(self.size())
+            time.sleep(0.02)
+        return len(sizes) == _GROWN
+
+    def size(self):
+        """Bytes of the log."""
+        return self.log.stat().st_size if self.log.exists() else 0
+
+    def ends(self):
+        """Exit code and last words of everybody."""
+        found = {}
+        for name, process in self.participants.items():
+            _, said = process.communicate(timeout=SLOWEST)
+            found[name] = process.returncode, said
+        return found

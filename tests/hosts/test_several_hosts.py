@@ -1,0 +1,66 @@
+"""Services on hosts of their own: the same bits over a bad network, and a name where a host is lost."""
+
+import time
+
+import pytest
+
+from cosim.certificates import make
+from cosim.log import LogReader
+from cosim.watch import WATCHER
+from lapwing.runs.single import fly_single
+from services.table import load, resolve
+from tests.hosts.network import Network, why_not
+from tests.hosts.run import Run
+
+HOSTS = {
+    "plant": "dynamics",
+    "sensors": "flight",
+    "autopilot": "flight",
+    "trajectory": "flight",
+    "recorder": "log",
+    WATCHER: "log",
+}
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory):
+    if reason := why_not():
+        pytest.skip(reason)
+    folder = tmp_path_factory.mktemp("keys") / "keys"
+    make(folder, HOSTS, 1)
+    return folder
+
+
+def test_the_digest_is_the_local_one_over_a_slow_network_that_loses_packets_and_is_cut_for_a_while(keys, tmp_path):
+    short = "run.duration=0.4"
+    fly_single(resolve(load("delivery_mission", [short])), tmp_path / "here.mcap")
+    with (
+        Network(sorted(set(HOSTS.values())), delay=(0.020, 0.025), loss=0.02) as network,
+        Run(network, HOSTS, [short, "success.require=[]"], keys, tmp_path) as run,
+    ):
+        run.flies()
+        network.cut_off = {"dynamics"}
+        time.sleep(2.0)
+        at = run.size()
+        time.sleep(0.1)
+        assert run.size() == at  # it waits
+        network.cut_off = set()
+        ends = run.ends()
+    assert ends == dict.fromkeys(HOSTS, (0, ""))
+    with LogReader(run.log) as there, LogReader(tmp_path / "here.mcap") as here:
+        assert there.digest() == here.digest()
+
+
+def test_a_host_that_is_lost_is_named_and_everybody_ends(keys, tmp_path):
+    with Network(sorted(set(HOSTS.values()))) as network, Run(network, HOSTS, [], keys, tmp_path) as run:
+        run.flies()
+        network.cut_off = {"flight"}
+        ends = run.ends()
+    said = {name: words for name, (_, words) in ends.items()}
+    assert all(code == 1 for code, _ in ends.values()), said
+    assert said.pop(WATCHER).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
+    assert said == {name: f"lapwing: {name}: {WATCHER} is gone before the run has ended\n" for name in said}
+    with LogReader(run.log) as read:
+        assert list(read.messages())

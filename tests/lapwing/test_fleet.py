@@ -1,0 +1,120 @@
+"""A scene of several vehicles from the command line: flown in both modes, told, reported, flown again."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import lapwing
+from lapwing import Flight
+from services.common.sections import SHIPPED
+
+pytestmark = pytest.mark.long
+SHORT = ["--set", "run.duration=1.5"]
+
+
+def command(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True, timeout=600, check=True
+    ).stdout
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fleet")
+    said = command("run", "fleet", *SHORT, "--mode", "single", "--log", folder / "a.mcap", "--json", folder / "a.json")
+    return folder, said, json.loads((folder / "a.json").read_text())
+
+
+def test_every_vehicle_has_its_verdict_events_and_the_nearest_two_are_told(flown):
+    folder, said, figures = flown
+    assert list(figures["vehicles"]) == ["left", "right", "scout"]
+    assert all(one["verdict"]["kind"] == "timed out" for one in figures["vehicles"].values())
+    assert figures["separation"]["vehicles"][1] == "scout"
+    assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # as they stand
+    assert "Nearest: " in said
+    for name in figures["vehicles"]:
+        flight = Flight.read(folder / "a.mcap", name)
+        assert (flight.vehicle, flight.setup.vehicle) == (name, name)
+        assert flight.events
+        assert list(flight.fleet) == ["left", "right", "scout"]
+    assert Flight.read(folder / "a.mcap", "scout").origin.scene["vehicle"]["airframe"] == "quad_x"
+
+
+def test_the_report_shows_all_paths(flown):
+    folder, _, _ = flown
+    assert "All vehicles from above" in (folder / "a.html").read_text()
+    page = folder / "scout.html"
+    command("report", folder / "a.mcap", "--vehicle", "scout", "--out", page)
+    assert "quad_x" in page.read_text()
+
+
+def test_info_verify_and_refly_take_its_log(flown):
+    folder, _, figures = flown
+    log = folder / "a.mcap"
+    assert "left, right, scout" in command("info", log)
+    assert figures["digest"] in command("verify", log)
+    assert f"the same digest {figures['digest']}" in command("refly", log)
+
+
+def test_in_processes_it_has_the_same_digest(flown):
+    folder, _, figures = flown
+    command("run", "fleet", *SHORT, "--log", folder / "b.mcap", "--json", folder / "b.json", "--key-prefix", "fleet")
+    assert json.loads((folder / "b.json").read_text())["digest"] == figures["digest"]
+
+
+def test_a_fleet_of_one_is_told_as_a_fleet(tmp_path):
+    hover = (SHIPPED / "hover.toml").read_text().replace("[vehicle]", "[[vehicle]]")
+    (tmp_path / "one.toml").write_text(hover)
+    command("run", tmp_path / "one.toml", *SHORT, "--mode", "single", "--log", tmp_path / "a.mcap",
+            "--json", tmp_path / "a.json")  # fmt: skip
+    figures = json.loads((tmp_path / "a.json").read_text())
+    assert (list(figures["vehicles"]), figures["separation"]) == (["drone1"], None)
+
+
+def test_a_replay_publishes_every_vehicle(flown):
+    folder, _, _ = flown
+    said = command("replay", folder / "a.mcap", "--speed", "max", "--topics", "/left/truth,/scout/imu",
+                   "--listen", "tcp/127.0.0.1:0", "--record", folder / "r.mcap")  # fmt: skip
+    assert "messages published" in said
+    assert "/scout/imu" in command("info", folder / "r.mcap")
+
+
+OF_ONE = {
+    "fly": lapwing.fly,
+    "campaign": lambda scene: lapwing.campaign(scene, [1]),
+    "Simulator": lapwing.Simulator,
+    "Batch": lambda scene: lapwing.Batch(scene, 2),
+}
+
+
+@pytest.mark.parametrize("name", OF_ONE)
+def test_in_python_what_is_for_one_vehicle_refuses_several(name):
+    with pytest.raises(lapwing.SceneError, match="vehicle: there are 3; expected a scene of one vehicle"):
+        OF_ONE[name]("fleet")
+
+
+@pytest.mark.parametrize(
+    ("option", "arguments"),
+    [
+        ("--plan", ["--plan", "scenes/plans/delivery.plan"]),
+        ("--view", ["--view"]),
+        ("--ros2", ["--set", "bus.ros2=true"]),
+    ],
+)
+def test_a_link_for_one_vehicle_refuses_several(option, arguments):
+    done = subprocess.run(
+        [sys.executable, "-m", "lapwing", "run", "fleet", *arguments], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (2, f"lapwing: {option}: is for one vehicle, and fleet has 3\n")
+
+
+def test_what_is_for_one_vehicle_is_refused_in_one_line():
+    for arguments in (["tune", "fleet"], ["campaign", "fleet", "--runs", "2", "--out", "nowhere"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2, done.stderr
+        assert "vehicle: there are 3; expected a scene of one vehicle" in done.stderr
+        assert len(done.stderr.splitlines()) == 1

@@ -1,0 +1,52 @@
+"""A disk that is full: one line, and a whole log of what has been written before."""
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from cosim.log import LogReader
+
+SCENE = Path.cwd() / "scenes" / "hover.toml"
+RUN = """
+import os, resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+os.environ["LAPWING_COMMIT"] = "test"  # git is not asked: it would leave half of its index
+resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES, BYTES))
+sys.argv = ["lapwing", "run", *sys.argv[1:], "--log", "full.mcap", "--key-prefix", "test-full"]
+from lapwing.cli.main import main
+main()
+"""
+
+
+def run(folder, size, mode):
+    code = textwrap.dedent(RUN).replace("BYTES", str(size))
+    return subprocess.run(
+        [sys.executable, "-c", code, str(SCENE), "--mode", mode],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+    )
+
+
+@pytest.mark.parametrize("mode", ["single", "processes"])
+def test_the_run_ends_with_one_line_and_a_whole_log(tmp_path, mode):
+    done = run(tmp_path, 400_000, mode)  # the first chunk has room, the second has not
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "cannot write the log: File too large" in done.stderr
+    with LogReader(tmp_path / "full.mcap") as log:
+        assert log.complete
+        assert "File too large" in log.metadata["failure"]
+        assert log.digest() == log.metadata["digest"]
+        times = [time_ns for topic, _, time_ns, _ in log.messages() if topic == "/drone1/truth"]
+    assert times == [k * 4_000_000 for k in range(1000)]
+
+
+def test_a_log_without_anything_flown_is_not_left(tmp_path):
+    done = run(tmp_path, 20_000, "single")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,104 @@
+"""Environments of Gymnasium: its own checker, one vehicle beside many, and a controller that does what is asked."""
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed: pip install lapwing[gym]")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import lapwing.gym  # noqa: E402
+
+TASKS = list(lapwing.gym.TASKS)
+
+
+def many(task, n=8):
+    return gymnasium.make_vec(f"lapwing/{task}-v0", num_envs=n, vectorization_mode="vector_entry_point")
+
+
+def steered(observed):
+    """A proportional controller on what is observed: towards the target, upright, quiet."""
+    way, past, R, omega = observed[:, 0:3], observed[:, 6:9], observed[:, 9:18].reshape(-1, 3, 3), observed[:, 18:21]
+    wanted = np.clip(1.2 * way, -3.0, 3.0) - 1.8 * past  # [m/s^2]
+    tilt = np.clip(wanted[:, :2] / 9.81, -0.5, 0.5)
+    up = np.column_stack([tilt, np.ones(len(tilt))])
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    off = np.cross(R[:, :, 2], up)  # in the world: the axis to turn about
+    turn = 6.0 * np.einsum("nij,ni->nj", R, off) - 0.1 * omega
+    thrust = wanted[:, 2] / 9.81 + 1.0 / np.clip(R[:, 2, 2], 0.5, 1.0) - 1.0
+    return np.clip(np.column_stack([thrust, turn[:, :2] / 6.0, -0.3 * omega[:, 2]]), -1.0, 1.0)
+
+
+def flown(task, n=8, seconds=8.0):
+    environments = many(task, n)
+    observed, _ = environments.reset(seed=3)
+    total, ended = np.zeros(n), np.zeros(n, bool)
+    for _ in range(round(seconds * 50)):
+        observed, reward, terminated, _, _ = environments.step(steered(observed))
+        total += np.where(ended, 0.0, reward)
+        ended |= terminated
+    return environments, observed, total, ended
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_gymnasiums_checker_passes(task):
+    check_env(gymnasium.make(f"lapwing/{task}-v0").unwrapped, skip_render_check=True)
+
+
+def test_one_is_the_first_of_many():
+    environments, one = many("Hover"), gymnasium.make("lapwing/Hover-v0")
+    together, _ = environments.reset(seed=9)
+    alone, _ = one.reset(seed=9)
+    assert environments.observation_space.contains(together)
+    assert np.array_equal(together[0], alone)
+    for _ in range(20):
+        together, reward, *_ = environments.step(np.full((8, 4), 0.1, np.float32))
+        alone, worth, *_ = one.step(np.full(4, 0.1, np.float32))
+    assert np.array_equal(together[0], alone)
+    assert reward[0] == worth
+
+
+def test_a_controller_hovers():
+    _, observed, total, ended = flown("Hover")
+    assert not ended.any()
+    assert np.abs(observed[:, :3]).max() < 0.1
+    assert total.min() > 250.0  # of 400
+
+
+def test_it_lands_softly():
+    environments = many("Land")
+    observed, _ = environments.reset(seed=3)
+    last = np.zeros(8)
+    for _ in range(450):
+        action = steered(np.column_stack([np.clip(observed[:, :3] - [0.0, 0.0, 0.4], -1.1, 1.1), observed[:, 3:]]))
+        observed, reward, terminated, _, _ = environments.step(action)
+        last = np.where(terminated, reward, last)
+    assert last.min() > 5.0
+
+
+def test_it_flies_through_gates():
+    environments, _, total, ended = flown("Race", seconds=12.0)
+    assert not ended.any()
+    assert environments.unwrapped._memory[:, 0].min() >= 2
+    assert total.min() > 20.0
+
+
+def test_an_episode_that_is_over_begins_anew_alone():
+    environments = many("Hover", 2)
+    environments.reset(seed=1)
+    for _ in range(500):
+        falls = np.array([[-1.0, 0, 0, 0], [0.0, 0, 0, 0]])
+        observed, reward, terminated, truncated, _ = environments.step(falls)
+        if terminated[0]:
+            break
+    assert (terminated.tolist(), reward[0]) == ([True, False], -10.0)
+    observed, reward, terminated, truncated, _ = environments.step(falls)
+    assert (reward[0], terminated[0], truncated[0]) == (0.0, False, False)
+    assert np.abs(observed[0, :3]).max() <= 1.5
+    assert environments.unwrapped.batch.state.time[0] == 0.0 < environments.unwrapped.batch.state.time[1]
+
+
+def test_unknown_task():
+    with pytest.raises(ValueError, match="task: expected one of Hover, Track, Land, Race, got 'Swim'"):
+        lapwing.gym.DroneVectorEnv(1, "Swim")

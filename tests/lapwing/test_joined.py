@@ -1,0 +1,103 @@
+"""A run whose services are started elsewhere ends in a verdict, too, when one of them dies."""
+
+import json
+import os
+import struct
+import subprocess
+import sys
+import time
+import urllib.request
+
+import pytest
+
+from cosim.log import LogReader
+from messages import Log
+from services.processes import FOXGLOVE, needed
+from services.table import load, resolve
+from tests.endpoints import loopback_endpoints
+from tests.services.foxglove.client import patient
+
+SETS = ["--set", "run.duration=60.0"]
+PATIENCE = 300.0  # [s]
+
+
+def start(*words):
+    command, silent = [sys.executable, "-m", "lapwing", *words], os.environ | {"BROWSER": "true"}
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=silent)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Kernels are there: a mission does not wait for them as long as a busy machine may take."""
+    subprocess.run([sys.executable, "-m", "lapwing", "warm", "hover"], check=True, capture_output=True)
+
+
+def flies(log):
+    """Whether the log has come to 3 s, so that everybody has long seen everybody."""
+    try:
+        with LogReader(log) as read:
+            return any(True for _ in read.messages(start_ns=3_000_000_000))
+    except ValueError:  # not there yet
+        return False
+
+
+def test_a_service_that_dies_is_named_and_what_was_flown_has_its_verdict(tmp_path):
+    names = needed(resolve(load("hover", SETS[1:])))
+    table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, "mission"]).items())
+    log, figures = tmp_path / "log.mcap", tmp_path / "figures.json"
+
+    common = [*SETS, "--peers", table, "--insecure", "--key-prefix", "joined"]
+    more = {"plant": ["--speed", "1"], "recorder": ["--log", str(log)]}
+    services = {name: start("service", name, "hover", *common, *more.get(name, [])) for name in names}
+    mission = start("run", "hover", *common, "--log", str(log), "--json", str(figures))
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while not flies(log) and time.monotonic() < deadline:
+            time.sleep(0.1)
+        services["plant"].kill()
+        _, said = mission.communicate(timeout=PATIENCE)
+    finally:
+        for process in (*services.values(), mission):
+            process.kill()
+            process.communicate()
+    assert mission.returncode == 1, said
+    assert "plant: gone at t = " in said
+    assert json.loads(figures.read_text())["verdict"]["kind"] == "broken off"
+
+
+def test_viewers_are_told_of_events_while_it_flies(tmp_path):
+    pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
+    names = needed(resolve(load("hover")))
+    ends = loopback_endpoints([*names, FOXGLOVE, "mission", "door"])
+    port = int(ends.pop("door").rpartition(":")[2])
+    table, log = ",".join(f"{name}={at}" for name, at in ends.items()), tmp_path / "log.mcap"
+    common = ["--set", "run.duration=3.0", "--peers", table, "--insecure", "--key-prefix", "told"]
+    viewer = start("service", FOXGLOVE, "hover", *common, "--foxglove", f"127.0.0.1:{port}")
+    started = [viewer]
+    try:
+        client = patient(port, viewer)
+        more = {"plant": ["--speed", "1"], "recorder": ["--log", str(log)]}
+        started += [start("service", name, "hover", *common, *more.get(name, [])) for name in names]
+        mission = start("run", "hover", *common, "--log", str(log), "--view")
+        started.append(mission)
+        address = mission.stdout.readline().removeprefix("live: ").strip()
+        page = urllib.request.urlopen(address + "steps", timeout=PATIENCE)
+        client.subscribe("/drone1/events")
+        told = []
+        while (message := client.next()) is not None:
+            if isinstance(message, bytes) and message[0] == 1:
+                told.append((struct.unpack_from("<BIQ", message)[2], message[13:]))
+        shown = [json.loads(line[6:]) for line in page.read().decode().splitlines() if line.startswith("data: {")]
+        _, said = mission.communicate(timeout=PATIENCE)
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+    assert mission.returncode == 0, said
+    with LogReader(log) as read:
+        kept = [(time_ns, payload) for _, _, time_ns, payload in read.messages(["/drone1/events"])]
+    assert told
+    assert set(told) <= set(kept)
+    kinds = [Log.decode(payload).name for _, payload in told]
+    assert "arming" in kinds
+    assert [kind for step in shown for _, kind, _ in step["events"]][: len(kinds)] == kinds

@@ -1,0 +1,139 @@
+"""A run on a page while it goes on: who may see it, what it is given, and that a browser draws it."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+
+from cosim.graph import Graph
+from cosim.single import PAGE
+from lapwing.runs.following import Following
+from lapwing.runs.live import LivePage
+from messages import Log
+from services.processes import create_all
+from services.table import load, resolve
+from tests.studies import chromium
+
+PATIENCE = 120.0  # [s]
+
+
+def get(address):
+    return urllib.request.urlopen(address, timeout=PATIENCE)
+
+
+def steps(stream):
+    """What a browser is given, to the end of the stream."""
+    found = []
+    for line in stream:
+        text = line.decode().rstrip("\n")
+        if text.startswith("event: over"):
+            break
+        if text.startswith("data: "):
+            found.append(json.loads(text.removeprefix("data: ")))
+    return found
+
+
+class Run:
+    """A run in this process, half a second a step, as a launcher would see it."""
+
+    def __init__(self):
+        self.setup = resolve(load("hover", {"run.duration": 3.0}))
+        self._graph = Graph(self.setup, create_all(self.setup), PAGE)
+        self.spoken, self.listen, self.time_ns = set(self.setup.services), None, 0
+        self.published = []
+
+    def publish(self, key, time_ns, payload):
+        self.published.append((key, time_ns, Log.decode(payload)))
+
+    def step(self):
+        before, rows = self._graph.tick, self.setup.rate // 2
+        for first in range(before, before + rows, PAGE // 2):
+            stop = min(first + PAGE // 2, before + rows)
+            self._graph.advance(stop)
+            self.listen(self._graph.pages(first, stop))
+        self.time_ns = (before + rows - 1) * self.setup.interval_ns
+
+
+def test_only_who_has_the_address_sees_it_and_only_while_it_flies():
+    run = Run()
+    with LivePage(run.setup) as page:
+        port = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/[\w-]{22}/", page.address)[1]
+        text = get(page.address).read().decode()
+        assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", text)
+        for path in ("", "steps", "x" * 22 + "/", "x" * 22 + "/steps"):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                get(f"http://127.0.0.1:{port}/{path}")
+            assert refused.value.code == 404
+        follow = Following(run.setup, [page.show])
+        follow.observe(run)
+        early = get(page.address + "steps")
+        for _ in range(4):
+            run.step()
+            follow.observe(run)
+        late = get(page.address + "steps")
+    seen = steps(early)
+    assert seen == steps(late)
+    assert [step["end"] for step in seen] == pytest.approx([0.496, 0.996, 1.496, 1.996])
+    events = [kind for step in seen for _, kind, _ in step["events"]]
+    assert sorted(events) == ["arming", "contact", "mode", "phase"]
+    assert [(key, message.name) for key, _, message in run.published] == [("drone1/events", kind) for kind in events]
+    with pytest.raises(urllib.error.URLError):
+        get(page.address)
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
+    run = Run()
+    until = "const until = async (holds) => { while (!holds()) await new Promise((done) => setTimeout(done, 20)); };"
+    until += 'await until(() => document.readyState === "complete");'
+    until += 'const section = document.getElementById("motion"), state = document.getElementById("state");'
+    with LivePage(run.setup) as page:
+        follow = Following(run.setup, [page.show])
+        follow.observe(run)
+        with chromium.Browser(page.address, tmp_path / "profile") as browser:
+            browser.run(until + 'await until(() => state && state.textContent.startsWith("waiting"));')
+            for _ in range(2):
+                run.step()
+                follow.observe(run)
+            browser.run(until + "await until(() => Number(section.dataset.time) > 0.9);")
+            for _ in range(2):
+                run.step()
+                follow.observe(run)
+            browser.run(until + "await until(() => Number(section.dataset.time) > 1.9);")
+            page.__exit__()
+            path, rotors, events = browser.run(
+                until
+                + """
+                await until(() => state.textContent === "the flight is over");
+                const slider = section.querySelector("[name=time]");
+                slider.value = 1.0;
+                slider.dispatchEvent(new Event("input"));
+                await until(() => Number(section.dataset.time) < 1.1);
+                const named = (name) => section.querySelector(".space").data.filter((trace) => trace.name === name);
+                const rows = document.querySelectorAll(".events tbody tr").length;
+                const rotors = section.querySelector(".space").data.findLast(({ line }) => line && line.width === 3);
+                return [named("flown")[0].z, rotors.z.filter((value) => value !== null).length, rows];
+                """
+            )
+            assert browser.errors == []
+    assert len(path) == 12 + 3 * 11  # the first row of a step is the last of the one before
+    assert np.all(np.diff(path[6:]) > -1e-6)  # it climbs
+    assert rotors == 4 * (25 + 2)
+    assert events == 4
+
+
+def test_a_run_is_shown_from_the_command_line(tmp_path):
+    words = ["run", "hover", "--view", "--set", "run.duration=3", "--log", str(tmp_path / "a.mcap")]
+    command = [sys.executable, "-m", "lapwing", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ | {"BROWSER": "true"}) as run:
+        line = run.stdout.readline()
+        seen = steps(get(line.removeprefix("live: ").strip() + "steps"))
+        assert run.wait(PATIENCE) == 0
+    assert seen[-1]["end"] == pytest.approx(3.0)
+    assert len(seen) > 5

@@ -1,0 +1,86 @@
+"""`lapwing new vehicle`: what it writes is sound and can hover; or it is refused in one line."""
+
+import math
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.performance import rotor_of, thrust_over_weight
+from lapwing.cli.main import app
+from lapwing.cli.new_vehicle import write_vehicle
+from lapwing.vehicle_figures import FIGURES
+from services.table import load
+
+
+@pytest.mark.parametrize(
+    "figures", [{}, {"rotors": 6.0}, {"rotors": 8.0, "mass": 12.0}, {"mass": 0.25}, {"mass": 80.0}]
+)
+def test_guesses_make_a_vehicle_that_a_scene_takes(tmp_path, figures):
+    path, remarks = write_vehicle("mine", figures, tmp_path)
+    frame = load_airframe(path)
+    assert not remarks
+    assert 1.5 < thrust_over_weight(frame) < 4.0
+    assert "Guessed, not measured: arm, " in path.read_text()
+    assert load("hover", {"vehicle.airframe": str(path)}).lookup("airframe.mass.total") == figures.get("mass", 2.0)
+
+
+def test_rotors_give_what_the_thrust_stand_has_shown(tmp_path):
+    stand = {"stand_density": 1.19, "stand_speed": 700.0, "stand_thrust": 5.6, "stand_torque": 0.11, "diameter": 0.254}
+    rotor = rotor_of(load_airframe(write_vehicle("mine", stand, tmp_path)[0]))
+    thrust, torque = rotor.constants(1.19)
+    assert thrust * 700.0**2 == pytest.approx(5.6, rel=1e-4)
+    assert torque * 700.0**2 == pytest.approx(0.11, rel=1e-4)
+
+
+def test_in_a_terminal_each_figure_is_asked_for_with_a_word_on_how_to_measure_it(tmp_path):
+    asked = []
+
+    def ask(question, guess, how):
+        asked.append(question)
+        assert len(how) > 15
+        return guess
+
+    path, _ = write_vehicle("mine", {"mass": 3.0}, tmp_path, ask)
+    assert asked == [f"{figure.name} [{figure.unit}]" for figure in FIGURES if figure.name != "mass"]
+    assert "Guessed, not measured: nothing." in path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("figures", "message"),
+    [
+        ({"mass": -1.0}, "mass: expected a number above 0 and below 10000, in kg, got -1"),
+        ({"rotors": 5.0}, "rotors: expected 4, 6 or 8"),
+        ({"mass": math.nan}, "mass: expected a number"),
+        ({"payload": 3.0}, "mass.payload: expected less than total"),
+        ({"inertia_z": 9.0}, "triangle inequality"),
+        ({"speed_constant": 100.0}, r"mine cannot hover: its thrust is 0\.\d\d times its weight; expected more than 1"),
+        ({"stand_thrust": 50.0, "stand_torque": 1.0}, r"50 N at .* rad/s is more than the .* N that a propeller"),
+        ({"stand_torque": 1e-4}, r"0.0001 N m at .* rad/s is less than the .* N m that this thrust costs"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_written(tmp_path, figures, message):
+    with pytest.raises(ValueError, match=message) as error:
+        write_vehicle("mine", figures, tmp_path)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "vehicles").exists()
+
+
+def test_a_weak_vehicle_is_warned_of_and_names_are_kept(tmp_path):
+    _, (remark,) = write_vehicle("mine", {"speed_constant": 470.0}, tmp_path)
+    assert re.fullmatch(r"its thrust is 1\.\d\d times its weight; below 1.4 too little is left for control", remark)
+    for name in ("mine", "delivery_drone", "My Quad"):
+        with pytest.raises(ValueError, match=f"NAME {name}"):
+            write_vehicle(name, {}, tmp_path)
+
+
+def test_on_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["new", "vehicle", "mine", "--set", "mass=1.2"])
+    assert done.exit_code == 0, done.output
+    assert "vehicles/mine.toml" in done.output
+    assert "lapwing tune excitation" in done.output
+    wrong = CliRunner().invoke(app, ["new", "vehicle", "other", "--set", "mas=1.2"])
+    assert wrong.exit_code == 2
+    assert "unknown figure 'mas'; did you mean mass?" in wrong.output

@@ -1,0 +1,81 @@
+"""Voltages of the motors from outside, in the place of the controller's."""
+
+import numpy as np
+import pytest
+from flights import ACCEPTED, OPERATED, RATE, REJECTED, UP, command, fly, results, said, scripted
+
+from cosim.log import LogReader
+from lapwing.runs.refly import refly
+from lapwing.runs.single import fly_single
+from services.table import load, resolve
+from tests.cosim import memory_log
+
+EVERY_TICK = f"rates.operator={RATE}"
+START = [command("offboard"), command("arm")]
+
+
+def motors(*volts):
+    return command("offboard_motors", *volts)
+
+
+def test_a_flight_whose_voltages_come_from_outside_is_the_controllers_to_the_bit():
+    flown = fly(12, {}, operated=False)
+    volts = flown.column("actuators", lambda m: tuple(m.motor_voltage))
+    given = {k: [motors(*v)] for k, v in enumerate(volts)}
+    given[0] += START
+    scene = load("hover", [*OPERATED, EVERY_TICK, "run.duration=12"])
+    again = memory_log.fly(scene, lambda tick: given.get(tick, ()))
+    assert volts.max() > 5.0
+    count = len(volts)
+    for name in ("truth", "actuators"):
+        one, other = (f.payloads(name)[:count] for f in (flown, again))
+        assert len(one) == len(other) == count
+        if name == "truth":
+            assert one == other
+    assert np.array_equal(again.column("actuators", lambda m: tuple(m.motor_voltage))[:count], volts)
+    thrust = [f.column("actuators", lambda m: tuple(m.thrust))[:count] for f in (flown, again)]
+    assert thrust[1] == pytest.approx(thrust[0], rel=1e-9, abs=1e-9)
+
+
+def test_they_hold_between_their_stamps_within_what_the_motors_take_and_the_controller_comes_back(tmp_path):
+    script = UP | {3.0: [motors(7.0, 8.0, -1.0, 1e6), command("offboard")], 3.1: [command("hold")]}
+    log = tmp_path / "direct.mcap"
+    setup = resolve(load("hover", [*OPERATED, "run.duration=8"]))
+    fly_single(setup, log, operator=scripted(script))
+    with LogReader(log) as read:
+        times, actuators = read.history("/drone1/actuators")
+        _, truth = read.history("/drone1/truth")
+        stated = read.metadata["digest"]
+    direct = (times >= 3_000_000_000) & (times < 3_100_000_000)
+    highest = setup.services["autopilot"].parameters.airframe.voltage_max
+    assert np.array_equal(np.unique(actuators["motor_voltage"][direct], axis=0), [[7.0, 8.0, 0.0, highest]])
+    assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
+    assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # it has been pushed hard
+    assert np.abs(truth["velocity"][-1]).max() < 0.1  # and stands again
+    assert refly(log) == (stated, stated)
+
+
+def test_where_no_more_come_a_failsafe_takes_over():
+    flown = fly(8, UP | {(3.0, 3.5): [motors(*[9.0] * 4)], 3.2: [command("offboard")]})
+    assert "the offboard setpoints are lost: hold" in said(flown)
+
+
+def test_who_stands_with_its_motors_off_has_landed_and_can_be_disarmed():
+    script = {0.0: [motors(*[3.0] * 4), *START], 0.5: [motors(*[0.0] * 4)], (0.6, 2.4): [motors(*[0.0] * 4)]}
+    flown = fly(3, script | {2.5: [command("disarm", id=9)]})
+    assert results(flown)[9] == ACCEPTED
+
+
+@pytest.mark.parametrize("volts", [(5.0,), (5.0,) * 6, (5.0, 5.0, 5.0, float("nan"))])
+def test_what_is_no_voltage_for_each_motor_is_not_taken(volts):
+    flown = fly(1, {0.1: [motors(*volts)], 0.2: [command("offboard", id=3)]})
+    assert results(flown)[3] == REJECTED
+    assert any("the last was refused: expected 4 voltages, got [5.0" in text for text in said(flown))
+
+
+def test_six_motors_take_six():
+    sets = [*OPERATED, "run.duration=1", "autopilot.estimator=truth"]
+    script = {0.0: [motors(*range(1, 7)), *START], (0.1, 1.0): [motors(*range(1, 7))]}
+    flown = memory_log.fly(load("hexacopter", sets), scripted(script))
+    last = flown.column("actuators", lambda m: tuple(m.motor_voltage))[-1]
+    assert last == pytest.approx([1, 2, 3, 4, 5, 6])

@@ -1,0 +1,81 @@
+"""EKF2_HGT_REF: which sensor the height comes from, in flight; and the ground that is followed."""
+
+import numpy as np
+import pytest
+from flights import ENABLED, NAN, command, error, fly, fly_by_sensors, height, inject, place
+
+from dynamics.errors import KeyedError
+from services.autopilot import estimator
+from services.autopilot.config import NEEDED
+from services.autopilot.estimator import state
+from services.common.failures import OFF, WRONG
+from services.table import load
+
+SONAR = "autopilot.parameters.EKF2_HGT_REF=2"
+AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command("goto", 14.0, 0.0, 3.0, 0.0, 2.0)]}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("reference", "least", "most"), [(0, 0.03, 0.1), (1, 0.005, 0.02), (2, 0.03, 0.1)])
+def test_the_height_comes_from_where_the_parameter_says(reference, least, most):
+    up = {0.04: [command("takeoff", 15.0), command("arm", NAN, 10.0)]}  # beyond the sonar's reach
+    sets = [f"EKF2_HGT_REF={reference}", "MPC_TKO_SPEED=3"]
+    flown = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
+    spread = flown.column("estimate", lambda m: m.position_std.z)[flown.times("estimate") > 17.0].mean()
+    assert least < spread < most  # the barometer knows less, and carries on where the sonar ends
+    assert error(flown, 15.0) < 0.3
+
+
+def test_the_ground_moves_the_height_and_leaves_the_barometers_sum_alone():
+    """z counts from the ground, z + b_h does not: its variance, and that of all else, stays."""
+    p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
+    s = estimator.initial(p, (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
+    s = s._replace(nominal=s.nominal._replace(velocity_world=(3.0, 4.0, 1.0)))
+    root = rng.normal(size=(state.SIZE, state.SIZE))
+    s.memory.covariance[:] = root @ root.T
+    s.memory.since[state.SONAR] = 25
+    before = s.memory.covariance.copy()
+    estimator.follow_ground(p, s)
+    z, b = state.POSITION + 2, state.BAROMETER
+    added = s.memory.covariance - before
+    dt = 25 * p.interval
+    assert added[z, z] == pytest.approx((0.5**2 * 5.0**2 + 0.5**2) * dt**2)
+    total = np.zeros(state.SIZE)
+    total[[z, b]] = 1.0
+    assert total @ added @ total == pytest.approx(0.0, abs=1e-12)
+    added[np.ix_([z, b], [z, b])] = 0.0
+    assert not added.any()
+
+
+@pytest.mark.long
+def test_a_rangefinder_that_looks_down_stands_in_for_a_sonar():
+    sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
+    laser = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.position=[0,0,-0.2]"]
+    slope = "environment.terrain={slope=[0.1,0.0]}"
+    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=sensors", *sensors, *laser, slope)
+    x, _, z = place(flown, 17.0)
+    assert x == pytest.approx(14.0, abs=0.2)
+    assert z - 0.1 * x == pytest.approx(3.0, abs=0.15)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("ground", ["slope=[0.1,0.0]", "steps={distance=[4.0],rise=[0.6]}"])
+def test_over_rising_ground_the_sonar_holds_the_height_above_it(ground):
+    flown = fly_by_sensors(17, AHEAD, SONAR, f"environment.terrain={{{ground}}}")
+    x, _, z = place(flown, 17.0)
+    assert x == pytest.approx(14.0, abs=0.2)
+    rise = 0.1 * x if "slope" in ground else 0.6
+    assert z - rise == pytest.approx(3.0, abs=0.15)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("unit", ["barometer", "sonar"])
+def test_the_other_sensor_takes_over(unit):
+    kind = WRONG if unit == "barometer" else OFF
+    flown = fly_by_sensors(14, {8: [inject(unit, kind)]}, SONAR, ENABLED)
+    assert height(flown, 14.0) == pytest.approx(height(flown, 8.0), abs=0.2)
+
+
+def test_a_reference_that_is_not_carried_is_refused():
+    with pytest.raises(KeyedError, match=r"EKF2_HGT_REF.*\[sensors\.sonar\]"):
+        load("hover", [SONAR, "autopilot.estimator=sensors", *[f"sensors.{name}={{}}" for name in NEEDED]])

@@ -1,0 +1,66 @@
+"""Rotors with axes of their own: what the autopilot takes them for is what the plant does, and it flies."""
+
+import numpy as np
+import pytest
+
+from cosim.scene import SceneError
+from dynamics.effects._axes import thrust_wrench
+from dynamics.effects._types import Loads
+from dynamics.kernel import uncompiled
+from dynamics.vehicles import multirotor
+from services.autopilot import law
+from services.autopilot.allocation import effectiveness, tilted_effectiveness
+from services.autopilot.known_airframe import known_airframe
+from services.common.vehicle import airframe
+from services.table import load, resolve
+from studies.fly import fly
+from studies.tune.linearise import hover
+
+SCENE = "hexacopter_tilted"
+
+
+def test_the_autopilot_knows_the_force_and_the_torques_of_the_plant():
+    scene = load(SCENE, {"airframe.mass.centre": [0.01, -0.02, 0.03]})
+    known, frame = known_airframe(scene), airframe(scene)
+    thrust = np.array([3.0, 4.0, 5.0, 2.0, 3.5, 4.5])
+    loads = Loads(tuple(map(float, thrust)), tuple(map(float, known.torque_per_thrust * thrust)))
+    force, torque = uncompiled(thrust_wrench)(multirotor.parameters(frame).layout, loads)
+    assert law.rotor_effectiveness(known) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
+
+
+def test_axes_along_z_are_those_of_rotors_without_axes():
+    x, y, z, reaction = (0.3, -0.2, 0.1), (0.1, 0.4, -0.3), (0.05, 0.0, -0.1), (0.02, -0.02, 0.02)
+    tilted = tilted_effectiveness(tuple(zip(x, y, z, strict=True)), ((0.0, 0.0, 1.0),) * 3, reaction)
+    assert np.array_equal(tilted, effectiveness(x, y, reaction))
+
+
+def test_a_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
+    flown = fly(load(SCENE))
+    assert str(flown.verdict).startswith("Landed")
+    assert "upright" in str(flown.verdict)
+    t = flown.setup.interval * np.arange(len(flown.truth))
+    hover = (t > 6.5) & (t < 8.0)
+    lift = flown.truth.rotor_thrust[hover].sum(axis=1).mean() * np.cos(np.radians(15.0))
+    assert lift == pytest.approx(2.4 * 9.80665, rel=0.01)
+    assert abs(flown.truth.position[hover][:, :2]).max() < 0.1
+    untilted = known_airframe(load("hexacopter"))
+    assert law.moments(known_airframe(load(SCENE)))[2] > 4.5 * law.moments(untilted)[2]
+
+
+def test_the_spin_up_reaction_is_that_of_the_plant():
+    scene = load(SCENE)
+    assert known_airframe(scene).spin_up_zero == pytest.approx(hover(scene).spin_up_zero, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("model", "axis", "message"),
+    [
+        ("reduced", [[0.0, 3.0, 1.0]] * 4, "rotors give at most"),  # 72 degrees to the side: cannot hover
+        ("reduced", [[0.0, 0.0, 0.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
+        ("reduced", [[0.0, 0.0, -1.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
+        ("multibody", [[0.1, 0.0, 1.0]] * 4, "rotors.axis: the five bodies need rotors that push along body z"),
+    ],
+)
+def test_refused(model, axis, message):
+    with pytest.raises(SceneError, match=message):
+        resolve(load("hover", {"airframe.rotors.axis": axis, "vehicle.model": model}))

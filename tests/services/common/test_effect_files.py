@@ -1,0 +1,36 @@
+"""Files that effects name are read once, when the scene is loaded."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from cosim.scene import SceneError
+from services.common.vehicle import rotor_constants
+from services.table import load
+
+TABLE = '[effects.rotor_table]\nfile = "prop.txt"'
+
+
+@pytest.fixture
+def path(tmp_path):
+    found = tmp_path / "table.toml"
+    found.write_text(Path("scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", TABLE))
+    return found
+
+
+def test_the_autopilot_knows_the_static_thrust_of_a_table(path):
+    path.with_name("prop.txt").write_text("J CT CP\n0.0 0.10 0.04\n0.2 0.08 0.04\n")
+    scene = load(path)
+    path.with_name("prop.txt").unlink()
+    found = rotor_constants(scene)
+    assert found.thrust == pytest.approx(0.1 * 0.5588**4 / (4 * math.pi**2))
+    assert found.with_density
+
+
+def test_a_file_that_is_not_there_or_has_a_hole(path):
+    with pytest.raises(SceneError, match=r"effects.rotor_table.file: .*prop.txt: no such file"):
+        load(path)
+    path.with_name("prop.txt").write_text("J CT CP\n0.0 0.10 0.04\n0.2 0.08\n")
+    with pytest.raises(SceneError, match=r"effects.rotor_table.file: expected 3 as its first line, got line 3|line 3"):
+        load(path)

@@ -1,0 +1,72 @@
+"""A client of the Foxglove WebSocket protocol."""
+
+import base64
+import json
+import os
+import socket
+
+
+class Client:
+    """As small a client as will do (RFC 6455; no message of ours is fragmented)."""
+
+    def __init__(self, port):
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=30.0)
+        key = base64.b64encode(os.urandom(16)).decode()
+        lines = ["GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade"]
+        lines += [f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Protocol: foxglove.sdk.v1"]
+        self._socket.sendall("\r\n".join([*lines, "", ""]).encode())
+        answer = b""
+        while not answer.endswith(b"\r\n\r\n"):
+            answer += self._read(1)
+        assert b" 101 " in answer, answer
+
+    def next(self):
+        """A text as JSON has it, or bytes; None at the end."""
+        while True:
+            try:
+                first, size = self._read(2)
+            except (EOFError, ConnectionResetError):
+                return None
+            if size >= 126:
+                size = int.from_bytes(self._read(2 if size == 126 else 8), "big")
+            data = self._read(size)
+            kind = first & 0x0F
+            if kind == 8:
+                return None
+            if kind in (1, 2):
+                return json.loads(data) if kind == 1 else data
+
+    def say(self, **message):
+        data = json.dumps(message).encode()
+        assert len(data) < 65536
+        self._socket.sendall(bytes([0x81, 0xFE]) + len(data).to_bytes(2, "big") + bytes(4) + data)
+
+    def subscribe(self, *topics):
+        """All of these are advertised, and subscribed to by their place."""
+        channels = {}
+        while not set(topics) <= set(channels):
+            message = self.next()
+            if isinstance(message, dict) and message["op"] == "advertise":
+                channels |= {channel["topic"]: channel for channel in message["channels"]}
+        wanted = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
+        self.say(op="subscribe", subscriptions=wanted)
+        return [channels[topic] for topic in topics]
+
+    def _read(self, size):
+        data = b""
+        while len(data) < size:
+            part = self._socket.recv(size - len(data))
+            if not part:
+                raise EOFError
+            data += part
+        return data
+
+
+def patient(port, process):
+    """A client of a process that may not listen yet."""
+    while process.poll() is None:
+        try:
+            return Client(port)
+        except ConnectionRefusedError:
+            continue
+    raise AssertionError("the replay has ended")

@@ -1,0 +1,124 @@
+"""What a client of the Foxglove WebSocket protocol gets: the topics, their payloads as they are, and the time."""
+
+import socket
+import struct
+import subprocess
+import sys
+
+import pytest
+
+from cosim.log import LogReader, LogWriter
+from messages import Clock, Imu, header, stamp
+from services.foxglove.server import Server, parse_address
+from tests.endpoints import loopback_endpoints
+from tests.services.foxglove.client import Client, patient
+
+pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
+TICK = 4_000_000  # [ns]
+
+
+def test_payloads_go_on_as_they_are_with_the_simulation_time():
+    with Server("127.0.0.1:0") as server:
+        server.declare("/drone1/imu", Imu.type_name)
+        server.declare("/foreign", "not/ours")
+        client = Client(server.port)
+        (channel,) = client.subscribe("/drone1/imu")
+        assert (channel["encoding"], channel["schemaName"], channel["schemaEncoding"]) == (
+            "cdr",
+            Imu.type_name,
+            "ros2msg",
+        )
+        assert channel["schema"] == Imu.schema_text
+        sent, got, times, k = [], [], [], 0
+        while len(got) < 5:  # what is put before the subscription has arrived goes to nobody
+            k += 1
+            sent.append((k * TICK, Imu(header(k * TICK, "base")).encode()))
+            server.put("/drone1/imu", *sent[-1])
+            server.put("/foreign", k * TICK, b"")
+            message = client.next()
+            while message[0] == 2:
+                times.append(struct.unpack("<Q", message[1:])[0])
+                if times[-1] == k * TICK:
+                    break
+                message = client.next()
+            if message[0] == 1:
+                _, subscription, time_ns = struct.unpack_from("<BIQ", message)
+                got.append((time_ns, message[13:]))
+                assert subscription == 0
+        assert set(got) <= set(sent)
+        assert times == sorted(times)
+
+
+@pytest.fixture
+def log(tmp_path):
+    path = tmp_path / "flight.mcap"
+    with LogWriter(path, {}, {}) as writer:
+        for tick in range(500):
+            writer.write("/clock", Clock, Clock(stamp(tick * TICK)).encode(), tick * TICK)
+    return path
+
+
+def test_a_replay_is_shown(log):
+    (endpoint, door) = loopback_endpoints(["a", "b"]).values()
+    port = int(door.rpartition(":")[2])
+    command = [sys.executable, "-m", "lapwing", "replay", str(log), "--loop", "--listen", endpoint]
+    with subprocess.Popen([*command, "--foxglove", f"127.0.0.1:{port}", "--key-prefix", "test-foxglove"]) as player:
+        try:
+            client = patient(port, player)
+            client.subscribe("/clock")
+            message = client.next()
+            while not (isinstance(message, bytes) and message[0] == 1):
+                message = client.next()
+        finally:
+            player.terminate()
+    time_ns = struct.unpack_from("<Q", message, 5)[0]
+    with LogReader(log) as read:
+        assert (time_ns, message[13:]) in {(t, payload) for _, _, t, payload in read.messages()}
+
+
+@pytest.mark.parametrize("text", ["", "8765", "localhost", "localhost:x", "localhost:99999", "a b:1"])
+def test_what_is_no_address_is_refused(text):
+    with pytest.raises(ValueError, match="expected HOST:PORT, for example"):
+        parse_address(text)
+
+
+def test_an_address_that_is_taken_is_told():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ValueError, match=f"--foxglove 127.0.0.1:{port}: cannot be listened on"):
+            Server(f"127.0.0.1:{port}")
+
+
+def test_a_run_is_shown_while_it_flies(tmp_path):
+    (door,) = loopback_endpoints(["a"]).values()
+    port = int(door.rpartition(":")[2])
+    path = tmp_path / "flight.mcap"
+    words = [
+        "run",
+        "hover",
+        "--speed",
+        "1",
+        "--set",
+        "run.duration=3",
+        "--log",
+        str(path),
+        "--json",
+        str(tmp_path / "a.json"),
+    ]
+    with subprocess.Popen([sys.executable, "-m", "lapwing", *words, "--foxglove", f"127.0.0.1:{port}"]) as run:
+        client = patient(port, run)
+        client.subscribe("/drone1/truth", "/drone1/events")
+        got, events = [], []
+        while (message := client.next()) is not None:
+            if isinstance(message, bytes) and message[0] == 1:
+                _, subscription, time_ns = struct.unpack_from("<BIQ", message)
+                (events if subscription else got).append((time_ns, message[13:]))
+        assert run.wait(timeout=60) == 0
+    with LogReader(path) as read:
+        kept = [(t, payload) for _, _, t, payload in read.messages(["/drone1/events"])]
+        flown = [(t, payload) for _, _, t, payload in read.messages(["/drone1/truth"])]
+    first = flown.index(got[0])
+    assert got == flown[first : first + len(got)]  # none is missing, and all in order
+    assert len(got) > 100
+    assert events
+    assert set(events) <= set(kept)

@@ -1,0 +1,135 @@
+"""What ground stations are told of the motors, checked as QGroundControl reads it."""
+
+import json
+
+import jsonschema
+import pytest
+
+from services.mavlink.component_metadata import ACTUATORS, GENERAL, PARAMETERS, files
+from services.mavlink.resolve import describe
+from services.table import load
+
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+
+
+def table(required, **more):
+    """The schema of an object that has these keys, and none but these and those of `more`."""
+    return {"type": "object", "properties": required | more, "required": list(required), "additionalProperties": False}
+
+
+def several(items):
+    return {"type": "array", "items": items, "minItems": 1}
+
+
+RANGE = table({"min": NUMBER, "max": NUMBER}, default=NUMBER)
+WHOLE = {"type": "integer"}
+SCHEMA = table(
+    {
+        "version": {"type": "integer", "minimum": 2},
+        "outputs_v1": several(
+            table(
+                {
+                    "label": TEXT,
+                    "subgroups": several(
+                        table(
+                            {
+                                "per-channel-parameters": several(
+                                    table({"label": TEXT, "name": TEXT, "function": TEXT})
+                                ),
+                                "channels": several(table({"label": TEXT, "param-index": WHOLE})),
+                            }
+                        )
+                    ),
+                }
+            )
+        ),
+        "functions_v1": {
+            "type": "object",
+            "additionalProperties": table({"label": TEXT}, **{"exclude-from-actuator-testing": {"type": "boolean"}}),
+            "propertyNames": {"pattern": "^[0-9]+$"},
+        },
+        "mixer_v1": table(
+            {
+                "actuator-types": table(
+                    {
+                        "DEFAULT": table({"values": RANGE}),
+                        "motor": table(
+                            {"values": RANGE, "function-min": WHOLE, "function-max": WHOLE},
+                            **{"label-index-offset": WHOLE},
+                        ),
+                    }
+                ),
+                "config": several(
+                    table(
+                        {
+                            "option": {"type": "string", "pattern": "^[A-Z_]{1,16}==[0-9]+$"},
+                            "type": {"const": "multirotor"},
+                            "title": TEXT,
+                            "actuators": several(
+                                table(
+                                    {
+                                        "group-label": TEXT,
+                                        "actuator-type": {"const": "motor"},
+                                        "required": {"const": True},
+                                        "count": WHOLE,
+                                        "per-item-parameters": several(
+                                            table(
+                                                {
+                                                    "label": TEXT,
+                                                    "function": {"enum": ["posx", "posy", "posz", "spin-dir"]},
+                                                    "value": several(NUMBER),
+                                                }
+                                            )
+                                        ),
+                                    }
+                                )
+                            ),
+                        }
+                    )
+                ),
+            }
+        ),
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def served():
+    return files(describe(load("groundstation")))
+
+
+def test_it_has_the_form_of_the_format(served):
+    jsonschema.validate(json.loads(served[ACTUATORS]), SCHEMA)
+
+
+def test_every_required_motor_is_driven_by_an_output(served):
+    """As QGroundControl looks at it: else its summary asks for set-up."""
+    described = json.loads(served[ACTUATORS])
+    values = {p["name"]: p["default"] for p in json.loads(served[PARAMETERS])["parameters"]}
+    (subgroup,) = described["outputs_v1"][0]["subgroups"]
+    (function,) = subgroup["per-channel-parameters"]
+    driven = [values[function["name"].replace("${i}", str(c["param-index"]))] for c in subgroup["channels"]]
+    motor = described["mixer_v1"]["actuator-types"]["motor"]
+    assert driven == list(range(motor["function-min"], motor["function-max"] + 1)) == [101, 102, 103, 104]
+    assert set(described["functions_v1"]) == {"0", *map(str, driven)}
+    (geometry,) = described["mixer_v1"]["config"]
+    name, _, value = geometry["option"].partition("==")
+    assert values[name] == int(value)
+    assert values["CA_ROTOR_COUNT"] == geometry["actuators"][0]["count"] == 4
+
+
+def test_the_geometry_is_forward_right_down(served):
+    """Rotor 1 of the delivery drone sits ahead on the left and turns clockwise (its airframe)."""
+    (group,) = json.loads(served[ACTUATORS])["mixer_v1"]["config"][0]["actuators"]
+    value = {p["function"]: p["value"] for p in group["per-item-parameters"]}
+    arm = 0.35171491
+    assert value["posx"] == pytest.approx([arm, -arm, -arm, arm])
+    assert value["posy"] == pytest.approx([-arm, -arm, arm, arm])
+    assert value["posz"] == pytest.approx([0.0] * 4)
+    assert value["spin-dir"] == [0.0, 1.0, 0.0, 1.0]
+
+
+def test_ardupilots_stations_are_told_of_none():
+    served = files(describe(load("groundstation", ["mavlink.flavour=ardupilot"])))
+    assert ACTUATORS not in served
+    assert len(json.loads(served[GENERAL])["metadataTypes"]) == 2

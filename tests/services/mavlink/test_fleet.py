@@ -1,0 +1,94 @@
+"""Several vehicles at one ground station: a link and a system for each, and who is told to fly flies."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+from pymavlink import mavutil
+from stand_in import free_port
+
+from cosim.log import LogReader
+from lapwing.runs.refly import refly
+from messages import OperatorInput, VehicleState
+from services.mavlink.dialect import mavlink
+from services.mavlink.links import numbered
+
+SETS = ("autopilot.trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
+
+
+def heard(station, kind, system, seconds=120.0):
+    """The next message of this kind from a system."""
+    while message := station.recv_match(type=kind, blocking=True, timeout=seconds):
+        if message.get_srcSystem() == system:
+            return message
+    raise AssertionError(f"no {kind} from system {system}")
+
+
+def order(station, system, number, *params):
+    """What a system answers to a command."""
+    station.mav.command_long_send(system, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
+    while (ack := heard(station, "COMMAND_ACK", system)).command != number:
+        pass
+    return ack.result
+
+
+@pytest.mark.long
+def test_each_system_flies_by_its_own_orders(tmp_path):
+    port, log = free_port(), tmp_path / "fleet.mcap"
+    first, second = (mavutil.mavlink_connection(f"udpout:127.0.0.1:{port + i}") for i in range(2))
+    sets = [part for each in SETS for part in ("--set", each)]
+    more = ["--mavlink", f"udpin:127.0.0.1:{port}", "--speed", "2", "--log", str(log), "--key-prefix", "test-mav-fleet"]
+    command = [sys.executable, "-m", "lapwing", "run", "fleet", *sets, *more]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        for station, system in ((first, 1), (second, 2)):
+            while not station.recv_match(type="HEARTBEAT", blocking=True, timeout=0.5):
+                assert process.poll() is None
+                station.mav.heartbeat_send(6, 8, 0, 0, 0)
+            assert heard(station, "GLOBAL_POSITION_INT", system)  # it has started
+        assert order(second, 2, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert order(second, 2, mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
+        while heard(second, "GLOBAL_POSITION_INT", 2).relative_alt < 1000:
+            pass
+        home = heard(second, "HOME_POSITION", 2)
+        assert (home.x, home.y) == (pytest.approx(-3.0, abs=0.1), pytest.approx(0.0, abs=0.1))  # north, east
+    assert process.returncode in (0, 3, 4)
+    with LogReader(log) as read:
+        assert read.complete
+        told = {
+            name: [c.kind for *_, m in read.messages([f"/{name}/operator"]) for c in OperatorInput.decode(m).commands]
+            for name in ("left", "right", "scout")
+        }
+        up = {
+            name: max(VehicleState.decode(m).pose.position.z for *_, m in read.messages([f"/{name}/truth"]))
+            for name in told
+        }
+    assert set(told["left"]) | set(told["scout"]) <= {"link"}  # that a station is there
+    assert {"arm", "takeoff"} <= set(told["right"])
+    assert up["right"] > 1.0 > max(up["left"], up["scout"])
+    before, after = refly(log)
+    assert before == after
+
+
+@pytest.mark.parametrize(
+    ("url", "links"),
+    [
+        ("udpout:127.0.0.1:14550", ["udpout:127.0.0.1:14550"] * 2),
+        ("udpin:127.0.0.1:14540", ["udpin:127.0.0.1:14540", "udpin:127.0.0.1:14541"]),
+        ("tcpin:127.0.0.1:5760", ["tcpin:127.0.0.1:5760", "tcpin:127.0.0.1:5761"]),
+    ],
+)
+def test_those_who_listen_have_a_port_each_and_those_who_send_share_the_station(url, links):
+    assert [numbered(url, i) for i in range(2)] == links
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("serial:/dev/ttyS0:57600", "has room for one vehicle; expected udpout, udpin or tcpin"),
+        ("udpin:127.0.0.1:65535", "port 65535: the link of vehicle 1 would be at 65536"),
+    ],
+)
+def test_a_link_that_there_cannot_be_is_refused(url, said):
+    with pytest.raises(ValueError, match=said):
+        numbered(url, 1)

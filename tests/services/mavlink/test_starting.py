@@ -1,0 +1,40 @@
+"""Before the vehicle speaks: the link is there, says that it starts, and serves what needs no vehicle."""
+
+from bench import Bench
+
+from services.mavlink.dialect import mavlink
+
+
+def test_heartbeats_say_that_it_starts_once_a_second_until_it_speaks():
+    bench = Bench(starting=True)
+    station = bench.station()
+    for k in range(25):
+        bench.adapter.tick(100.0 + 0.1 * k)
+    beats = station.all("HEARTBEAT")
+    assert [m.system_status for m in beats] == [mavlink.MAV_STATE_BOOT] * 3
+    station.got.clear()
+    bench.step(3)
+    assert station.last("HEARTBEAT").system_status == mavlink.MAV_STATE_STANDBY
+    station.got.clear()
+    bench.adapter.tick(200.0)
+    assert not station.got
+
+
+def test_parameters_and_what_it_is_are_told_while_it_starts():
+    bench = Bench(starting=True)
+    station = bench.station()
+    station.send("param_request_list", 1, 1)
+    for k in range(20):
+        bench.adapter.tick(0.01 * k)
+    assert len({v.param_id for v in station.all("PARAM_VALUE")}) == len(bench.adapter.parameters.names)
+    station.send("command_long", 1, 1, 512, 0, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, *[0.0] * 6)
+    assert station.last("AUTOPILOT_VERSION")
+
+
+def test_commands_are_turned_away_for_the_time_being():
+    bench = Bench(starting=True)
+    station = bench.station()
+    station.send("command_long", 1, 1, 400, 0, 1.0, *[0.0] * 6)
+    assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    bench.step()
+    assert station.command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED

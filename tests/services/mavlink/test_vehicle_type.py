@@ -1,0 +1,15 @@
+import pytest
+
+from services.mavlink.px4_facts import px4_facts
+from services.mavlink.telemetry.state import heartbeat
+from services.mavlink.vehicle import Rotor, VehicleDescription
+from services.mavlink.view import VehicleView
+
+
+@pytest.mark.parametrize(("rotors", "kind", "frame"), [(4, 2, 4001), (6, 13, 6001), (8, 14, 8001), (5, 43, 4001)])
+def test_heartbeat_and_parameters_tell_the_same_kind_of_multirotor(rotors, kind, frame):
+    """Numbers as in MAVLink's common.xml and in PX4's airframe reference."""
+    description = VehicleDescription(rotors=(Rotor((0.0, 0.0, 0.0), True),) * rotors)
+    facts = {fact.name: fact.value({}) for fact in px4_facts(description)[:4]}
+    assert heartbeat(VehicleView(description)).type == facts["MAV_TYPE"] == kind
+    assert facts["SYS_AUTOSTART"] == frame

@@ -1,0 +1,234 @@
+"""A run as a node of a ROS 2 graph, seen and commanded by zenoh-ros2-sdk, which others wrote."""
+
+import os
+import queue
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from cosim.log import LogReader
+from messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
+from messages.types import FOLDER
+from services.ros2.commands import SOURCE
+from services.ros2.node import ROUTER, Node, parse_router
+
+DOMAIN = 7
+PATIENCE = 120.0  # [s] the run gets to compile and to begin
+
+
+@pytest.fixture
+def port():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        return taken.getsockname()[1]
+
+
+@pytest.fixture
+def graph(port, tmp_path):
+    """Publishers and subscribers of another program on a router; its session begins with the first."""
+    pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
+    from zenoh_ros2_sdk import message_registry
+    from zenoh_ros2_sdk.session import ZenohSession
+
+    for path in FOLDER.glob("*/*.msg"):  # so that none is fetched from elsewhere
+        copy = tmp_path / "msg" / path.parent.name / "msg" / path.name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(path.read_text())
+    message_registry.get_registry().messages_dir = tmp_path / "msg"
+    graph = Graph(port)
+    yield graph
+    for entity in graph.entities:
+        entity.close()
+    if ZenohSession._instance is not None:
+        ZenohSession._instance.session.close()
+        ZenohSession._instance = None
+    message_registry._registry = None
+
+
+class Graph:
+    """What the other program has in the graph."""
+
+    def __init__(self, port):
+        self._where = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
+        self.entities = []
+
+    def topics(self):
+        """Types by topic."""
+        from zenoh_ros2_sdk import discovery
+
+        return dict(discovery.get_topic_names_and_types(**self._where))
+
+    def publisher(self, topic, message):
+        from zenoh_ros2_sdk import ROS2Publisher
+
+        found = ROS2Publisher(topic, message.type_name, **self._where)
+        self.entities.append(found)
+        return found
+
+    def subscribe(self, topic, message):
+        """A queue of what comes."""
+        from zenoh_ros2_sdk import ROS2Subscriber
+
+        arrived = queue.SimpleQueue()
+        self.entities.append(ROS2Subscriber(topic, message.type_name, callback=arrived.put, **self._where))
+        return arrived
+
+    def type_(self, name):
+        """The other program's class of a message."""
+        from zenoh_ros2_sdk.session import ZenohSession
+
+        return ZenohSession.get_instance().store.types[name]
+
+
+def fly(tmp_path, port, *more):
+    words = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}", "--log", str(tmp_path / "a.mcap"), *more]
+    command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--set", "success.require=[]", *words]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    deadline = time.monotonic() + PATIENCE
+    while run.poll() is None and time.monotonic() < deadline:
+        try:
+            socket.create_connection(("127.0.0.1", port)).close()
+            return run
+        except ConnectionRefusedError:
+            time.sleep(0.1)
+    run.kill()
+    raise AssertionError(run.communicate()[0])
+
+
+def plain(message):
+    """A message of either program as numbers and texts."""
+    if hasattr(message, "_fields"):
+        return {name: plain(getattr(message, name)) for name in message._fields}
+    if hasattr(message, "__msgtype__"):
+        return {name: plain(value) for name, value in vars(message).items() if name != "__msgtype__"}
+    return message
+
+
+def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
+    run = fly(tmp_path, port, "--speed", "2", "--set", "run.duration=14")
+    try:
+        clock, poses = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/pose", PoseStamped)
+        arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
+        target = graph.publisher("/drone1/command/pose", PoseStamped)
+        events = graph.subscribe("/drone1/events", Log)
+        heard = [poses.get(timeout=PATIENCE)]
+        topics = graph.topics()
+        there = heard[0].pose.__class__(
+            graph.type_("geometry_msgs/msg/Point")(2.0, 1.0, 3.0), heard[0].pose.orientation
+        )
+        started = False
+        while heard[-1].header.stamp.sec < 13:
+            heard.append(poses.get(timeout=PATIENCE))
+            if heard[-1].header.stamp.sec >= 6:  # the estimator has settled
+                target.publish(header=heard[-1].header, pose=there)
+                if not started and heard[-1].header.stamp.nanosec > 500_000_000:
+                    started = True
+                    mode.publish(data="offboard")
+                    arm.publish(data=True)
+        said = run.communicate(timeout=PATIENCE)[0]
+    finally:
+        run.kill()
+    assert run.returncode == 0, said
+    assert "commands taken\n" in said
+    with LogReader(tmp_path / "a.mcap") as log:
+        types = {topic: [kind] for topic, kind in log.topics().items()}
+        recorded = [PoseStamped.decode(payload) for *_, payload in log.messages(["/drone1/pose"])]
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+    types.pop("/wall_time")  # made by who writes the log
+    assert types.items() <= topics.items()
+    place = recorded.index(next(m for m in recorded if plain(m) == plain(heard[0])))
+    assert [plain(m) for m in heard] == [plain(m) for m in recorded[place : place + len(heard)]]
+    assert clock.qsize() >= len(heard) - 1
+    told = [events.get_nowait() for _ in range(events.qsize())]
+    assert ("arming", "armed") in {(event.name, event.msg) for event in told}
+    commands = [command for message in inputs for command in message.commands]
+    assert {c.source for c in commands} == {SOURCE}
+    assert [c.kind for c in commands if c.kind != "offboard_position"] == ["offboard", "arm"]
+    position = recorded[-1].pose.position
+    assert abs(position.x - 2.0) < 0.5
+    assert abs(position.y - 1.0) < 0.5
+    assert abs(position.z - 3.0) < 0.5
+
+
+def test_a_node_drives_the_motors(tmp_path, port, graph):
+    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=4", "--set", "autopilot.estimator=truth")
+    try:
+        poses = graph.subscribe("/drone1/pose", PoseStamped)
+        arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
+        motors = graph.publisher("/drone1/command/motors", Actuators)
+        volts, started = np.array([1.0, 1.5, 2.0, 2.5]), False
+        while (pose := poses.get(timeout=PATIENCE)).header.stamp.sec < 3:
+            none = graph.type_("geometry_msgs/msg/Vector3")(0.0, 0.0, 0.0)
+            motors.publish(header=pose.header, motor_voltage=volts, armed=False, thrust=volts, attitude_reference=none)
+            if not started and pose.header.stamp.sec >= 1:
+                started = True
+                mode.publish(data="offboard")
+                arm.publish(data=True)
+        said = run.communicate(timeout=PATIENCE)[0]
+    finally:
+        run.kill()
+    assert run.returncode == 0, said
+    with LogReader(tmp_path / "a.mcap") as log:
+        _, recorded = log.history("/drone1/actuators")
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+    given = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
+    assert {(command.source, command.values) for command in given} == {(SOURCE, tuple(volts))}
+    assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
+
+
+def test_the_second_node_on_a_machine_joins_the_first_ones_router(port):
+    with Node(DOMAIN, f"127.0.0.1:{port}") as first, Node(DOMAIN, f"127.0.0.1:{port}") as second:
+        asked = second.subscribe({"/clock": Clock})
+        first.declare("/clock", Clock.type_name)
+        first.declare("/foreign", "not/msg/Ours")
+        first.put("/foreign", 0, b"")
+        sent = Clock(stamp(5)).encode()
+        deadline, found = time.monotonic() + PATIENCE, None
+        while found is None and time.monotonic() < deadline:  # the subscription takes a while to be known
+            first.put("/clock", 5, sent)
+            found = asked.get()
+    assert found == ("/clock", sent)
+
+
+def test_what_is_no_router_is_told(port):
+    with (
+        socket.create_server(("127.0.0.1", port)),
+        pytest.raises(ValueError, match=f"--ros2: cannot connect to tcp/127.0.0.1:{port}: .* expected a Zenoh router"),
+    ):
+        Node(DOMAIN, f"127.0.0.1:{port}")
+
+
+@pytest.mark.parametrize("text", ["", "7447", "localhost", "localhost:x", "localhost:99999", "a b:1"])
+def test_what_is_no_address_is_refused(text):
+    with pytest.raises(ValueError, match=f"expected HOST:PORT, for example {ROUTER}"):
+        parse_router(text, False)
+
+
+def test_another_machine_needs_to_be_asked_for():
+    assert parse_router("[::1]:7447", False) == ("tcp/[::1]:7447", True)
+    assert parse_router("robot:7447", True) == ("tcp/robot:7447", False)
+    with pytest.raises(ValueError, match="robot:7447: is not this machine, and anybody there could command"):
+        parse_router("robot:7447", False)
+
+
+@pytest.mark.skipif(os.environ.get("LAPWING_ROS2") != "1", reason="needs ROS 2 with rmw_zenoh, and LAPWING_ROS2=1")
+def test_ros2_itself_sees_the_run_and_arms_it(tmp_path, port):
+    nodes = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ROS_DOMAIN_ID": str(DOMAIN)}
+    nodes["ZENOH_CONFIG_OVERRIDE"] = f'connect/endpoints=["tcp/127.0.0.1:{port}"]'
+
+    def ros2(*words):
+        command = ["ros2", "topic", *words]
+        return subprocess.run(command, env=os.environ | nodes, check=True, capture_output=True, text=True).stdout
+
+    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=60")
+    try:
+        assert {"/clock", "/drone1/imu", "/drone1/command/arm"} <= set(ros2("list", "--no-daemon").split())
+        assert "frame_id: world" in ros2("echo", "--once", "/drone1/pose", "geometry_msgs/msg/PoseStamped")
+        ros2("pub", "--once", "-w", "1", "/drone1/command/arm", "std_msgs/msg/Bool", "{data: true}")
+        said = run.communicate(timeout=PATIENCE)[0]
+    finally:
+        run.kill()
+    assert "ros2: 1 commands taken\n" in said

@@ -1,0 +1,28 @@
+"""A phase lets the payload go while the vehicle stands, not before."""
+
+import numpy as np
+import pytest
+
+from services.table import load
+from studies.fly import fly
+
+
+def height(to):
+    return {"kind": "minimum_jerk", "to": to, "duration": 3.0}
+
+
+def test_a_payload_is_kept_in_the_air_and_let_go_on_the_ground():
+    phases = [
+        {"name": "climb", "z": height(1.0)},
+        {"name": "hover", "duration": 3.0, "release": True},
+        {"name": "descend", "z": height(0.0), "release": True},
+        {"name": "stand", "duration": 2.0, "release": True},
+        {"name": "climb again", "z": height(1.0)},
+        {"name": "hover again", "duration": 3.0},
+        {"name": "descend again", "z": height(0.0)},
+    ]
+    flown = fly(load("hover", {"effects.payload": {}, "trajectory.phase": phases, "run.duration": 18.0}))
+    t, thrust = flown.setup.interval * np.arange(len(flown.truth)), flown.truth.rotor_thrust.sum(axis=1)
+    first, second = ((t > begin) & (t < begin + 1.0) for begin in (4.5, 15.5))
+    weight = [mass * 9.80665 for mass in (10.0224, 8.0224)]
+    assert [thrust[first].mean(), thrust[second].mean()] == pytest.approx(weight, rel=0.01)

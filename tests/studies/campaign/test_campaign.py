@@ -1,0 +1,193 @@
+"""A campaign of short flights: its folder, a stop, other workers, a run flown again, two beside each other."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from lapwing.cli.main import app
+from studies.campaign import local, table
+from studies.campaign.distributions import choice, normal, uniform
+from studies.campaign.folder import begin, manifest, read
+from studies.campaign.plan import plan
+from studies.campaign.results import Results
+from studies.campaign.runs import first_setup, fly_runs, reference
+from studies.campaign.study import campaign
+
+SCENE = "delivery_mission"  # the start of it; some of the runs are said to fail
+SHORT = ("run.duration=3.5", 'success.require=["max_tilt < 0.03"]')
+VARY = {"vehicle.mass": normal(10.4, 0.3), "effects.wind_random.mean.0": uniform(0.0, 9.0)}
+RUNS = 40
+
+
+def started(path, **changes):
+    made = plan(**{"path": SCENE, "overrides": SHORT, "runs": RUNS, "vary": VARY, **changes})
+    first = reference(*first_setup(made))
+    return begin(path, made, manifest(made, first)), first
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """A campaign that was flown in one go, in this process; and its digest."""
+    folder, first = started(tmp_path_factory.mktemp("campaign") / "one")
+    campaign(folder, first, local.here)
+    return folder, folder.finish(csv=True)
+
+
+def lapwing(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+def options(folder, **vary):
+    sets = [part for text in SHORT for part in ("--set", text)]
+    varied = [part for key, d in (vary or VARY).items() for part in ("--vary", f"{key}={d}")]
+    return ["campaign", SCENE, *sets, *varied, "--runs", RUNS, "--out", folder, "--workers", 1]
+
+
+def test_a_run_draws_flies_and_is_a_row(flown):
+    folder, _ = flown
+    rows = [row for page in folder.pages() for row in page]
+    assert [row["run"] for row in rows] == list(range(RUNS))
+    assert all(row[key] == folder.plan.values(row["run"])[key] for row in rows for key in VARY)
+    assert len({row["end_state"] for row in rows}) == RUNS
+    assert {row["verdict"] for row in rows} == {"timed out"}
+
+
+def test_a_stop_loses_no_shard_that_is_done_and_workers_change_nothing(flown, tmp_path):
+    folder, first = started(tmp_path / "c")
+    campaign(folder, first, local.here, part=range(0, len(folder.shards), 2))
+    (tmp_path / "c" / "shards" / ".00001.csv.77").write_text("half written")
+    assert len(folder.missing()) == len(folder.shards) // 2
+    seen = []
+    count = campaign(folder, first, local.processes(2), seen.append)
+    assert (seen[0].runs, seen[-1].runs, count.runs) == (RUNS // 2, RUNS, RUNS)
+    assert folder.finish() == flown[1]
+
+
+@pytest.mark.skipif(not table.has_parquet(), reason="pyarrow is not installed: pip install lapwing[campaign]")
+def test_the_table_is_parquet_with_its_making_in_the_metadata(flown):
+    from pyarrow import parquet
+
+    folder, digest = flown
+    found = parquet.read_table(folder.path / "runs.parquet")
+    assert found.num_rows == RUNS
+    assert found["effects.wind_random.mean.0"].to_pylist() == folder.arrays()["effects.wind_random.mean.0"].tolist()
+    about = {name.decode(): text.decode() for name, text in found.schema.metadata.items()}
+    assert (about["scene"], about["digest"]) == (SCENE, digest)
+    assert json.loads(about["vary"])["vehicle.mass"] == "normal(10.4, 0.3)"
+    assert json.loads(about["versions"])["numpy"]
+
+
+def test_csv_gives_every_bit_back(flown):
+    folder, _ = flown
+    rows = table.read_csv(folder.path / "runs.csv", folder.kinds)
+    assert list(table.bits(folder.kinds, rows)) == list(table.bits(folder.kinds, folder.rows(0) + rows[2:]))
+
+
+def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_path):
+    folder, _ = flown
+    before = (folder.path / "campaign.json").read_text()
+    for changes, differing in (({"seed": 2}, "seed"), ({"runs": 41}, "runs"), ({"vary": {}}, "vary")):
+        with pytest.raises(ValueError, match=f"holds another campaign .*{differing}"):
+            started(folder.path, **changes)
+    assert (folder.path / "campaign.json").read_text() == before
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="holds something else"):
+        started(tmp_path)
+    (tmp_path / "c" / "shards").mkdir(parents=True)  # another machine has just begun
+    assert started(tmp_path / "c")[0].missing()
+
+
+def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
+    folder, _ = flown
+    _, first = started(folder.path)
+    with pytest.raises(ValueError, match=r"has numpy .*; the campaign was begun with 0.1"):
+        fly_runs(folder.plan, first._replace(versions={**first.versions, "numpy": "0.1"}), 0, 1)
+    with pytest.raises(ValueError, match="run 0 goes another way there"):
+        fly_runs(folder.plan, first._replace(end_state="00"), 0, 1)
+
+
+def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
+    counts = []
+
+    def backwards(call, tasks):
+        yield from reversed(list(local.here(call, tasks)))
+
+    for workers in (local.here, backwards):
+        folder, first = started(tmp_path / workers.__name__)
+        counts.append(campaign(folder, first, workers, until=0.2))
+        assert counts[-1].failure.half_width <= 0.2
+    assert counts[0] == counts[1]
+    assert 0 < counts[0].runs < RUNS
+
+
+def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
+    code, said = lapwing(*options(tmp_path / "c", **{"vehicle.mass": choice(10.4, -1.0)}))
+    assert code == 0
+    found = Results(read(tmp_path / "c"))
+    assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
+    assert f"{len(found)} timed out, {len(found.refused['run'])} refused" in said
+    assert "vehicle.mass: expected a number above 0, got -1.0" in found.refused["told"][0]
+    assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
+
+
+def test_report_json_and_a_run_flown_again_to_the_bit(flown, tmp_path, monkeypatch):
+    folder, digest = flown
+    code, said = lapwing(*options(folder.path), "--json", tmp_path / "c.json")
+    assert (code, digest in said) == (0, True)
+    good = int(Results(folder)["success"].sum())
+    assert 0 < good < RUNS
+    assert f"{good} of the successes timed out" in " ".join(said.split())
+    told = json.loads((tmp_path / "c.json").read_text())
+    assert (told["runs"], len(told["failed"]), told["digest"]) == (RUNS, RUNS - good, digest)
+    page = (folder.path / "report.html").read_text()
+    assert all(text in page for text in ("Probability of success", "Which parameter matters", "normal(10.4, 0.3)"))
+    worst = Results(folder).worst(1)[0]["run"]
+    command = f"lapwing run {SCENE} --run {worst} --campaign {folder.path}"
+    assert command in page
+    monkeypatch.chdir(tmp_path)
+    code, said = lapwing(*command.split()[1:], "--mode", "single", "--log", "again.mcap")
+    assert (code, f"run {worst} of {folder.path}: the same end, to the bit" in said) == (4, True)  # one that fails
+    code, said = lapwing("run", SCENE, "--run", RUNS, "--campaign", folder.path)
+    assert (code, f"--run {RUNS}: expected a run of {folder.path}, 0 to 39" in said) == (2, True)
+    code, said = lapwing("run", "hover", "--run", 1, "--campaign", folder.path)
+    assert (code, "is not what" in said) == (2, True)
+
+
+def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
+    folder, _ = flown
+    other, first = started(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
+    campaign(other, first, local.here)
+    code, said = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
+    assert (code, f"{RUNS} pairs of runs" in said) == (0, True)
+    found = {d["figure"]: d for d in json.loads((tmp_path / "d.json").read_text())["differences"]}
+    energy = found["energy"]
+    assert energy["difference"]["value"] == pytest.approx(energy["other"] - energy["one"])
+    alone = abs(energy["difference"]["high"] - energy["difference"]["low"])
+    assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
+    assert lapwing("compare", folder.path, tmp_path)[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["hover", "--runs", "0"], "--runs 0: expected at least 1"),
+        (["hover", "--vary", "vehicle.mass"], "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
+        (["hover", "--vary", "vehicle.mass=gauss(1)"], "--vary vehicle.mass=gauss(1): expected a distribution"),
+        (["hover", "--vary", "vehicle.mas=normal(10,1)"], "vehicle.mas: unknown key 'mas'; did you mean mass?"),
+        (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
+        (["hover", "--report", "c.gif"], "--report c.gif: expected a name that ends in .html, .pdf or .png"),
+        (["hover", "--until-ci", "2"], "--until-ci 2: expected a probability between 0 and 1"),
+        (["hover", "--workers", "0"], "--workers 0: expected at least 1"),
+        (["hover", "--runs", "4", "--out", "{}", "--shard", "3/500"], "has 4 shards; expected at most I/4"),
+        (["hover", "--runs", "4", "--out", "{}", "--shard", "5/4"], "--shard 5/4: expected I/N with I from 1 to N"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message, tmp_path):
+    code, said = lapwing("campaign", *(a.replace("{}", str(tmp_path / "c")) for a in arguments))
+    assert code == 2
+    assert message in " ".join(said.split())
+    assert not Path("campaigns").exists()

@@ -1,0 +1,45 @@
+"""A campaign on a Dask cluster of several processes, one of which is killed and another joins late: the same table."""
+
+import os
+import signal
+
+import pytest
+
+from studies.campaign import local
+from studies.campaign.cluster import dask
+from studies.campaign.folder import begin, manifest
+from studies.campaign.plan import plan
+from studies.campaign.runs import first_setup, reference
+from studies.campaign.study import campaign
+
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
+
+
+def test_a_killed_worker_and_a_late_one_change_nothing(tmp_path):
+    made = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
+    first = reference(*first_setup(made))
+    alone, folder = (begin(tmp_path / name, made, manifest(made, first)) for name in ("alone", "cluster"))
+    campaign(alone, first, local.here)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        victim, *_ = client.run(os.getpid).values()
+        calls = []
+
+        def strike(count):
+            calls.append(count.runs)
+            if len(calls) == 2:  # after the first shard
+                cluster.scale(3)
+                os.kill(victim, signal.SIGKILL)
+
+        count = campaign(folder, first, dask(cluster.scheduler_address), strike)
+    assert count.runs == 40
+    assert len(calls) == 1 + len(folder.shards)
+    assert folder.finish() == alone.finish()
+
+
+def test_nobody_answers(monkeypatch):
+    monkeypatch.setattr("studies.campaign.cluster.PATIENCE", 0.5)
+    with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers there"):
+        dask("tcp://127.0.0.1:9")

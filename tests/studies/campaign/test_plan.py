@@ -1,0 +1,145 @@
+"""What the runs of a campaign draw."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
+from studies.campaign.plan import plan
+
+
+def drawn(made, key):
+    return [made.values(run)[key] for run in range(made.runs)]
+
+
+@pytest.mark.parametrize(
+    ("distribution", "reference"),
+    [
+        (normal(10.4, 0.2), stats.norm(10.4, 0.2)),
+        (uniform(-1, 12), stats.uniform(-1, 13)),
+        (loguniform(0.1, 100.0), stats.loguniform(0.1, 100.0)),
+    ],
+)
+def test_quantiles_are_those_of_scipy(distribution, reference):
+    for u in (0.001, 0.3, 0.5, 0.97):
+        assert distribution.at(u) == pytest.approx(reference.ppf(u))
+    assert parse(str(distribution)) == distribution
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("choice(rtk, standard)", ("rtk", "standard")),
+        ("choice(a.toml,sets/b.toml)", ("a.toml", "sets/b.toml")),
+        ("choice([1.0, 2.0], [3.0, 4.0])", ([1.0, 2.0], [3.0, 4.0])),
+        ('choice("a, b", true, 3)', ("a, b", True, 3)),
+        ("linspace(0, 1, 3)", (0.0, 0.5, 1.0)),
+    ],
+)
+def test_values_that_are_finitely_many(text, values):
+    found = parse(text)
+    assert found.values == values
+    assert [found.at(u) for u in (np.arange(len(values)) + 0.5) / len(values)] == list(values)
+    assert parse(str(found)) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("normal(1)", "normal: got '1'"),
+        ("normal(a, b)", "normal: got 'a, b'"),
+        ("normal(1, -2)", "normal: expected a deviation of at least 0, got 1, -2"),
+        ("uniform(2, 1)", "uniform: expected low <= high, got 2, 1"),
+        ("loguniform(0, 1)", "loguniform: expected 0 < low <= high"),
+        ("linspace(0, 1, 0)", "expected a whole number of values"),
+        ("choice()", "choice: expected at least one value"),
+        ("gauss(1, 2)", f"expected a distribution, {', '.join(KINDS)}"),
+        ("3.0", "expected a distribution"),
+    ],
+)
+def test_no_distribution(text, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        parse(text)
+
+
+def test_draws_depend_on_seed_run_and_key_alone():
+    one = plan("hover", runs=50, seed=3, vary={"a": normal(0, 1), "b": uniform(0, 1)})
+    more = plan("hover", runs=80, seed=3, vary={"c": uniform(0, 1), "b": uniform(0, 1)})
+    assert drawn(one, "b") == drawn(more, "b")[:50]
+    assert [one.seed_of(k) for k in range(50)] == [more.seed_of(k) for k in range(50)]
+    assert drawn(one, "b") != drawn(plan("hover", runs=50, seed=4, vary={"b": uniform(0, 1)}), "b")
+    assert [one._replace(seed=1).seed_of(k) for k in range(3)] == [1, 2, 3]
+    assert len({plan("hover", seed=s).seed_of(k) for s in (1, 2, 3) for k in range(100)}) == 300
+    assert one._replace(seed=2**31 - 1).seed_of(2**32 - 1) < 2**63
+
+
+def test_draws_are_distributed_as_they_ought_to_be():
+    made = plan("hover", runs=2000, vary={"a": normal(1.0, 2.0), "b": uniform(0, 1)})
+    a, b = drawn(made, "a"), drawn(made, "b")
+    assert stats.kstest(a, stats.norm(1.0, 2.0).cdf).pvalue > 0.01
+    assert stats.kstest(b, stats.uniform.cdf).pvalue > 0.01
+    assert abs(np.corrcoef(a, b)[0, 1]) < 0.06
+
+
+@pytest.mark.parametrize("design", ["lhs", "sobol"])
+def test_designs_draw_every_part_of_a_range(design):
+    made = plan("hover", runs=16, vary={"a": uniform(0, 16), "b": uniform(0, 16)}, design=design)
+    for key in "ab":
+        assert sorted(map(int, drawn(made, key))) == list(range(16))  # one in each sixteenth
+    assert drawn(made, "a") != drawn(made, "b")
+    assert made.values(7) == plan("hover", runs=16, vary=dict(made.vary), design=design).values(7)
+
+
+def test_a_grid_has_all_combinations():
+    made = plan("hover", vary={"a": choice(1, 2), "b": linspace(0, 1, 3), "c": uniform(0, 1)}, design="grid")
+    assert made.runs == 6
+    assert sorted(zip(drawn(made, "a"), drawn(made, "b"), strict=True)) == [(a, b) for a in (1, 2) for b in (0, 0.5, 1)]
+    assert len(set(drawn(made, "c"))) == 6
+
+
+def test_a_sweep_keeps_together_what_belongs_together(tmp_path):
+    (tmp_path / "s.csv").write_text('vehicle.mass, "sensors.gps.preset"\n9.5, rtk\n10.5, standard\n')
+    made = plan("hover", runs=3, sweep=tmp_path / "s.csv")
+    assert [made.values(k) for k in range(3)] == [
+        {"vehicle.mass": 9.5, "sensors.gps.preset": "rtk"},
+        {"vehicle.mass": 10.5, "sensors.gps.preset": "standard"},
+        {"vehicle.mass": 9.5, "sensors.gps.preset": "rtk"},
+    ]
+    assert plan("hover", sweep=tmp_path / "s.csv").runs == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "expected a line of keys"),
+        ("a,b\n", "expected a line of keys, each once, and a line of values for each run"),
+        ("a,b\n1\n", "line 2: expected 2 values, got 1"),
+        ("a\n1 2\n", "1 2 is not a TOML value"),
+    ],
+)
+def test_no_sweep(tmp_path, text, said):
+    (tmp_path / "s.csv").write_text(text)
+    with pytest.raises(ValueError, match=said):
+        plan("hover", sweep=tmp_path / "s.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"runs": 0}, "--runs 0: expected at least 1"),
+        ({"seed": 0}, "--seed 0: expected a whole number from 1 to 2147483647"),
+        ({"design": "halton"}, "--design halton: expected one of random, lhs, sobol, grid"),
+        ({"design": "lhs"}, "--design lhs: expected a --vary"),
+        ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"--design grid: expected a --vary with choice"),
+        ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: No such file"),
+    ],
+)
+def test_no_plan(arguments, said):
+    from pathlib import Path
+
+    if "sweep" in arguments:
+        arguments = {"sweep": Path(arguments["sweep"])}
+    with pytest.raises(ValueError, match=said):
+        plan("hover", **arguments)

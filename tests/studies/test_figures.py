@@ -1,0 +1,133 @@
+"""Figures of flights made up, whose answers are known; and what a scene calls a success."""
+
+import made_up
+import numpy as np
+import pytest
+
+from cosim.scene import SceneError
+from services.common.success import Success, holds
+from services.table import load
+from studies.figures import FIGURES, _farthest, check_success, figures
+from studies.tracking import AXES
+
+N = 400
+
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+def flown(failure="", diverged=False, finished=True, setpoint=None, truth=None, estimate=None, armed=True):
+    """A flight at 100 Hz: columns of some topics besides what stands still."""
+    pose = {"pose.position": ZERO, "pose.orientation": made_up.LEVEL}
+    still = {**pose, "velocity": ZERO, "motor_power": (100.0,), "ground_contact": False, "motor_voltage": (20.0,)}
+    return made_up.flight(
+        N,
+        failure=failure,
+        diverged=diverged,
+        truth={**still, **(truth or {})},
+        setpoint={"position": ZERO, "yaw": 0.0, **(setpoint or {})},
+        actuators={"attitude_reference": ZERO, "armed": armed},
+        estimate={**pose, "position_std": (0.1, 0.1, 0.1), **(estimate or {})},
+        status={"finished": finished, "landed": True},
+        scene={"airframe": {"motor": {"max_voltage": 40.0}}},
+    )
+
+
+def test_errors_of_known_offsets():
+    half = np.sin(0.05), np.cos(0.05)
+    f = figures(
+        flown(
+            setpoint={"position": (1.0, 2.0, 3.0), "yaw": 0.2},
+            truth={"pose.position": (0.9, 2.0, 3.2), "pose.orientation": (0.0, 0.0, *half)},  # a yaw of 0.1
+            estimate={"pose.position": (1.0, 1.7, 3.2)},
+        )
+    )
+    assert [f[f"rmse.{axis}"] for axis in AXES] == pytest.approx([0.1, 0.0, 0.2, 0.0, 0.0, 0.1])
+    assert [f[f"rmse_estimate.{axis}"] for axis in AXES] == pytest.approx([0.0, 0.3, 0.2, 0.0, 0.0, 0.2])
+    assert f["max_distance"] == pytest.approx(np.hypot(0.1, 0.2))
+    assert f["overshoot"] == pytest.approx(0.2)  # above the reference; it never came as far along x
+    assert [f[f"inside.{axis}"] for axis in "xyz"] == [1.0] * 3
+    assert f["energy"] == pytest.approx(400.0)
+    assert (f["verdict"], f["saturation"], f["max_tilt"]) == ("landed", 0.0, 0.0)
+    assert np.isnan(f["touchdown.speed"])
+    assert set(f) == set(FIGURES)
+
+
+def test_share_of_the_time_within_three_sigma():
+    ramp = np.zeros((N, 3))
+    ramp[:, 1] = np.linspace(0.0, 0.6, N)  # three sigma are reached half-way
+    f = figures(flown(estimate={"pose.position": ramp}))
+    assert [f[f"inside.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 0.5, 1.0])
+
+
+def test_only_the_armed_part_counts():
+    armed = np.arange(N) < 10
+    off = np.where(armed, 0.0, 5.0)[:, None] * np.ones(3)
+    assert figures(flown(truth={"pose.position": off}, armed=armed))["max_distance"] == 0.0
+
+
+def test_a_touch_down_has_its_place_speed_and_tilt():
+    touch, half = np.arange(N) > 300, np.sin(0.1)
+    falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    moving = np.arange(N)[:, None] * np.array([0.01, -0.02, 0.0])
+    leaning = {"pose.orientation": (0.0, half, 0.0, np.sqrt(1.0 - half**2)), "pose.position": moving}
+    hit = figures(flown(truth={"ground_contact": touch, "velocity": falling, **leaning}))
+    assert (hit["verdict"], hit["touchdown.speed"], hit["time"]) == ("crashed", 3.0, 3.01)
+    assert (hit["touchdown.x"], hit["touchdown.y"]) == pytest.approx((3.01, -6.02))
+    assert hit["touchdown.tilt"] == pytest.approx(0.2)
+
+
+def test_saturation_is_a_share_of_the_time_in_the_air():
+    voltage = np.where(np.arange(N) < 100, 40.0, 20.0)[:, None]
+    f = figures(flown(truth={"motor_voltage": voltage}))
+    assert f["saturation"] == pytest.approx(0.25, abs=0.01)
+
+
+def test_verdicts_are_those_of_a_single_run():
+    assert figures(flown("not finite at t = 1 s", diverged=True))["verdict"] == "diverged"
+    assert figures(flown(finished=False))["verdict"] == "timed out"
+
+
+@pytest.mark.parametrize(
+    ("text", "true"),
+    [
+        ("rmse.x < 0.1", True),
+        ("rmse.x < 0.1 and verdict == 'crashed'", False),
+        ("rmse.x < 0.1 or verdict == 'crashed'", True),
+        ("verdict in ('landed', 'flown') and not time > 5", True),
+        ("0.01 < abs(-rmse.x) * 2 <= max(0.1, time / 100)", True),
+        ("energy < 1", False),  # NaN
+        ("1 / (time - 3) < 1", False),
+    ],
+)
+def test_expressions_over_figures(text, true):
+    assert holds(text, {"rmse.x": 0.05, "verdict": "landed", "time": 3.0, "energy": np.nan}) == true
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "rmse.x <", "x = 3", "__import__('os')", "rmse.x.__class__()", "[x for x in y]", "(1).real", "f'{x}'"],
+)
+def test_nothing_else_is_an_expression(text):
+    with pytest.raises(SceneError, match=r"success.require.0: expected an expression over figures"):
+        load("hover", {"success.require": [text]})
+
+
+def test_the_default_lets_crashes_and_divergences_fail():
+    success = load("hover")[Success]
+    assert [success.unmet({"verdict": v}) != [] for v in ("landed", "timed out", "crashed", "diverged")] == [
+        False, False, True, True,
+    ]  # fmt: skip
+    with pytest.raises(SceneError, match=r"success.require.0: unknown figure 'rmse.zz'; did you mean rmse.z\?"):
+        check_success(load("hover", {"success.require": ["rmse.zz < 1"]}))
+
+
+def test_distance_and_overshoot_have_the_bits_of_numpys():
+    random = np.random.default_rng(7)
+    reference, position, armed = random.normal(size=(300, 6)), random.normal(size=(300, 3)), random.random(300) > 0.4
+    wanted, flown = reference[:, :3][armed], position[armed]
+    beyond = np.concatenate([flown.max(axis=0) - wanted.max(axis=0), wanted.min(axis=0) - flown.min(axis=0)])
+    found = _farthest(reference, position, armed)
+    assert found == (np.linalg.norm(wanted - flown, axis=1).max(), beyond.max())
+    position[np.flatnonzero(armed)[7], 1] = np.nan
+    assert np.isnan(_farthest(reference, position, armed)).all()

@@ -1,0 +1,64 @@
+"""Worker processes end with the process that they fly for, however that ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.long
+
+PATIENCE = 120.0  # [s] a generous bound; the target is a second
+SCRIPT = """
+import os, time
+from cosim.interrupt import end_at_once
+from studies.workers import workers
+
+if __name__ == "__main__":
+    end_at_once()
+    with workers(2) as pool:
+        busy = [pool.submit(time.sleep, 3600.0) for _ in range(2)]
+        while not all(job.running() for job in busy):
+            time.sleep(0.05)
+        print(*pool._processes, flush=True)
+        busy[0].result()
+"""
+
+
+def running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_workers_end_with_an_interrupted_or_killed_parent(tmp_path, number):
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("finds processes in /proc")
+    (tmp_path / "flies.py").write_text(SCRIPT)
+    paths = os.pathsep.join([str(Path.cwd()), os.environ.get("PYTHONPATH", "")])
+    parent = subprocess.Popen(
+        [sys.executable, str(tmp_path / "flies.py")],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
+    workers: list[int] = []
+    try:
+        workers = [int(pid) for pid in parent.stdout.readline().split()]
+        assert len(workers) == 2
+        assert all(map(running, workers))
+        parent.send_signal(number)
+        parent.wait(PATIENCE)
+        deadline = time.monotonic() + PATIENCE
+        while any(map(running, workers)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not [pid for pid in workers if running(pid)]
+    finally:
+        for pid in [parent.pid, *workers]:
+            if running(pid):
+                os.kill(pid, signal.SIGKILL)
+        parent.stdout.close()
+        parent.wait()
