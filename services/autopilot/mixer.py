@@ -69,8 +69,9 @@ def possible(values: PerRotor, highest: float) -> PerRotor:
 def saturate(shares: Shares, q: Demands, thrust_max: float) -> Demands:
     """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
-    Attitude comes first, then collective; yaw is given up first: it gets what room the others leave. Rotors without a
-    share of the collective, which have failed, are left out.
+    Attitude comes first, then collective; yaw is given up first: it gets what room the others leave. So demands stay
+    as they are where they are possible with their yaw and without it. Rotors without a share of the collective, which
+    have failed, are left out.
     """
     lowest = math.inf  # of what roll and pitch ask of a rotor, over its share of the collective
     for s in shares:
