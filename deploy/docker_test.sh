@@ -88,6 +88,7 @@ passed "digest equal to the local run's: $here"
 before=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")
 # shellcheck disable=SC2086
 docker rm --force $before > /dev/null
+: > compose.log # now: what is looked for below must not be found in the first flight's lines
 container() { docker ps --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" \
     --filter "label=com.docker.compose.service=$1"; }
 # shellcheck disable=SC2086
@@ -100,6 +101,7 @@ until grep -q "t = " compose.log; do
     [ $waited -lt $TIMEOUT ] || fail "the mission to be killed has not begun"
 done
 victim=$(container sensors)
+[ -n "$victim" ] || fail "no container of sensors runs"
 if docker exec "$victim" touch /app/here 2> /dev/null; then fail "a container writes to its image"; fi
 until [ "$(docker inspect --format '{{.State.Health.Status}}' "$victim")" = healthy ]; do
     sleep 1
