@@ -22,6 +22,7 @@ from statistics import median
 from pymavlink import mavutil
 
 from benchmarks._bars import Row, show
+from tests.participants import participants
 
 MISSION, GROUND = "scenes/delivery_mission.toml", "scenes/groundstation.toml"
 SECONDS = 30.0  # of real time for jitter and processor time
@@ -44,12 +45,11 @@ def start(scene, folder, *more):
 
 def adapter_ticks(process):
     """Processor time that the link's process has used [s], None before it is there."""
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    for child in children:
-        if "mavlink" in Path(f"/proc/{child}/cmdline").read_text().split("\0"):
-            fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
-            return (int(fields[11]) + int(fields[12])) / 100.0
-    return None
+    child = participants(process.pid).get("mavlink")
+    if child is None:
+        return None
+    fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / 100.0
 
 
 def first_news(folder):

@@ -1,20 +1,23 @@
-"""A process of a run as its launcher holds it. It may be started before it is known what it is given, to import
-meanwhile what it will need."""
+"""A process of a run as its launcher holds it. It may be started before it is known what it is given."""
 
+import importlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import IO, NamedTuple
 
+from cosim.forked import Forked
+
 PARTICIPANT = "services.participant"  # the module that a child runs
+FORKS = sys.platform == "linux"  # elsewhere libraries of the system may have threads before anything is flown
 
 
 class Child(NamedTuple):
     """A child of this process."""
 
-    process: subprocess.Popen
+    process: subprocess.Popen | Forked
     said: IO[bytes]  # all that it has written to its standard output and error
 
 
@@ -35,16 +38,32 @@ def start(name: str, inherited: tuple[int, ...] = (), said: IO[bytes] | None = N
     return Child(process, said)
 
 
+def _fork(name: str) -> Child:
+    """The same, with all that this process has imported."""
+    main = importlib.import_module(PARTICIPANT).main
+    said = tempfile.TemporaryFile()  # noqa: SIM115
+    return Child(Forked(lambda: main(name), said), said)
+
+
 @contextmanager
-def started_early(*names: str) -> Iterator[dict[str, Child]]:
-    """Children by name, of which `launch` takes those that it needs; the others end with the context."""
-    children = {name: start(name) for name in names}
+def started_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
+    """Children by name, of which `launch` takes those that it needs and ends the others.
+
+    They have what this process has imported, so it must not have begun threads of its own.
+    """
+    children = {name: _fork(name) if FORKS else start(name) for name in names}
     try:
         yield children
     finally:
-        for child in children.values():
-            assert child.process.stdin is not None
-            child.process.stdin.close()
-            child.process.kill()
-            child.process.wait()
-            child.said.close()
+        dismiss(children)
+
+
+def dismiss(children: dict[str, Child]) -> None:
+    """End those that nobody needs."""
+    for child in children.values():
+        assert child.process.stdin is not None
+        child.process.stdin.close()
+        child.process.kill()
+        child.process.wait()
+        child.said.close()
+    children.clear()

@@ -9,8 +9,9 @@ from types import MappingProxyType
 from typing import IO
 
 from cosim.bus import ZenohBus, mesh
-from cosim.child import Child, start
+from cosim.child import Child, dismiss, start
 from cosim.errors import RunFailed
+from cosim.forked import Forked
 from cosim.participants import Participants
 from cosim.private import private_endpoints
 from cosim.restarts import Restarts
@@ -42,7 +43,7 @@ def launch(
         beside: processes without which the run goes on.
         external: endpoints of those among `names` that somebody else starts; everybody connects to them.
         restarts: who is started again where it is killed or stopped; None: nobody.
-        started: processes that are there already (`started_early`); those that are needed are taken out.
+        started: processes that are there already (`started_early`); those that are not needed are ended.
 
     Raises:
         RunFailed: a service died or froze, or the run ended before its time.
@@ -50,7 +51,7 @@ def launch(
     """
     beside = list(beside)
     everybody = [name for name in [*beside, *names] if name not in external]  # a ground station waits for its link
-    children: dict[str, subprocess.Popen] = {}
+    children: dict[str, subprocess.Popen | Forked] = {}
     restarts = restarts or Restarts({}, lambda line: None)
     errors: dict[str, IO[bytes]] = {}
     with private_endpoints([*everybody, WATCHER]) as own, ExitStack() as stack:
@@ -59,7 +60,7 @@ def launch(
 
         def begin(some: list[str]) -> None:
             for name in some:
-                if started and name in started:
+                if started and name in started and not restarts.journal(name):
                     children[name], errors[name] = started.pop(name)
                 else:
                     children[name], errors[name] = start(name, restarts.journal(name), errors.get(name))
@@ -72,19 +73,20 @@ def launch(
         ready = [name for name in everybody if name in (started or ())]
         begin(ready)
         begin([name for name in everybody if name not in ready])
+        dismiss(started or {})
         listen, connect = mesh(WATCHER, endpoints)
         with ZenohBus(listen, connect, mark=participants.mark(WATCHER)) as bus:
             try:
                 watch = Watch(bus, participants, [*names, *beside, *external])
                 _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
             finally:
-                early = {name for name in beside if children[name].poll() is not None}
+                early = {name: code for name in beside if (code := children[name].poll()) is not None}
                 _ask_to_end(children)  # before this session closes, which takes a while
         _end(children)
-        return {name: _farewell(children[name].returncode if name in early else 0, errors[name]) for name in beside}
+        return {name: _farewell(early.get(name, 0), errors[name]) for name in beside}
 
 
-def _close(children: dict[str, subprocess.Popen], errors: dict[str, IO[bytes]]) -> None:
+def _close(children: dict[str, subprocess.Popen | Forked], errors: dict[str, IO[bytes]]) -> None:
     _end(children)
     for file in errors.values():
         file.close()
@@ -150,7 +152,7 @@ def _follow(
         raise RunFailed(early)
 
 
-def _note_stopped(children: dict[str, subprocess.Popen], since: dict[str, float]) -> None:
+def _note_stopped(children: dict[str, subprocess.Popen | Forked], since: dict[str, float]) -> None:
     """Note in `since` who is stopped, and when it was first noticed; also where it has not yet joined."""
     for name, child in children.items():
         if child.returncode is None and _stopped(child):
@@ -159,7 +161,7 @@ def _note_stopped(children: dict[str, subprocess.Popen], since: dict[str, float]
             since.pop(name, None)
 
 
-def _stopped(child: subprocess.Popen) -> bool:
+def _stopped(child: subprocess.Popen | Forked) -> bool:
     """Whether it is stopped; one that has just ended is not."""
     try:
         return os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
@@ -209,13 +211,13 @@ def _farewell(code: int, file: IO[bytes]) -> str:
     return file.read().decode(errors="replace").strip()
 
 
-def _ask_to_end(children: dict[str, subprocess.Popen]) -> None:
+def _ask_to_end(children: dict[str, subprocess.Popen | Forked]) -> None:
     for child in children.values():
         if child.poll() is None:
             child.terminate()
 
 
-def _end(children: dict[str, subprocess.Popen]) -> None:
+def _end(children: dict[str, subprocess.Popen | Forked]) -> None:
     """End what still runs: first asked, then forced."""
     _ask_to_end(children)
     deadline = time.monotonic() + GRACE

@@ -4,6 +4,7 @@ import json
 import subprocess
 from collections.abc import Callable, Iterable, Mapping
 
+from cosim.forked import Forked
 from cosim.keys import RESTARTED_KEY
 from cosim.watch import STALL, WATCHER, Watch
 
@@ -33,7 +34,7 @@ class Restarts:
         """Whether all of these may be started again."""
         return all(self._left.get(name, 0) > 0 for name in names)
 
-    def stop(self, name: str, child: subprocess.Popen) -> None:
+    def stop(self, name: str, child: subprocess.Popen | Forked) -> None:
         """Kill a service that is stopped, so that it can be started again."""
         self._reasons[name] = f"stopped for {STALL:g} s"
         child.kill()

@@ -1,12 +1,15 @@
-"""One process of a run: what it is given, and how it takes part. `python -m services.participant NAME` reads that from
-standard input, as the launcher writes it."""
+"""One process of a run: what it is given, and how it takes part. `python -m services.participant NAME`, or a fork that
+calls `main`, reads that from standard input, as the launcher writes it."""
 
 import importlib
 import json
 import os
 import struct
 import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from cosim import user_module
@@ -15,6 +18,7 @@ from cosim.setup import Setup
 from cosim.watch import WATCHER
 
 _LENGTH = struct.Struct("<Q")
+LONGEST = 15  # characters that the system keeps of a process's name
 
 
 class Participation(NamedTuple):
@@ -98,7 +102,9 @@ def take_part(given: Participation) -> None:
         security = settings(setup, given.name, given.key_prefix, given.keys)
     with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security) as bus:
         watched = WATCHER in given.peers and not given.with_parent
+        door = given.with_parent and processes.ROUTER in given.peers  # one that cannot be opened ends the run
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
+        others += [processes.ROUTER] if door else []
         compares = not given.with_parent or bool(encoded)
         pace = (given.speed, given.core, compares, given.realtime)
         journal = Journal(given.name, given.journal) if given.journal >= 0 else None
@@ -126,12 +132,13 @@ def take_part(given: Participation) -> None:
         private.remove(given.peers[given.name])
 
 
-def _import_ahead(name: str) -> None:
-    """Import what a process of this name will need, which may be before the scene is read."""
+def import_ahead(names: Iterable[str]) -> None:
+    """Import what processes of these names will need, which may be before the scene is read."""
     from services import processes
 
     importlib.import_module("cosim.lockstep")
-    importlib.import_module(f"{processes.entry(processes.encoded(name) or name).package}.service")
+    for name in names:
+        importlib.import_module(f"{processes.entry(processes.encoded(name) or name).package}.service")
 
 
 def _heard(process: Any) -> dict[str, Any]:
@@ -153,13 +160,15 @@ def _heard(process: Any) -> dict[str, Any]:
     return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
 
 
-def main() -> None:
-    """Take part as the launcher says."""
+def main(name: str) -> None:
+    """Take part as the launcher says, most likely under this name."""
     from cosim.errors import BusError, LockStepError
     from cosim.exit import leave_garbage
 
     leave_garbage()
-    _import_ahead(sys.argv[1])
+    with suppress(OSError):  # what `ps` and `top` call it, where the system has that
+        Path("/proc/self/comm").write_text(name[:LONGEST])
+    import_ahead([name])
     try:
         take_part(take_over())
     except (ValueError, BusError) as error:
@@ -174,4 +183,4 @@ def _end(message: str, code: int) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1])

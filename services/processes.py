@@ -62,6 +62,11 @@ def needed(setup: Setup, external: Iterable[str] = ()) -> list[str]:
     return own + [f"{name}{ENCODER}" for name in external]
 
 
+def usual() -> list[str]:
+    """The processes that a run may need whatever its options are."""
+    return [p.name for p in PROCESSES if not p.optional]
+
+
 def encoded(name: str) -> str:
     """The service whose messages the process of this name makes, "" for any other process."""
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""

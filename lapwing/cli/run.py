@@ -1,7 +1,7 @@
 """`lapwing run`: fly a scene, record it, and report."""
 
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -78,9 +78,8 @@ def run(
     campaign: Annotated[Path | None, typer.Option(metavar="DIR", help="the folder of the campaign of --run")] = None,
 ) -> None:
     """Fly a scene, record it, and report."""
-    # a ground station waits for its link, which loads while the scene is read
-    ahead = ["mavlink"] if mavlink and mode == "processes" and peers is None else []
-    with user_errors(), started_early(*ahead) as early:
+    asked = {"router": bool(open_), "mavlink": bool(mavlink), "foxglove": bool(foxglove), "ros2": ros2 is not None}
+    with user_errors(), _started_early(mode == "processes" and peers is None, **asked) as early:
         from cosim.realtime import why_not
         from cosim.watch import WATCHER
         from lapwing.runs.joined import check_complete, check_endpoint, elsewhere, parse_external, parse_peers
@@ -200,6 +199,26 @@ def run(
                 of = f" of {flown.vehicle}" if loaded.vehicles else ""
                 why = f"{flown.verdict.kind}; success.require: {'; '.join(unmet)}"
                 fail(f"the flight{of} has failed: {why}", FLIGHT_FAILED)
+
+
+@contextmanager
+def _started_early(in_processes: bool, **options: bool) -> Iterator[dict[str, Child]]:
+    """The processes of a run, before the scene is read: they need not import what this one has imported by then.
+
+    Args:
+        in_processes: whether there will be any.
+        options: whether one is asked for that runs only then; it imports what it alone needs while the scene is read.
+    """
+    if not in_processes:
+        yield {}
+        return
+    from services.participant import import_ahead
+    from services.processes import usual
+
+    names = usual()
+    import_ahead(names)
+    with started_early([*names, *(name for name, wanted in options.items() if wanted)]) as early:
+        yield early
 
 
 def _fly(given: "Participation", log: Path, view: bool, early: dict[str, Child]) -> "Elapsed":

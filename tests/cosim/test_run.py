@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from cosim.bus import ZenohBus
-from cosim.child import PARTICIPANT
 from cosim.log import LogReader
 from cosim.log.recover import recover
 from lapwing.runs.single import fly_single
 from messages import BodyStates, VehicleState
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
+from tests.participants import participants
 
 pytestmark = pytest.mark.long
 
@@ -68,11 +68,7 @@ class Running:
         while not self._recorded() > 100 and self.launcher.poll() is None and time.monotonic() < deadline:
             time.sleep(0.1)
         assert self.launcher.poll() is None, self.launcher.stderr.read()
-        pid = self.launcher.pid
-        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-        commands = {int(child): Path(f"/proc/{child}/cmdline").read_text().split("\0") for child in found}
-        participants = {child: c for child, c in commands.items() if PARTICIPANT in c}
-        self.children = {c[c.index(PARTICIPANT) + 1]: child for child, c in participants.items()}
+        self.children = participants(self.launcher.pid)
         assert set(self.children) >= SERVICES
 
     def _recorded(self):

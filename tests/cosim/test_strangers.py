@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from cosim.bus import ZenohBus, mesh
-from cosim.child import PARTICIPANT
 from cosim.keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, STEP_KEY
 from cosim.log import LogReader
 from cosim.participants import Participants, new_secret
 from cosim.private import private_endpoints
 from messages.attachment import pack
 from services.common.operator import OPERATOR_KEY
+from tests.participants import participants
 
 SCENE = "scenes/hover.toml"
 PREFIX = "test-strangers"
@@ -118,10 +118,9 @@ def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path
     while not (sockets := {s.name: s for s in tmp_path.glob("lapwing-*/*") if s.is_socket()}).keys() >= names:
         assert run.poll() is None, run.communicate()
         time.sleep(0.05)
-    children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-    participants = [pid for pid in children if PARTICIPANT in Path(f"/proc/{pid}/cmdline").read_text()]
-    assert len(participants) == 4
-    assert not any(listening(pid) for pid in [run.pid, *participants])
+    flying = participants(run.pid)
+    assert flying.keys() == names - {"mission"}
+    assert not any(listening(pid) for pid in [run.pid, *flying.values()])
 
     ends = [f"unixsock-stream/{socket}" for socket in sockets.values()]
     with ZenohBus(connect=ends) as stranger:

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import studies.fly
-from cosim.child import PARTICIPANT
 from cosim.log import LogReader
-from services.table import load
+from services.processes import needed
+from services.table import load, resolve
 from tests.faults import cut
 from tests.faults.kinds import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
+from tests.participants import participants
 
 SCENES = {  # overrides that make a flight of a few seconds
     "hover": ["run.duration=5"],
@@ -99,12 +100,12 @@ def _fly(trial: Trial, folder: Path, log: Path) -> Outcome:
             env={**os.environ, "TMPDIR": str(folder), **cold},
             cwd=Path(__file__).parents[2],
         )
-        while not at_once and not _children(launcher.pid) and launcher.poll() is None:
+        while not at_once and not participants(launcher.pid) and launcher.poll() is None:
             time.sleep(0.05)
         time.sleep(trial.delay)
-        children = _children(launcher.pid)
+        children = participants(launcher.pid)
         everybody = {**children, LAUNCHER: launcher.pid}
-        names = sorted(children)
+        names = [name for name in sorted(children) if name in _needed(trial.scene)]  # others are there at first
         if trial.kind in RESTARTED:
             names = [name for name in names if name in undisturbed(trial.scene).services]
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
@@ -117,7 +118,7 @@ def _fly(trial: Trial, folder: Path, log: Path) -> Outcome:
         struck = time.monotonic()
         wrong = []
         if (victim, trial.kind) == (LAUNCHER, "freeze"):
-            _gone(_children(launcher.pid) | children, FROZEN)
+            _gone(participants(launcher.pid) | children, FROZEN)
             os.kill(launcher.pid, signal.SIGCONT)
         try:
             launcher.wait(TIMEOUT)
@@ -171,6 +172,12 @@ def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> l
     return [] if last >= flown - RECOVERED else [f"the log ends at {last:.3f} s, struck at {flown:.3f} s"]
 
 
+@cache
+def _needed(scene: str) -> list[str]:
+    """The processes of the run of a scene of a trial."""
+    return needed(resolve(load(scene, SCENES[scene])))
+
+
 class Undisturbed(NamedTuple):
     """A run to which nothing is done."""
 
@@ -196,18 +203,6 @@ def _fill(path: Path) -> None:
     with suppress(OSError), path.open("wb", buffering=0) as file:
         while True:
             file.write(bytes(4096))
-
-
-def _children(pid: int) -> dict[str, int]:
-    """Process ids of the participants, by name."""
-    found = {}
-    with suppress(OSError):
-        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-            with suppress(OSError):
-                words = Path(f"/proc/{child}/cmdline").read_text().split("\0")
-                if PARTICIPANT in words:
-                    found[words[words.index(PARTICIPANT) + 1]] = int(child)
-    return found
 
 
 def _gone(pids: dict[str, int], seconds: float) -> list[str]:

@@ -20,6 +20,7 @@ from services.mavlink.dialect import mavlink
 from services.mavlink.links import check
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
+from tests.participants import participants
 
 pytestmark = pytest.mark.long
 
@@ -36,15 +37,8 @@ def run(tmp_path, key_prefix, *more, **options):
 
 def adapter_of(process):
     """Process id of the link of a run, once it is there."""
-    found = []
-
-    def look():
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        found.extend(c for c in children if "mavlink" in Path(f"/proc/{c}/cmdline").read_text().split("\0"))
-        return found
-
-    assert until(look, 120.0)
-    return int(found[0])
+    assert until(lambda: "mavlink" in participants(process.pid), 120.0)
+    return participants(process.pid)["mavlink"]
 
 
 def heard(connection, kind, seconds=120.0):

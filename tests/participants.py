@@ -1,0 +1,19 @@
+"""The processes of a run, found from outside by what the system calls them."""
+
+from contextlib import suppress
+from pathlib import Path
+
+from services.processes import PROCESSES
+
+
+def participants(launcher):
+    """Process numbers of a launcher's children that take part, by name."""
+    names = {process.name for process in PROCESSES}
+    found = {}
+    with suppress(OSError):
+        for child in Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split():
+            with suppress(OSError):
+                name = Path(f"/proc/{child}/comm").read_text().strip()
+                if name in names:
+                    found[name] = int(child)
+    return found
