@@ -7,6 +7,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import IO, NoReturn
 
 POLL = 0.005  # [s] between two looks at whether it has ended
@@ -82,7 +83,10 @@ def _run(run: Callable[[], None], standard_input: int, said: int) -> NoReturn:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         for here, there in ((standard_input, 0), (said, 1), (said, 2)):
             os.dup2(here, there)
-        os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # among them the standard input of those before it
+        for number in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of those before it
+            if number > 2:
+                with suppress(OSError):
+                    os.close(number)
         sys.stdout, sys.stderr = (open(number, "w", buffering=1, closefd=False) for number in (1, 2))  # noqa: SIM115
         code = _code_of(run)
         sys.stdout.flush()
