@@ -134,6 +134,8 @@ class EnvironmentTable(Section):
             return  # refused with its key once all tables are there
         grid, key = given.terrain.grid, "environment.terrain.grid"
         if grid is None or grid.file is None:
+            if grid and grid.reach is not None:
+                raise KeyedError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
             return
         if grid.heights is not None:
             raise KeyedError(key, "has file and heights", "one of them")
