@@ -108,7 +108,7 @@ def effects(
 
 @app.command()
 def accuracy(
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (TOML)")],
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (name or file)")],
     set_: Overrides = None,
     goal: Annotated[
         float | None, typer.Option("--target", metavar="ERROR", help="name the cheapest choice that meets it: 1e-6")

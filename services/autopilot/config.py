@@ -1,5 +1,6 @@
 """The `[autopilot]` of a scene: gains, what the controller flies on, and the attitude loop."""
 
+import math
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -7,15 +8,18 @@ from pydantic import Field
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics.errors import KeyedError
+from services.autopilot import motor_limits
 from services.autopilot.distance import distance_sensor
 from services.autopilot.gains import FOLDER, GainSet
 from services.autopilot.known_airframe import known_airframe
 from services.autopilot.law import build
 from services.common import modules, parameters, user_code
+from services.common.environment import environment
 from services.common.parameter_file import parse
 
 ESTIMATORS = ("sensors", "truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
+WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unreliable
 
 Option = bool | int | float | str | list[float]
 
@@ -60,12 +64,14 @@ class Autopilot(Section):
         if not self.trajectory and not self.operator:
             message = "false leaves nobody to say what to fly; set operator = true too"
             raise KeyedError("autopilot.trajectory", message)
+        told = known_airframe(scene)
         try:
-            build(scene[GainSet].plain(), known_airframe(scene))
+            build(scene[GainSet].plain(), told)
         except KeyedError:
             raise
         except ValueError as error:
             raise KeyedError("airframe", str(error)) from None
+        motor_limits.check(scene, told)
         for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 message = "nobody to take them"
@@ -74,6 +80,10 @@ class Autopilot(Section):
             missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
                 raise KeyedError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
+            horizontal = math.hypot(*environment(scene).magnetic_field_world[:2])
+            if horizontal < WEAKEST_FIELD:
+                message = f"got {horizontal:.1g} T across the vertical, of which the estimator takes its heading"
+                raise KeyedError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
             reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
             sensor = parameters.HEIGHT_SENSORS[reference]
             known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor

@@ -3,21 +3,10 @@
 import math
 
 from cosim.scene import Scene
-from dynamics.atmosphere import density
-from dynamics.kernel import uncompiled
-from dynamics.vehicles.multirotor import STANDARD_DENSITY
 from services.autopilot.law import Airframe, lift, moments
 from services.autopilot.motor import Motor
-from services.common.environment import environment
+from services.common import vehicle
 from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height
-
-
-def _density(scene: Scene) -> float:
-    """[kg/m^3] of the air at home, as far as the scene has it depend on the altitude."""
-    around = environment(scene)
-    if "air_density" not in scene[Effects].tables:
-        return STANDARD_DENSITY
-    return float(uncompiled(density)(around.atmosphere, around.home.height))
 
 
 def known_airframe(scene: Scene) -> Airframe:
@@ -25,7 +14,7 @@ def known_airframe(scene: Scene) -> Airframe:
     frame = airframe(scene)
     rotor = rotor_constants(scene)
     torque_per_thrust = rotor.torque / rotor.thrust
-    thrust_coefficient = (_density(scene) if rotor.with_density else 1.0) * rotor.thrust
+    thrust_coefficient = vehicle.thrust_coefficient(scene)
     weight = frame.mass.total * gravity(scene) / len(frame.rotors.position)
     slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
     spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0

@@ -59,8 +59,7 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
     """
     thrust_max = uncompiled(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
     weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
-    share = shares(airframe)
-    needed = weight * max(collective for collective, *_ in share[0])
+    share, needed = shares(airframe), hover_thrust(airframe)
     if thrust_max <= needed:
         raise ValueError(
             f"the rotors give at most {thrust_max:.1f} N each, less than the {needed:.1f} N that hovering needs"
@@ -85,6 +84,12 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         motor=airframe.motor,
         resting_height=airframe.resting_height,
     )
+
+
+def hover_thrust(airframe: Airframe) -> float:
+    """Thrust [N] in hover of the rotor that carries the most."""
+    weight = airframe.mass * airframe.gravity / lift(airframe)
+    return weight * max(collective for collective, *_ in shares(airframe)[0])
 
 
 def lift(airframe: Airframe) -> float:

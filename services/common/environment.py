@@ -2,14 +2,12 @@
 
 import datetime
 from functools import lru_cache
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cosim.scene import Files, Scene, Section
-from cosim.scene.files import named
 from dynamics.atmosphere import Atmosphere
 from dynamics.environment import (
     FIRST_YEAR,
@@ -21,6 +19,7 @@ from dynamics.environment import (
 from dynamics.errors import KeyedError
 from dynamics.geodesy import Home, normal_gravity
 from dynamics.terrain import Level, Relief, relief
+from services.common import height_file
 
 Length = Annotated[float, Field(gt=0.0, le=1e4)]
 Place = Annotated[float, Field(ge=-1e5, le=1e5)]
@@ -56,10 +55,11 @@ class Steps(Table):
 class Grid(Table):
     """Heights of points of a grid, bilinear between them, beyond it as at its edge; they count from that at home."""
 
-    file: str | None = None  # path of an .npy array relative to the scene, rows along world y, columns along x
+    file: str | None = None  # path relative to the scene: an .npy array, rows along world y, columns along x; a GeoTIFF
     heights: tuple[Heights, ...] | None = Field(default=None, strict=False)  # [m] the same here; one of both
-    corner: Pair = (0.0, 0.0)  # [m] world x and y of the first row and column
+    corner: Pair | None = None  # [m] world x and y of the first row and column; (0, 0), or what follows from reach
     spacing: Length = 1.0  # [m] between neighbours
+    reach: Length | None = None  # [m] from home to each side of the square that is taken out of a GeoTIFF
 
 
 class Box(Table):
@@ -107,7 +107,7 @@ class Terrain(Table):
             [(*box.position, *box.size, box.heading, box.top) for box in self.box],
             [(*cylinder.position, cylinder.radius, cylinder.top) for cylinder in self.cylinder],
             np.array(grid.heights) if grid else None,
-            grid.corner if grid else (0.0, 0.0),
+            grid.corner or (0.0, 0.0) if grid else (0.0, 0.0),
             grid.spacing if grid else 1.0,
         )
 
@@ -128,12 +128,29 @@ class EnvironmentTable(Section):
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """The heights of a grid's file become its `heights`."""
-        grid = named({"terrain": named(tree, "environment", "terrain")}, "terrain", "grid")
-        if not isinstance(grid, dict) or not isinstance(file := grid.get("file"), str):
+        try:
+            given = cls.model_validate(tree.get(cls.TABLE, {}))
+        except ValidationError:
+            return  # refused with its key once all tables are there
+        grid, key = given.terrain.grid, "environment.terrain.grid"
+        if grid is None or grid.file is None:
+            if grid and grid.reach is not None:
+                raise KeyedError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
             return
-        if "heights" in grid:
-            raise KeyedError("environment.terrain.grid", "has file and heights", "one of them")
-        grid["heights"] = _heights("environment.terrain.grid.file", files.folder / file)
+        if grid.heights is not None:
+            raise KeyedError(key, "has file and heights", "one of them")
+        path, table = files.folder / grid.file, tree[cls.TABLE]["terrain"]["grid"]
+        if path.suffix in height_file.GEOTIFF:
+            points = _points(grid, key)
+            heights = height_file.of_geotiff(f"{key}.file", path, given.home, points, grid.spacing)
+            table["corner"] = [-points * grid.spacing] * 2
+        elif path.suffix != ".npy":
+            raise KeyedError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")
+        elif grid.reach is not None:
+            raise KeyedError(f"{key}.reach", "of an array all is taken", "none, or a GeoTIFF")
+        else:
+            heights = height_file.of_array(f"{key}.file", path)
+        table["heights"] = heights.tolist()
 
     def check(self, scene: Scene) -> None:
         """There is such a day, and such a ground."""
@@ -172,19 +189,19 @@ def _day(date: str) -> datetime.date:
     return day
 
 
-def _heights(key: str, path: Path) -> list[list[float]]:
-    """The array of an .npy file as lists. KeyedError where it is none."""
-    if path.suffix != ".npy":
-        raise KeyedError(key, f"got {path.name!r}", "the path of an .npy file")
-    try:
-        found = np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise KeyedError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
-    except (ValueError, EOFError) as error:
-        raise KeyedError(key, f"{path}: {error}", "an array of numbers, as numpy.save writes it") from None
-    if found.ndim != 2 or found.dtype.kind not in "fiu":
-        raise KeyedError(key, f"{path}: {found.ndim} dimensions of {found.dtype}", "two dimensions of numbers")
-    return found.astype(float).tolist()
+def _points(grid: Grid, key: str) -> int:
+    """How many points of a GeoTIFF's grid there are from home to each side."""
+    if grid.reach is None:
+        raise KeyedError(f"{key}.reach", "missing", "[m] from home to each side of what is taken out of the GeoTIFF")
+    if grid.corner is not None:
+        raise KeyedError(f"{key}.corner", "follows from reach", "none beside a GeoTIFF")
+    points = int(grid.reach / grid.spacing)
+    if points < 1:
+        raise KeyedError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
+    if (2 * points + 1) ** 2 > height_file.MOST:
+        expected = f"at most {height_file.MOST} points: a shorter reach or a wider spacing"
+        raise KeyedError(f"{key}.spacing", f"got {grid.spacing:g} over a reach of {grid.reach:g} m", expected)
+    return points
 
 
 def environment(scene: Scene) -> Environment:

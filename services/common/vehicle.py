@@ -8,14 +8,17 @@ from pydantic import ConfigDict, Field
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics import effects
+from dynamics.atmosphere import density
 from dynamics.effects.rotor_quadratic import RotorQuadratic
 from dynamics.effects.rotor_table import RotorTable
 from dynamics.effects.rotor_thrust import RotorThrust
 from dynamics.errors import KeyedError
+from dynamics.kernel import uncompiled
 from dynamics.lie.quaternion import Quaternion, rotate
 from dynamics.terrain import Level, Relief, surface
 from dynamics.vector import Vec3
 from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.multirotor import STANDARD_DENSITY
 from dynamics.vehicles.standing import Pose, standing_pose
 from services.common import mesh
 from services.common.environment import environment
@@ -23,6 +26,7 @@ from services.common.named_tables import NamedTables
 from services.common.sections import SHIPPED, Pair
 
 BURIED = 1e-6  # [m]
+STEEPEST_START = 46.0  # [deg] that a vehicle leans at its start: ground is at most 45 degrees steep
 
 
 class Vehicle(Section):
@@ -153,6 +157,16 @@ def rotor_constants(scene: Scene) -> RotorConstants:
     return RotorConstants(known.thrust_constant, known.torque_constant, True)
 
 
+def thrust_coefficient(scene: Scene) -> float:
+    """Thrust of a rotor over the square of its speed [N s^2/rad^2], in the air of home."""
+    rotor, around = rotor_constants(scene), environment(scene)
+    if not rotor.with_density:
+        return rotor.thrust
+    if "air_density" not in scene[Effects].tables:
+        return STANDARD_DENSITY * rotor.thrust
+    return float(uncompiled(density)(around.atmosphere, around.home.height)) * rotor.thrust
+
+
 def gravity(scene: Scene) -> float:
     """Gravity at home [m/s^2]: that of whichever effect gives one, 0 without."""
     return next((e.acceleration_at_home for e in active(scene) if hasattr(e, "acceleration_at_home")), 0.0)
@@ -163,8 +177,18 @@ def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
     pose = standing_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
     if not isinstance(terrain, Level):
+        _upright(pose)
         _above_ground(airframe(scene), terrain, pose)
     return pose
+
+
+def _upright(pose: Pose) -> None:
+    """KeyedError where the feet find no ground side by side, as where a wall is under one of them."""
+    upward = rotate(pose[1], (0.0, 0.0, 1.0))[2]
+    lean = math.degrees(math.acos(min(upward, 1.0)))
+    if lean > STEEPEST_START:
+        message = f"no place for the vehicle at its start: on its feet it would lean by {lean:.0f} degrees"
+        raise KeyedError("environment.terrain", message, "room for the vehicle where it starts")
 
 
 def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
@@ -177,7 +201,7 @@ def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
         if under > BURIED:
             place = ", ".join(f"{p:g}" for p in part)
             message = f"buries the start: the vehicle's ({place}) m would be {under:.2f} m below the ground"
-            raise KeyedError("environment.terrain", message, "room for the vehicle at home")
+            raise KeyedError("environment.terrain", message, "room for the vehicle where it starts")
 
 
 def start_place(scene: Scene) -> Vec3:

@@ -95,8 +95,8 @@ def wires(frame: str, port: Port, p: Airspeed) -> list[Wire]:
     return [Wire(topic.AIRSPEED, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))]
 
 
-# Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Zero point (0.2 Pa) and span (3 % of the
-# value) could not be verified. Noise and resolution: chosen.
+# Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Resolution: 20 counts a pascal, the scale
+# in PX4's and ArduPilot's drivers. Chosen: zero point, span and noise (the sheet's tables were not at hand).
 SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
 
 PRESETS = {"sdp33": SDP33, "ideal": Airspeed()}

@@ -109,15 +109,15 @@ def wires(frame: str, port: Port, p: OpticalFlow) -> list[Wire]:
     return [Wire(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))]
 
 
-# PixArt PMW3901MB: 7.4 rad/s at the most by its data sheet (as discuss.px4.io/t/19364 cites it), from 80 mm on. Noise,
-# focal length and the range of texture: chosen.
+# PixArt PMW3901MB data sheet, as PX4's driver cites it (src/drivers/optical_flow/pmw3901): 7.4 rad/s at the most, from
+# 80 mm on, no farthest distance; texture up to 30 m is that driver's assumption. Noise, focal length: chosen.
 PMW3901 = OpticalFlow(
     noise_rad_per_s_per_sqrt_hz=0.01,
     gyro_noise_dps_per_sqrt_hz=0.01,
     scale_error=0.02,
     flow_max=7.4,
     range_min=0.08,
-    range_max=20.0,
+    range_max=30.0,
 )
 
 PRESETS = {"pmw3901": PMW3901, "ideal": OpticalFlow()}

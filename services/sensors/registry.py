@@ -1,6 +1,7 @@
 """Which sensors there are, and their parameters from a scene's tables."""
 
 import importlib
+import math
 import pkgutil
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -65,6 +66,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
     kind: Any = type(preset)
     try:
         p = _adapter(kind).validate_python(_merged(preset, values))
+        _check_limits(p)
         if hasattr(module, "check"):
             module.check(p)
         if not hasattr(p, "faults"):
@@ -81,6 +83,21 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
 @cache
 def _adapter(cls: Any) -> TypeAdapter:
     return TypeAdapter(cls, config={"extra": "forbid", "allow_inf_nan": True})
+
+
+def _check_limits(p: Any) -> None:
+    """KeyedError where a range is empty, or a number infinite that is no limit: infinite limits are none."""
+    for key, value in p._asdict().items():
+        if hasattr(value, "_asdict"):
+            try:
+                _check_limits(value)
+            except KeyedError as error:
+                raise error.under(key) from None
+        elif value == math.inf and p._field_defaults.get(key) != math.inf:
+            raise KeyedError(key, "got inf", "a finite number")
+    least, most = getattr(p, "range_min", 0.0), getattr(p, "range_max", math.inf)
+    if least >= most:
+        raise KeyedError("range_min", f"got {least:g}", f"less than range_max = {most:g} m")
 
 
 def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from cosim.scene import Scene
 from dynamics import discovery
+from services.common.sections import SHIPPED
 from services.table import load
 from studies.accuracy.problem import Problem
 from studies.accuracy.systems import problems
@@ -20,12 +21,13 @@ def find(target: str) -> Problem:
 
 
 def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:
-    """The scene that a target names, None where it names a problem.
+    """The scene that a target names, by its path or, where no problem has its name, by that; None for a problem.
 
     Raises:
         ValueError: no sound scene, or overrides without one.
     """
-    if target.endswith(".toml"):
+    shipped = target not in problems() and (SHIPPED / f"{target}.toml").is_file()
+    if target.endswith(".toml") or shipped:
         return load(Path(target), overrides)
     if overrides := list(overrides):
         raise ValueError(f"--set {overrides[0]}: {target} is no scene, and has no keys to override")

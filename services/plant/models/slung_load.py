@@ -12,7 +12,7 @@ from dynamics.vector import Vec3
 from dynamics.vehicles import multirotor_slung
 from dynamics.vehicles.multirotor_slung import Sling
 from services.common.environment import environment
-from services.common.vehicle import Vehicle, VehicleAirframe, active, airframe
+from services.common.vehicle import Vehicle, VehicleAirframe, active, airframe, gravity, thrust_coefficient
 from services.plant.config import Solver
 from services.plant.cores.slung_load import SlungLoadView
 from services.plant.models import reduced
@@ -40,10 +40,22 @@ class SlungLoad(Section):
             raise KeyedError(
                 NAME, f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "{NAME}"'
             )
+        _check_weight(scene)
         fastest = multirotor_slung.frequency(_sling(scene), airframe(scene).mass.total)
         if scene[Solver].step * fastest > FASTEST:
             message = f"the load on the taut cable swings along it with {fastest:.0f} rad/s"
             raise KeyedError("solver.step", message, f"at most {FASTEST / fastest:.1g} s, or a softer cable")
+
+
+def _check_weight(scene: Scene) -> None:
+    """The rotors lift vehicle and load."""
+    frame, load = airframe(scene), scene[SlungLoad].mass
+    fastest = frame.motor.max_voltage / frame.motor.rotor_constant
+    lift = len(frame.rotors.position) * thrust_coefficient(scene) * fastest**2
+    weight = (frame.mass.total + load) * gravity(scene)
+    if lift <= weight:
+        message = f"got {load:g}: the rotors lift at most {lift:.0f} N, vehicle and load weigh {weight:.0f} N"
+        raise KeyedError(f"{NAME}.mass", message, "a lighter load [kg]")
 
 
 def _sling(scene: Scene) -> Sling:

@@ -92,6 +92,10 @@ def test_a_recorded_scene_has_the_same_environment_without_its_files(tmp_path):
         ({"terrain": {"grid": {"heights": [[0.0, float("nan")]]}}}, "heights.0.1: expected a finite number, got nan"),
         ({"terrain": {"grid": {"spacing": 1.0}}}, "terrain.grid: expected heights, or a file of them, got neither"),
         ({"terrain": {"grid": {"file": "no.npy"}}}, "no.npy: no such file or directory"),
+        (
+            {"terrain": {"grid": {"heights": [[0.0, 1.0], [0.0, 1.0]], "reach": 5.0}}},
+            "grid.reach: of heights all are taken; expected none, or a GeoTIFF",
+        ),
         ({"terrain": {"steps": {"distance": [1.0], "rise": []}}}, "steps.rise: expected one for each of the 1, got 0"),
     ],
 )
@@ -108,6 +112,18 @@ def test_a_body_that_buries_the_start_is_refused():
         SceneError, match=r"environment.terrain: buries the start: the vehicle's \(0, 0, 0\) m would be"
     ):
         resolve(load("hover", pillar))
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        {"steps": {"distance": [0.1], "rise": [3.0]}},
+        {"box": [{"position": [0.3, 0.0], "size": [0.2, 4.0], "top": 5.0}]},
+    ],
+)
+def test_a_wall_under_a_foot_leaves_no_place_to_start(terrain):
+    with pytest.raises(SceneError, match=r"environment.terrain: no place .* it would lean by 8\d degrees"):
+        resolve(load("hover", {"environment.terrain": terrain}))
 
 
 def test_on_a_roof_it_stands_on_the_roof():

@@ -2,6 +2,7 @@
 
 import pytest
 
+from dynamics.errors import KeyedError
 from services.sensors import registry
 
 
@@ -50,6 +51,25 @@ def test_bad_tables_are_refused_in_one_line(table, words):
         registry.parameters("imu", table, 0.004)
     assert all(word in str(error.value) for word in words)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "table", "said"),
+    [
+        ("imu", {"gyro": {"noise_dps_per_sqrt_hz": float("inf")}}, "imu.gyro.noise_dps_per_sqrt_hz: expected a finite"),
+        ("airspeed", {"scale_error": float("nan")}, "airspeed.scale_error: expected a number at least 0 and below 1"),
+        ("sonar", {"range_min": 8.0}, "sonar.range_min: expected less than range_max = 7.65 m, got 8"),
+        ("rangefinder", {"range_max": 0.05}, "rangefinder.range_min: expected less than range_max = 0.05 m, got 0.05"),
+        ("optical_flow", {"range_min": 31.0}, "optical_flow.range_min: expected less than range_max = 30 m, got 31"),
+    ],
+)
+def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, said):
+    with pytest.raises(KeyedError, match=said):
+        registry.parameters(sensor, table, 0.004)
+
+
+def test_a_limit_may_be_infinite():
+    assert registry.parameters("rangefinder", {"range_max": float("inf")}, 0.004).range_max == float("inf")
 
 
 def test_an_unknown_sensor_lists_the_choices():

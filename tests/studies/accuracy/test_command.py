@@ -9,7 +9,7 @@ from studies.accuracy import command, table
 from studies.accuracy.measure import Point, cheapest, check_target, measure, telling
 from studies.accuracy.plot import draw
 from studies.accuracy.problem import Outcome, Problem, Way
-from studies.accuracy.targets import find
+from studies.accuracy.targets import find, scene_of
 from studies.terminal import console
 
 
@@ -75,6 +75,12 @@ def test_a_misspelt_target_lists_the_choices():
         ValueError, match=r"unknown problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? \(problems: .*free"
     ):
         find("gyrostat_bloked")
+
+
+def test_a_scene_goes_by_its_name_where_no_problem_has_it():
+    assert scene_of("delivery_paper", ["solver.step=0.002"]).lookup("solver.step") == 0.002
+    assert scene_of("gyrostat_blocked", []) is None
+    assert scene_of("scenes/gyrostat_blocked.toml", []).name == "gyrostat_blocked"
 
 
 def test_json_and_picture(tmp_path):

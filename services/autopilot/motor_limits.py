@@ -1,0 +1,32 @@
+"""Whether the motors can hover within the limits that `motor_electrics` keeps."""
+
+import math
+
+from cosim.scene import Scene
+from dynamics.errors import KeyedError
+from services.autopilot.law import Airframe, hover_thrust
+from services.common.vehicle import Effects, airframe
+
+
+def check(scene: Scene, known: Airframe) -> None:
+    """A motor in hover keeps its current, power and voltage (theory.md, eq. (2.9)).
+
+    Raises:
+        KeyedError: it does not; `airframe.motor` is the key.
+    """
+    if "motor_electrics" not in scene[Effects].tables:
+        return
+    frame = airframe(scene)
+    motor, constant = frame.motor, frame.motor.rotor_constant
+    thrust = hover_thrust(known)
+    speed = math.sqrt(thrust / known.motor.thrust_coefficient)
+    current = thrust * known.torque_per_thrust / (motor.belt_efficiency * constant) + motor.no_load_current
+    voltage = constant * speed + (motor.resistance + motor.esc_resistance) * current
+    for needed, limit, unit in (
+        (current, frame.motor_current_limit, "A"),
+        (current * voltage, motor.power_limit, "W"),
+        (voltage, motor.max_voltage, "V"),
+    ):
+        if needed >= limit:
+            message = f"hovering takes {needed:.1f} {unit} of a motor, which gets {limit:.1f} {unit} at the most"
+            raise KeyedError("airframe.motor", message, "a lighter vehicle, or higher limits of motor, ESC and battery")

@@ -1,0 +1,86 @@
+"""Heights of the ground from a file: a numpy array, or a GeoTIFF brought onto metres east and north of home."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynamics.errors import KeyedError
+from dynamics.geodesy import Home
+
+GEOTIFF = (".tif", ".tiff")
+METRES = ("", "m", "metre", "meter")  # what a band says of its unit; most files say nothing
+MOST = 1_000_000  # points that a scene keeps
+
+
+def of_array(key: str, path: Path) -> np.ndarray:
+    """The array of an .npy file.
+
+    Raises:
+        KeyedError: there is none of numbers in two dimensions; `key` is what names the file.
+    """
+    try:
+        found = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise KeyedError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    except (ValueError, EOFError) as error:
+        raise KeyedError(key, f"{path}: {error}", "an array of numbers, as numpy.save writes it") from None
+    if found.ndim != 2 or found.dtype.kind not in "fiu":
+        raise KeyedError(key, f"{path}: {found.ndim} dimensions of {found.dtype}", "two dimensions of numbers")
+    return found.astype(float)
+
+
+def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) -> np.ndarray:
+    """Heights of a GeoTIFF on a square about home, bilinear (theory.md, section 2.9).
+
+    Args:
+        key: that names the file, for messages.
+        path: of the file, in any coordinate system that it states.
+        home: centre of the square.
+        points: from home to each side.
+        spacing: [m] between neighbours.
+
+    Returns:
+        [m] rows from south to north, columns from west to east, shape (2 points + 1, 2 points + 1).
+
+    Raises:
+        KeyedError: rasterio is missing, the file is none of heights in metres, or it does not cover the square.
+    """
+    try:
+        import rasterio
+        from rasterio.warp import Resampling, reproject
+    except ImportError:
+        raise KeyedError(key, "rasterio is not installed; pip install lapwing[geotiff]") from None
+    side = 2 * points + 1
+    east_north = f"+proj=aeqd +lat_0={home.latitude_deg!r} +lon_0={home.longitude_deg!r} +datum=WGS84 +units=m"
+    edge = (points + 0.5) * spacing  # a pixel is an area about its point
+    heights = np.full((side, side), np.nan)
+    try:
+        with rasterio.open(path) as file:
+            _check(key, path, file)
+            reproject(
+                rasterio.band(file, 1),
+                heights,
+                dst_crs=east_north,
+                dst_transform=rasterio.transform.from_origin(-edge, edge, spacing, spacing),
+                dst_nodata=np.nan,
+                resampling=Resampling.bilinear,
+                tolerance=0.0,
+            )
+            heights = heights[::-1] * file.scales[0] + file.offsets[0]
+    except rasterio.errors.RasterioError as error:
+        raise KeyedError(key, f"{path}: {error}", "a GeoTIFF of heights") from None
+    if np.isnan(heights).any():
+        row, column = np.argwhere(np.isnan(heights))[0] - points
+        where = f"({column * spacing:g}, {row * spacing:g})"
+        raise KeyedError(key, f"{path} has no height at {where} m of home", "a file that covers grid.reach about home")
+    return heights
+
+
+def _check(key: str, path: Path, file: Any) -> None:
+    if file.count != 1:
+        raise KeyedError(key, f"{path} has {file.count} bands", "one band of heights")
+    if file.crs is None:
+        raise KeyedError(key, f"{path} states no coordinate system", "a GeoTIFF that does")
+    if (unit := file.units[0] or "").lower() not in METRES:
+        raise KeyedError(key, f"{path} has heights in {unit!r}", "metres")

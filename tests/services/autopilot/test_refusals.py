@@ -1,0 +1,48 @@
+"""What the autopilot could not fly is refused before it flies."""
+
+import pytest
+
+from cosim.scene import SceneError
+from dynamics.vehicles import performance
+from dynamics.vehicles.airframe import load_airframe
+from services.common.sections import SHIPPED
+from services.table import load
+
+DRONE = load_airframe(SHIPPED / "vehicles" / "delivery_drone.toml")
+ELECTRIC = {"effects.motor_electrics": {}}
+SENSORS = {"autopilot.estimator": "sensors", "sensors": {"imu": {}, "magnetometer": {}, "gps": {}}}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        ({"airframe.mass.total": 25.0}, "the rotors give at most 48.3 N each, less than the 61.3 N"),
+        ({"airframe.motor.peak_current": 3.0, **ELECTRIC}, "A of a motor, which gets 3.0 A at the most"),
+        ({"airframe.battery.c_rating": 1.0, **ELECTRIC}, "A of a motor, which gets 2.5 A at the most"),
+        ({"airframe.motor.peak_power": 20.0, **ELECTRIC}, "W of a motor, which gets 20.0 W at the most"),
+        ({"airframe.motor.max_voltage": 32.0, **ELECTRIC}, "V of a motor, which gets 32.0 V at the most"),
+    ],
+)
+def test_a_vehicle_that_cannot_hover(overrides, said):
+    with pytest.raises(SceneError, match=f"airframe.*{said}"):
+        load("hover", overrides)
+
+
+def test_the_limit_is_that_of_the_performance_card():
+    """Just below its maximum thrust the vehicle is taken, just above it is not."""
+    heaviest = performance.maximum_thrust(DRONE, 1.225) / performance.GRAVITY
+    scene = {**ELECTRIC, "environment.home.height": 0.0}
+    load("hover", {**scene, "vehicle.mass": 0.999 * heaviest})
+    with pytest.raises(SceneError, match="hovering takes"):
+        load("hover", {**scene, "vehicle.mass": 1.001 * heaviest})
+
+
+def test_a_slung_load_that_the_rotors_cannot_lift():
+    with pytest.raises(SceneError, match=r"slung_load.mass: expected a lighter load .*got 20: the rotors lift at most"):
+        load("slung_load", {"slung_load.mass": 20.0})
+
+
+def test_a_field_without_a_heading():
+    with pytest.raises(SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T across"):
+        load("hover", {**SENSORS, "environment.magnetic_field": [0.0, 0.0, -4e-5]})
+    load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # flown by the truth

@@ -1,0 +1,113 @@
+"""Terrain from a GeoTIFF, beside conversions by other packages, and what is refused."""
+
+import math
+import re
+
+import numpy as np
+import pymap3d
+import pytest
+
+from cosim.scene import SceneError
+from dynamics.terrain import surface
+from services.common.environment import environment
+from services.table import load
+
+rasterio = pytest.importorskip("rasterio")
+
+LATITUDE, LONGITUDE = 47.3, 8.5
+HOME = {"latitude_deg": LATITUDE, "longitude_deg": LONGITUDE, "height": 500.0}
+PLACES = [(0.0, 0.0), (100.0, 0.0), (0.0, 100.0), (-120.0, 80.0), (150.0, -150.0)]
+STEP = 1.0 / 3600.0  # [deg] an arc second
+
+
+def write(path, heights, crs="EPSG:4326", transform=None, **tags):
+    """A file whose first row is the northernmost."""
+    rows, columns = heights.shape[-2:]
+    west, north = LONGITUDE - 0.5 * columns * STEP, LATITUDE + 0.5 * rows * STEP
+    transform = transform or rasterio.transform.from_origin(west, north, STEP, STEP)
+    bands = 1 if heights.ndim == 2 else len(heights)
+    given = {"dtype": heights.dtype, "crs": crs, "transform": transform, "nodata": tags.pop("nodata", None)}
+    with rasterio.open(path, "w", "GTiff", width=columns, height=rows, count=bands, **given) as file:
+        file.write(heights if heights.ndim == 3 else heights[None])
+        for name, value in tags.items():
+            setattr(file, name, value)
+    return path
+
+
+def ground(path, **grid):
+    table = {"file": str(path), "reach": 200.0, "spacing": 10.0} | grid
+    return environment(load("hover", {"environment.home": HOME, "environment.terrain.grid": table})).terrain
+
+
+def test_heights_over_latitude_and_longitude_are_where_they_belong(tmp_path):
+    """A plane in degrees, against pymap3d: rows run from north to south in the file, the other way in the world."""
+    row, column = np.mgrid[0:40, 0:60]
+    north, east = (20 - row - 0.5) * STEP, (column + 0.5 - 30) * STEP
+    found = ground(write(tmp_path / "hill.tif", 700.0 + 5e3 * north + 2e3 * east))
+    for x, y in PLACES:
+        latitude, longitude, _ = pymap3d.enu2geodetic(x, y, 0.0, LATITUDE, LONGITUDE, 500.0)
+        expected = 5e3 * (latitude - LATITUDE) + 2e3 * (longitude - LONGITUDE)
+        assert surface(found, x, y)[0] == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_projected_file_is_turned_by_the_convergence_of_its_meridians(tmp_path):
+    """A slope along the easting of UTM zone 32, half a degree west of its central meridian."""
+    column = np.mgrid[0:80, 0:80][1]
+    easting, northing = 462_200.0, 5_238_700.0  # near home, within the file
+    transform = rasterio.transform.from_origin(easting - 400.0, northing + 400.0, 10.0, 10.0)
+    found = ground(write(tmp_path / "utm.tif", 0.3 * 10.0 * column, "EPSG:32632", transform))
+    convergence = math.atan(math.tan(math.radians(LONGITUDE - 9.0)) * math.sin(math.radians(LATITUDE)))
+    scale = 0.9996 * (1.0 + 0.5 * (37_800.0 / 6.38e6) ** 2)
+    east = (surface(found, 150.0, 0.0)[0] - surface(found, -150.0, 0.0)[0]) / 300.0
+    north = (surface(found, 0.0, 150.0)[0] - surface(found, 0.0, -150.0)[0]) / 300.0
+    assert math.atan2(north, east) == pytest.approx(-convergence, abs=1e-4)
+    assert math.hypot(east, north) == pytest.approx(0.3 * scale, rel=1e-4)
+
+
+def test_scaled_heights_are_scaled_back(tmp_path):
+    column = np.mgrid[0:40, 0:60][1].astype("int16")
+    plain = ground(write(tmp_path / "plain.tif", column.astype(float)))
+    scaled = ground(write(tmp_path / "scaled.tif", 4 * column, scales=(0.25,), offsets=(100.0,)))
+    for x, y in PLACES:
+        assert surface(scaled, x, y)[0] == pytest.approx(surface(plain, x, y)[0])
+
+
+FLAT = np.zeros((40, 60))
+HOLE = np.where(np.arange(60) == 30, -9999.0, FLAT)
+
+
+@pytest.mark.parametrize(
+    ("written", "grid", "said"),
+    [
+        ({}, {"reach": None}, "grid.reach: missing; expected [m] from home to each side"),
+        ({}, {"reach": 5.0}, "grid.reach: expected at least the spacing of 10 m, got 5"),
+        ({}, {"spacing": 0.1}, "grid.spacing: expected at most 1000000 points"),
+        ({}, {"corner": [0.0, 0.0]}, "grid.corner: follows from reach; expected none beside a GeoTIFF"),
+        ({}, {"reach": 3000.0}, "expected a file that covers grid.reach about home"),
+        ({"heights": HOLE, "nodata": -9999.0}, {}, "has no height at (0, "),
+        ({"heights": np.zeros((3, 40, 60))}, {}, "expected one band of heights"),
+        ({"crs": None}, {}, "states no coordinate system"),
+        ({"units": ("ft",)}, {}, "has heights in 'ft'; expected metres"),
+    ],
+)
+def test_refused(tmp_path, written, grid, said):
+    path = write(tmp_path / "hill.tif", written.pop("heights", FLAT), **written)
+    with pytest.raises(SceneError, match=re.escape(said)) as error:
+        ground(path, **grid)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", [None, b"no image"])
+def test_what_is_no_geotiff_is_refused(tmp_path, content):
+    path = tmp_path / "hill.tif"
+    if content:
+        path.write_bytes(content)
+    with pytest.raises(SceneError, match=r"grid.file: .*expected a GeoTIFF of heights") as error:
+        ground(path)
+    assert "\n" not in str(error.value)
+
+
+def test_an_array_has_no_reach(tmp_path):
+    np.save(tmp_path / "hill.npy", FLAT)
+    with pytest.raises(SceneError, match=r"grid.reach: of an array all is taken; expected none, or a GeoTIFF"):
+        ground(tmp_path / "hill.npy", corner=[-20.0, -20.0])
