@@ -13,7 +13,7 @@ from cosim.provenance import DIVERGED, FAILURE, RESTARTS
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
-from messages.topics import Topic, topic_named
+from messages.topics import ACTUATORS, BODIES, SETPOINT, TRUTH, Topic, topic_named
 from studies import tracking
 from studies.events import Event, events, ordered, restarts, slack
 from studies.origin import Origin
@@ -22,6 +22,7 @@ from studies.topic_view import TopicView
 from studies.verdict import Verdict, judge
 
 AXES = tuple(tracking.AXES)
+IN_SPACE = (TRUTH, BODIES, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
 
 
 class Flight:
@@ -33,6 +34,7 @@ class Flight:
         origin: where it comes from, with the log's metadata.
         vehicle: name.
         fleet: what is true of every vehicle that flew, "truth" by name; this one among them.
+        others: the other vehicles that flew, each a flight with what is shown of it in space.
         failure: why it ended before its time; "" where it did not, or where a log does not say.
         diverged: whether that is a state that was no longer finite.
     """
@@ -42,6 +44,7 @@ class Flight:
         self.origin, self.vehicle, self.failure, self.diverged = origin, origin.vehicle, failure, diverged
         self._topics = dict(topics)
         self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
+        self.others: tuple[Flight, ...] = ()
 
     @classmethod
     def read(cls, path: str | Path, vehicle: str | None = None) -> Self:
@@ -60,7 +63,7 @@ class Flight:
             named = vehicle or next(iter(fleet), None)
             if named is None or named not in fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
-            others = {f"/{name}/truth" for name in fleet}
+            others = {topic.key(name) for name in fleet for topic in IN_SPACE}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
             return cls._of_log(log, str(path), log.histories(own), named, fleet)
 
@@ -81,15 +84,16 @@ class Flight:
 
     @classmethod
     def _of_log(cls, log: LogReader, source: str, histories: Mapping[str, Any], vehicle: str, fleet: list[str]) -> Self:
-        prefix = f"/{vehicle}/"
-        views = {
-            name.removeprefix(prefix).removeprefix("/"): TopicView(*columns)
-            for name, columns in histories.items()
-            if name.startswith(prefix) or "/" not in name[1:]
-        }
         failure, diverged = log.metadata.get(FAILURE, ""), log.metadata.get(DIVERGED) == "yes"
-        found = cls(views, Origin.of_log(source, vehicle, log.metadata, log.attachments), failure, diverged)
-        truths = {name: TopicView(*histories[f"/{name}/truth"]) for name in fleet if name != vehicle}
+
+        def of(name: str, keys: Collection[str]) -> Any:
+            views = {key.removeprefix(f"/{name}").removeprefix("/"): TopicView(*histories[key]) for key in keys}
+            return cls(views, Origin.of_log(source, name, log.metadata, log.attachments), failure, diverged)
+
+        found: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
+        shown = {name: [key for topic in IN_SPACE if (key := topic.key(name)) in histories] for name in fleet}
+        found.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
+        truths = {other.vehicle: other.truth for other in found.others}
         found.fleet = {name: truths.get(name, found.truth) for name in fleet}
         return found
 

@@ -1,4 +1,4 @@
-"""A flight while it goes on: what is new, as a flight of its own, and the events in it."""
+"""A vehicle's flight while it goes on: what is new, as a flight of its own, and the events in it."""
 
 from collections.abc import Iterable
 
@@ -7,13 +7,13 @@ import numpy as np
 from cosim.setup import Setup
 from cosim.wire import Page
 from messages.history import history
-from messages.topics import ACTUATORS, BODIES, SETPOINT, STATUS, TRUTH, Topic
+from messages.topics import STATUS, Topic, of_all
 from studies.events import Event
-from studies.flight import Flight
+from studies.flight import IN_SPACE, Flight
 from studies.origin import Origin
 from studies.topic_view import TopicView
 
-TAKEN = (TRUTH, BODIES, SETPOINT, ACTUATORS, STATUS)
+TAKEN = (*IN_SPACE, STATUS)
 AFTERWARDS = ("motors",)  # kinds of events that are known only when they are over
 
 
@@ -21,7 +21,7 @@ class LiveFlight:
     """Takes the messages of a run as its services hand them over, in whatever order they come."""
 
     def __init__(self, setup: Setup):
-        """Of a run that is about to begin."""
+        """Of a run that is about to begin; of a fleet the set-up of one vehicle (`cosim.fleet.members`)."""
         self._setup = setup
         self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
 
@@ -29,9 +29,10 @@ class LiveFlight:
         """What a service has handed over."""
         interval = self._setup.interval_ns
         for page in pages:
-            if page.topic in self._said:
+            topic = of_all(page.topic)
+            if topic in self._said and page.topic.vehicle in ("", self._setup.vehicle):
                 rows = zip(page.ticks, page.payloads, strict=True)
-                self._said[page.topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
+                self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
 
     def step(self, until_ns: int) -> Flight | None:
         """What has come up to an instant since the step before, begun with the newest message before it.

@@ -126,10 +126,8 @@ def run(
         if ros2 is None and loaded.has(Bus) and loaded[Bus].ros2:
             ros2 = loaded[Bus].ros2_domain
             check_mode(mode, peers is not None, False, {"--ros2": True})
-        if loaded.vehicles:
-            of_one = {"--view": view, "--ros2": ros2 is not None, "--plan": plan}
-            if given_too := [option for option, wanted in of_one.items() if wanted]:
-                raise ValueError(f"{given_too[0]}: is for one vehicle, and {scene} has {len(loaded.vehicles)}")
+        if loaded.vehicles and plan:
+            raise ValueError(f"--plan: is for one vehicle, and {scene} has {len(loaded.vehicles)}")
         commands = tuple(read_plan(plan, start_height(loaded), environment(loaded).home)) if plan else ()
         warn_of_gains(loaded)
         router = check_ros2(ros2, ros2_router, insecure)

@@ -4,13 +4,14 @@ import queue
 import secrets
 import threading
 import time
+from collections.abc import Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
 from cosim.setup import Setup
 from studies.events import Event
 from studies.flight import Flight
-from studies.report.motion import step_to_json
+from studies.report.motion import steps_to_json
 from studies.report.page import live_page
 
 KEPT = 3000  # steps for a browser that comes late
@@ -36,9 +37,9 @@ class LivePage:
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/{token}/"
         threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True).start()
 
-    def show(self, step: Flight, events: list[Event]) -> None:
-        """Show what is new, and what happened in it."""
-        self._put(f"data: {step_to_json(step, events, first=not self._steps)}\n\n")
+    def show(self, steps: Sequence[Flight], events: Sequence[list[Event]]) -> None:
+        """Show what is new of every vehicle, and what happened in it."""
+        self._put(f"data: {steps_to_json(steps, events, first=not self._steps)}\n\n")
 
     def _put(self, text: str) -> None:
         with self._lock:

@@ -66,7 +66,8 @@ class Commands:
     """Turns messages into commands of the autopilot, and counts."""
 
     def __init__(self, vehicle: str):
-        """Of a vehicle."""
+        """Of a vehicle, by its name."""
+        self.vehicle = vehicle
         self._accepted = {f"/{vehicle}/{a.name}": a for a in ACCEPTED}
         self._operator = f"/{vehicle}/{OPERATOR}"
         self.messages = {topic: a.message for topic, a in self._accepted.items()} | {self._operator: OperatorInput}

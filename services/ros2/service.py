@@ -5,10 +5,12 @@ It takes no part in the lock step: nobody waits for it, and when it ends the fli
 
 from typing import Any
 
+from cosim.fleet import members
 from cosim.process import POLL, Process
+from cosim.setup import Setup
 from cosim.watch import WATCHER
-from messages import OperatorInput
-from messages.topics import EVENTS
+from messages import OperatorInput, header
+from messages.topics import EVENTS, of_vehicle
 from services.common.operator import OPERATOR_KEY
 from services.processes import create
 from services.ros2.commands import Commands
@@ -27,22 +29,25 @@ def run(process: Process, given: Any) -> None:
         for topic in create(setup, name).topics:
             topics[process.key(topic)] = topic
             authors[process.key(topic)] = process.participants.author(name)
-    commands = Commands(setup.vehicle)
+    given_to = {topic: commands for commands in _commands(setup) for topic in commands.messages}
     operate = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with Node(given.ros2, given.ros2_router, given.insecure) as node:
         for topic in topics.values():
             node.declare(topic.key(setup.vehicle), topic.message.type_name)
-        events = process.key(EVENTS)  # of who watches the run
-        node.declare(EVENTS.key(setup.vehicle), EVENTS.message.type_name)
-        asked = node.subscribe(commands.messages if _takes_commands(setup) else {})
-        published = process.bus.receive(authors | {events: process.participants.mark(WATCHER)})
+        events = {EVENTS.zenoh_key(name, process.key_prefix): of_vehicle(EVENTS, name) for name in setup.vehicles}
+        for topic in events.values():
+            node.declare(topic.key(), topic.message.type_name)
+        asked = node.subscribe({topic: commands.messages[topic] for topic, commands in given_to.items()})
+        watcher = dict.fromkeys(events, process.participants.mark(WATCHER))  # who watches the run tells of events
+        published = process.bus.receive(authors | watcher)
         process.join()
         flying = set(topics)  # topics that have not come to their end
-        topics[events] = EVENTS
+        topics |= events
         while flying and not process.stopping:
             while arrived := asked.get():
+                commands = given_to[arrived[0]]
                 for command in commands.read(*arrived):
-                    operate(OperatorInput(commands=(command,)).encode(), 0)
+                    operate(OperatorInput(header(0, commands.vehicle), (command,)).encode(), 0)
             news = published.get_with_key(POLL)
             if news is None:
                 continue
@@ -51,10 +56,12 @@ def run(process: Process, given: Any) -> None:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
                 flying.discard(key)
-    if report := commands.report():
-        print(report, flush=True)
+    for commands in dict.fromkeys(given_to.values()):
+        if report := commands.report():
+            print(report if setup.vehicle else f"{commands.vehicle}: {report}", flush=True)
 
 
-def _takes_commands(setup: Any) -> bool:
-    """Whether the scene lets others command: `autopilot.operator`."""
-    return "autopilot" in setup.services and setup.services["autopilot"].parameters.operator
+def _commands(setup: Setup) -> list[Commands]:
+    """Of each vehicle that the scene lets others command: `autopilot.operator`."""
+    steered = [member for member in members(setup) if "autopilot" in member.services]
+    return [Commands(member.vehicle) for member in steered if member.services["autopilot"].parameters.operator]

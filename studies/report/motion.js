@@ -2,11 +2,12 @@
 // While the flight goes on, `section.dataset.stream` names where its rows come from (server-sent events).
 const fly = (section, given, live) => {
   const box = section.querySelector(".space");
-  const [slider, play, speed, follow, forces, label] = ["time", "play", "speed", "follow", "forces", "now"].map((name) =>
-    section.querySelector(`[name=${name}]`),
+  const [slider, play, speed, follow, whom, forces, label] = ["time", "play", "speed", "follow", "whom", "forces", "now"].map(
+    (name) => section.querySelector(`[name=${name}]`),
   );
   const FORCE = 0.02, WIND = 0.15; // m for 1 N, m for 1 m/s
-  const RING = 24, HALF = 0.5, KEPT = 6000, LAG = 0.3; // of a flight that goes on: rows, and how far it is shown behind [s]
+  const RING = 24, HALF = 0.5, LAG = 0.3; // how far a flight that goes on is shown behind [s]
+  const NAMED = 8; // vehicles at most that are told apart by their colours
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   const floats = (text) => text && new Float32Array(bytes(text));
@@ -27,6 +28,7 @@ const fly = (section, given, live) => {
     })),
   });
   const flights = given.flights.map(decode);
+  const KEPT = Math.max(300, 6000 / flights.length); // rows of a flight that goes on
 
   // More rows of a flight that goes on, without the first, which is known; the oldest go where there are too many.
   function extend(known, more) {
@@ -90,19 +92,30 @@ const fly = (section, given, live) => {
     return { type: "scatter3d", mode: "lines", x: [], y: [], z: [], line: { color: colour, width }, ...hidden };
   }
 
-  const columns = (values) => [0, 1, 2].map((axis) => Array.from({ length: values.length / 3 }, (_, k) => values[3 * k + axis]));
+  // Points with a gap behind them.
+  const append = (trace, points) => {
+    for (const point of [...points, [null, null, null]]) ["x", "y", "z"].forEach((axis, i) => trace[axis].push(point[i]));
+  };
+  const rows = (values) => Array.from({ length: values.length / 3 }, (_, k) => values.subarray(3 * k, 3 * k + 3));
 
-  // Traces that stay, then those that move: of each flight one for each look of its strokes.
+  // Traces that stay, then those that move: one for what looks the same, of all flights.
   const traces = [], moving = [];
+  function add(kind, key, flight, trace) {
+    const { color, width } = trace.line || {};
+    const alike = (other) => trace.line && other.kind === kind && other.key === key && other.trace.line.color === color && other.trace.line.width === width;
+    const found = moving.find(alike);
+    if (found) found.flights.push(flight); else moving.push({ kind, key, flights: [flight], trace });
+  }
   for (const flight of flights) {
-    const many = flights.length > 1 ? `${flight.name}, ` : "";
-    for (const [values, colour, name, dash] of [[flight.path, flight.colour, "flown", "solid"], [flight.asked, "#333333", "reference", "dash"]]) {
-      if (!values) continue;
-      const trace = { ...line(colour, 2, many + name), line: { color: colour, width: 2, dash } };
-      const [x, y, z] = columns(values);
-      if (live) moving.push({ flight, kind: "path", key: values === flight.path ? "path" : "asked", trace });
-      else traces.push({ ...trace, x, y, z });
-    }
+    const flown = flights.length > 1 && flights.length <= NAMED ? `${flight.name}, flown` : "flown";
+    add("path", "path", flight, line(flight.colour, 2, flown));
+    const reference = line("#333333", 2, "reference");
+    if (flight.asked) add("path", "asked", flight, { ...reference, line: { ...reference.line, dash: "dash" } });
+  }
+  moving.forEach(({ trace }, k) => { trace.showlegend = moving.findIndex((other) => other.trace.name === trace.name) === k; });
+  if (!live) for (const { flights, key, trace } of moving.splice(0)) {
+    flights.forEach((flight) => append(trace, rows(flight[key])));
+    traces.push(trace);
   }
   const looks = (flight) => {
     const found = new Map();
@@ -116,14 +129,16 @@ const fly = (section, given, live) => {
     return { type: "mesh3d", x: [], y: [], z: [], i, j, k, color: colour, flatshading: true, lighting, hoverinfo: "skip" };
   };
   for (const flight of flights) {
-    flight.bodies.forEach(({ surface }, key) => { if (surface) moving.push({ flight, kind: "surface", key, trace: hull(surface) }); });
-    for (const [key, [colour, width]] of looks(flight)) moving.push({ flight, kind: "stroke", key, trace: line(colour, width) });
-    moving.push({ flight, kind: "rotor", trace: line(flight.colour, 3) });
-    if (flight.links.length) moving.push({ flight, kind: "link", trace: line("#9AA5AF", 3) });
-    if (flight.asked) moving.push({ flight, kind: "asked", trace: { ...line("#333333", 2, "setpoint"), mode: "markers", marker: { size: 4, symbol: "diamond-open", color: "#333333" } } });
-    if (flight.wind) moving.push({ flight, kind: "wind", trace: line("#56B4E9", 5, "wind") });
-    if (flight.bodies.some((body) => body.f)) moving.push({ flight, kind: "force", trace: line("#CC79A7", 4, "contact force") });
+    flight.bodies.forEach(({ surface }, key) => { if (surface) add("surface", key, flight, hull(surface)); });
+    for (const [key, [colour, width]] of looks(flight)) add("stroke", key, flight, line(colour, width));
+    add("rotor", "", flight, line(flight.colour, 3));
+    if (flight.links.length) add("link", "", flight, line("#9AA5AF", 3));
+    if (flight.asked) add("asked", "", flight, { ...line("#333333", 2, "setpoint"), mode: "markers", marker: { size: 4, symbol: "diamond-open", color: "#333333" } });
+    if (flight.wind) add("wind", "", flight, line("#56B4E9", 5, "wind"));
+    if (flight.bodies.some((body) => body.f)) add("force", "", flight, line("#CC79A7", 4, "contact force"));
+    whom.add(new Option(flight.name, whom.length));
   }
+  whom.hidden = flights.length < 2;
   forces.parentElement.hidden = !moving.some(({ kind }) => kind === "force");
 
   function arrow(draw, from, vector) {
@@ -154,12 +169,9 @@ const fly = (section, given, live) => {
   // Points of everything that moves at a time, by trace.
   function frame(now) {
     const found = moving.map(() => ({ x: [], y: [], z: [] }));
-    const pen = (k) => (points) => {
-      for (const point of [...points, [null, null, null]]) ["x", "y", "z"].forEach((axis, i) => found[k][axis].push(point[i]));
-    };
-    moving.forEach(({ flight, kind, key }, k) => {
-      const at = place(flight.t, now), draw = pen(k);
-      if (kind === "path") return ["x", "y", "z"].forEach((axis, i) => { found[k][axis] = columns(flight[key])[i]; });
+    moving.forEach(({ flights, kind, key }, k) => flights.forEach((flight) => {
+      const at = place(flight.t, now), draw = (points) => append(found[k], points);
+      if (kind === "path") return draw(rows(flight[key]));
       if (kind === "asked") return draw([between(flight.asked, 3, at)]);
       if (kind === "wind") {
         const wind = between(flight.wind, 3, at).map((value) => value * WIND);
@@ -196,7 +208,7 @@ const fly = (section, given, live) => {
           }
         }
       });
-    });
+    }));
     return found;
   }
 
@@ -224,9 +236,10 @@ const fly = (section, given, live) => {
   }
   measure();
 
-  // Ranges of the axes: all of it, or what is near the first vehicle.
+  // Ranges of the axes: all of it, or what is near the chosen vehicle.
   function ranges(now) {
-    const [centre, reach] = follow.checked ? [between(flights[0].path, 3, place(flights[0].t, now)), Math.min(2.5 * size, half)] : [middle, half];
+    const { path, t } = flights[whom.value];
+    const [centre, reach] = follow.checked ? [between(path, 3, place(t, now)), Math.min(2.5 * size, half)] : [middle, half];
     return Object.fromEntries(["x", "y", "z"].map((axis, i) => [`scene.${axis}axis.range`, [centre[i] - reach, centre[i] + reach]]));
   }
 
@@ -277,7 +290,7 @@ const fly = (section, given, live) => {
   stretch();
   slider.addEventListener("input", () => { if (live && playing) toggle(); now = Number(slider.value); show(true); });
   play.addEventListener("click", toggle);
-  [follow, forces].forEach((choice) => choice.addEventListener("change", () => show(false)));
+  [follow, whom, forces].forEach((choice) => choice.addEventListener("change", () => show(false)));
   document.addEventListener("plot-time", ({ detail }) => { if (!playing) { now = Math.min(given.end, Math.max(0, detail)); show(false); } });
 
   const axis = (title) => ({ title: { text: title }, backgroundcolor: "white", gridcolor: "#D9DDE1", showspikes: false });
@@ -323,9 +336,9 @@ const fly = (section, given, live) => {
   source.addEventListener("message", ({ data }) => {
     const next = JSON.parse(data);
     if (flight) flight.more(next); else flight = fly(section, next, true);
-    for (const [time, kind, text] of next.events) {
+    for (const [time, vehicle, kind, text] of next.events) {
       const row = document.querySelector(".events tbody").insertRow(0);
-      [time.toFixed(2), kind, text].forEach((value) => { row.insertCell().textContent = value; });
+      [time.toFixed(2), ...(next.flights.length > 1 ? [vehicle] : []), kind, text].forEach((value) => { row.insertCell().textContent = value; });
     }
     state.textContent = "flying";
   });

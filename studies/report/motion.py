@@ -10,10 +10,12 @@ import numpy as np
 from studies.events import Event
 from studies.flight import Flight
 from studies.report import shapes
-from studies.report.style import BOUND, FLOWN, REFERENCE
+from studies.report.sections import labels
+from studies.report.style import BOUND, COLOURS, FLOWN, REFERENCE
 
 FRAMES = 1500  # of a flight at most; the browser goes evenly between two
-STEP_FRAMES = 12  # of what is new in a flight that goes on
+FLEET_FRAMES = 15_000  # of all vehicles of a fleet together
+STEP_FRAMES, LEAST = 12, 4  # of what is new in a flight that goes on; of each vehicle of a large fleet
 LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 
 
@@ -102,31 +104,52 @@ def of_bodies(flight: Flight, drawn: Sequence[tuple[tuple[Stroke, ...], tuple[Ro
 
 
 def to_json(flights: Sequence[Flight]) -> str:
-    """Motions of flights for the browser (motion.js), safe within an HTML element; "" where nothing moves."""
-    found = [_table(flight, motion(flight), colour) for flight, colour in zip(flights, (FLOWN, BOUND), strict=False)]
-    longest = max(float(flight.truth.times[-1]) for flight in flights)
+    """Motions of a flight with its fleet, or of two laid over each other, for the browser (motion.js); safe within an
+    HTML element."""
+    if len(flights) == 1:
+        shown = [flights[0], *flights[0].others]
+        order = list(flights[0].fleet)
+        names = [flight.vehicle for flight in shown]
+        colours = [_colour(order.index(name)) for name in names]
+    else:
+        shown, names, colours = list(flights), list(labels(flights)), [FLOWN, BOUND]
+    frames = min(FRAMES, FLEET_FRAMES // len(shown))
+    found = [_table(*each, frames) for each in zip(shown, names, colours, strict=True)]
+    longest = max(float(flight.truth.times[-1]) for flight in shown)
     return json.dumps({"end": longest, "flights": found}, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def step_to_json(step: Flight, events: Sequence[Event], first: bool) -> str:
-    """What is new of a flight that goes on, and what happened in it, for the browser; surfaces in the first step."""
-    table = _table(step, motion(step), FLOWN, STEP_FRAMES, later=True)
+def steps_to_json(steps: Sequence[Flight], events: Sequence[Sequence[Event]], first: bool) -> str:
+    """What is new of the vehicles of a run that goes on, and what happened to each, for the browser; surfaces in the
+    first step."""
+    frames = max(LEAST, STEP_FRAMES // len(steps))
+    tables = [_table(step, step.vehicle, _colour(i), frames, later=True) for i, step in enumerate(steps)]
     if not first:
-        for body in table["bodies"]:
+        for body in (body for table in tables for body in table["bodies"]):
             body["surface"] = None
-    told = [(event.time, event.kind, event.text) for event in events]
-    return json.dumps({"end": float(step.truth.times[-1]), "flights": [table], "events": told}, separators=(",", ":"))
+    told = [
+        (event.time, step.vehicle, event.kind, event.text)
+        for step, happened in zip(steps, events, strict=True)
+        for event in happened
+    ]
+    given = {"end": float(steps[0].truth.times[-1]), "flights": tables, "events": sorted(told, key=lambda e: e[0])}
+    return json.dumps(given, separators=(",", ":"))
 
 
-def _table(flight: Flight, moved: Motion, colour: str, frames: int = FRAMES, later: bool = False) -> dict[str, Any]:
+def _colour(place: int) -> str:
+    """Of the vehicle at this place of a fleet."""
+    return COLOURS[place % len(COLOURS)]
+
+
+def _table(flight: Flight, name: str, colour: str, frames: int, later: bool = False) -> dict[str, Any]:
     """A flight in at most so many rows; `later`: wind and forces that are not there may come yet."""
-    truth = flight.truth
+    truth, moved = flight.truth, motion(flight)
     kept = np.unique(np.linspace(0, len(truth) - 1, min(frames, len(truth))).round().astype(int))
     times = truth.times[kept]
     followed = flight.reference[:, :3]
     asked = followed[np.minimum(kept, len(followed) - 1)] if len(followed) else None
     return {
-        "name": flight.vehicle,
+        "name": name,
         "colour": colour,
         "t": _array(times, np.float64),
         "path": _array(truth.position[kept]),

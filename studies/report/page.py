@@ -54,7 +54,8 @@ def flight_page(flights: Sequence[Flight]) -> str:
 
 def live_page(setup: Setup, stream: str) -> str:
     """The page of a flight that goes on; the address `stream` gives what is new of it."""
-    return render("live.html", [], name=setup.scene, title=setup.title, stream=stream, moving=_moving())
+    said = {"name": setup.scene, "title": setup.title, "several": len(setup.vehicles) > 1}
+    return render("live.html", [], stream=stream, moving=_moving(), **said)
 
 
 def _moving() -> str:

@@ -1,5 +1,6 @@
 """A run on a page while it goes on: who may see it, what it is given, and that a browser draws it."""
 
+import base64
 import json
 import os
 import re
@@ -18,6 +19,7 @@ from lapwing.runs.live import LivePage
 from messages import Log
 from services.processes import create_all
 from services.table import load, resolve
+from studies.report.motion import steps_to_json
 from tests.studies import chromium
 
 PATIENCE = 120.0  # [s]
@@ -42,8 +44,8 @@ def steps(stream):
 class Run:
     """A run in this process, half a second a step, as a launcher would see it."""
 
-    def __init__(self):
-        self.setup = resolve(load("hover", {"run.duration": 3.0}))
+    def __init__(self, scene="hover"):
+        self.setup = resolve(load(scene, {"run.duration": 3.0}))
         self._graph = Graph(self.setup, create_all(self.setup), PAGE)
         self.spoken, self.listen, self.time_ns = set(self.setup.services), None, 0
         self.published = []
@@ -80,11 +82,27 @@ def test_only_who_has_the_address_sees_it_and_only_while_it_flies():
     seen = steps(early)
     assert seen == steps(late)
     assert [step["end"] for step in seen] == pytest.approx([0.496, 0.996, 1.496, 1.996])
-    events = [kind for step in seen for _, kind, _ in step["events"]]
+    events = [kind for step in seen for _, _, kind, _ in step["events"]]
     assert sorted(events) == ["arming", "contact", "mode", "phase"]
     assert [(key, message.name) for key, _, message in run.published] == [("drone1/events", kind) for kind in events]
     with pytest.raises(urllib.error.URLError):
         get(page.address)
+
+
+def test_of_a_fleet_every_vehicle_is_shown_and_its_events_are_its_own():
+    run, shown = Run("fleet"), []
+    names = ["left", "right", "scout"]
+    follow = Following(run.setup, [lambda steps, events: shown.append(json.loads(steps_to_json(steps, events, True)))])
+    follow.observe(run)
+    for _ in range(2):
+        run.step()
+        follow.observe(run)
+    assert [[flight["name"] for flight in step["flights"]] for step in shown] == [names] * 2
+    starts = [np.frombuffer(base64.b64decode(flight["path"]), "<f4")[:2] for flight in shown[0]["flights"]]
+    assert np.array(starts) == pytest.approx(np.array([(0.0, 3.0), (0.0, -3.0), (-3.0, 0.0)]), abs=1e-3)
+    told = [(f"{vehicle}/events", kind) for step in shown for _, vehicle, kind, _ in step["events"]]
+    assert sorted(told) == sorted((key, message.name) for key, _, message in run.published)
+    assert {key for key, kind in told if kind == "arming"} == {f"{name}/events" for name in names}
 
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
@@ -122,8 +140,8 @@ def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
                 """
             )
             assert browser.errors == []
-    assert len(path) == 12 + 3 * 11  # the first row of a step is the last of the one before
-    assert np.all(np.diff(path[6:]) > -1e-6)  # it climbs
+    assert len(path) == 12 + 3 * 11 + 1  # the first row of a step is the last of the one before; a gap at the end
+    assert np.all(np.diff(path[6:-1]) > -1e-6)  # it climbs
     assert rotors == 4 * (25 + 2)
     assert events == 4
 

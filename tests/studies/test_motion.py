@@ -1,6 +1,7 @@
 """The vehicle in space on the report's page: what the page is given, and that a browser draws and plays it."""
 
 import base64
+import copy
 import json
 import re
 
@@ -16,6 +17,7 @@ from studies.flight import Flight
 from studies.origin import Origin
 from studies.report import motion, shapes, write
 from studies.report.motion import FRAMES
+from studies.report.style import COLOURS
 from studies.topic_view import TopicView
 from tests.golden.digests import sample_file
 
@@ -70,6 +72,61 @@ def test_a_long_flight_is_thinned_to_its_ends():
     times = numbers(table["t"], "<f8")
     assert len(times) == FRAMES
     assert (times[0], times[-1]) == (0.0, 49.99)
+
+
+def fleet():
+    """Two vehicles, the second 4 m north of the first."""
+    first = flight()
+    truth = {name: first.truth[name] for name in first.truth.fields}
+    truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
+    second = Flight({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
+    second.vehicle = "second"
+    first.others = (second,)
+    first.fleet = {"second": second.truth, first.vehicle: first.truth}
+    return first
+
+
+def test_a_fleet_is_shown_together_the_vehicle_of_the_report_first_and_each_in_its_colour():
+    tables = json.loads(motion.to_json([fleet()]))["flights"]
+    assert [table["name"] for table in tables] == ["drone1", "second"]
+    assert [table["colour"] for table in tables] == [COLOURS[1], COLOURS[0]]  # as in the plot of all paths
+    assert [numbers(table["path"])[1] for table in tables] == [0.0, 4.0]
+
+
+def test_two_flights_laid_over_each_other_have_the_names_of_their_logs():
+    tables = json.loads(motion.to_json([fleet(), flight()]))["flights"]
+    assert len(tables) == 2
+    assert len({table["name"] for table in tables}) == 2
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_a_browser_draws_a_fleet_and_its_camera_follows_whom_one_chooses(tmp_path):
+    given = fleet()
+    given.digest = "0" * 32
+    with chromium.Browser(write(given, tmp_path / "flight.html"), tmp_path / "profile") as browser:
+        names, hubs, centres = browser.run(
+            """
+            const until = async (holds) => { while (!holds()) await new Promise((done) => setTimeout(done, 20)); };
+            await until(() => document.readyState === "complete");
+            const section = document.getElementById("motion"), whom = section.querySelector("[name=whom]");
+            await until(() => section.dataset.time !== undefined);
+            const space = section.querySelector(".space"), centres = [];
+            for (const chosen of [0, 1]) {
+              whom.value = chosen;
+              whom.dispatchEvent(new Event("change"));
+              const centre = () => space.layout.scene.yaxis.range.reduce((low, high) => (low + high) / 2);
+              await until(() => Math.abs(centre() - 4 * chosen) < 0.1);
+              centres.push(centre());
+            }
+            const arms = space.data.filter(({ line }) => line && line.width === 6);
+            const names = [...whom.options].map(({ text }) => text);
+            return [names, arms.map(({ y }) => [Math.min(...y), Math.max(...y)]), centres];
+            """
+        )
+        assert browser.errors == []
+    assert names == ["drone1", "second"]
+    assert centres == pytest.approx([0.0, 4.0])
+    assert [min(low for low, _ in hubs), max(high for _, high in hubs)] == pytest.approx([-0.3, 4.3], abs=0.01)
 
 
 def test_bodies_move_each_by_itself_and_have_their_forces():
@@ -249,7 +306,7 @@ def test_a_browser_draws_the_mesh_where_the_vehicle_is_and_as_it_is_turned(tmp_p
 
 def test_a_flight_that_goes_on_tells_its_mesh_once():
     for first in (True, False):
-        (table,) = json.loads(motion.step_to_json(flight(scene=WITH_MESH), [], first))["flights"]
+        (table,) = json.loads(motion.steps_to_json([flight(scene=WITH_MESH)], [[]], first))["flights"]
         assert [body["surface"] is not None for body in table["bodies"]] == [first]
 
 

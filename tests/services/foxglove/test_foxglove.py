@@ -89,13 +89,14 @@ def test_an_address_that_is_taken_is_told():
             Server(f"127.0.0.1:{port}")
 
 
-def test_a_run_is_shown_while_it_flies(tmp_path):
+@pytest.mark.parametrize(("scene", "vehicle"), [("hover", "drone1"), ("fleet", "right")])
+def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle):
     (door,) = loopback_endpoints(["a"]).values()
     port = int(door.rpartition(":")[2])
     path = tmp_path / "flight.mcap"
     words = [
         "run",
-        "hover",
+        scene,
         "--speed",
         "1",
         "--set",
@@ -107,7 +108,7 @@ def test_a_run_is_shown_while_it_flies(tmp_path):
     ]
     with subprocess.Popen([sys.executable, "-m", "lapwing", *words, "--foxglove", f"127.0.0.1:{port}"]) as run:
         client = patient(port, run)
-        client.subscribe("/drone1/truth", "/drone1/events")
+        client.subscribe(f"/{vehicle}/truth", f"/{vehicle}/events")
         got, events = [], []
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:
@@ -115,8 +116,8 @@ def test_a_run_is_shown_while_it_flies(tmp_path):
                 (events if subscription else got).append((time_ns, message[13:]))
         assert run.wait(timeout=60) == 0
     with LogReader(path) as read:
-        kept = [(t, payload) for _, _, t, payload in read.messages(["/drone1/events"])]
-        flown = [(t, payload) for _, _, t, payload in read.messages(["/drone1/truth"])]
+        kept = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/events"])]
+        flown = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/truth"])]
     first = flown.index(got[0])
     assert got == flown[first : first + len(got)]  # none is missing, and all in order
     assert len(got) > 100

@@ -83,9 +83,9 @@ class Graph:
         return ZenohSession.get_instance().store.types[name]
 
 
-def fly(tmp_path, port, *more):
+def fly(tmp_path, port, *more, scene="groundstation"):
     words = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}", "--log", str(tmp_path / "a.mcap"), *more]
-    command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--set", "success.require=[]", *words]
+    command = [sys.executable, "-m", "lapwing", "run", scene, "--set", "success.require=[]", *words]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     deadline = time.monotonic() + PATIENCE
     while run.poll() is None and time.monotonic() < deadline:
@@ -177,6 +177,36 @@ def test_a_node_drives_the_motors(tmp_path, port, graph):
     given = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
     assert {(command.source, command.values) for command in given} == {(SOURCE, tuple(volts))}
     assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
+
+
+def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, graph):
+    more = ["--speed", "1", "--set", "run.duration=4", "--set", "autopilot.operator=true"]
+    run = fly(tmp_path, port, *more, scene="fleet")
+    try:
+        clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/right/events", Log)
+        arm, mode = graph.publisher("/right/command/arm", Bool), graph.publisher("/right/command/mode", String)
+        topics = {}
+        while clock.get(timeout=PATIENCE).clock.sec < 3:
+            if not topics:
+                topics = graph.topics()
+                mode.publish(data="takeoff")
+                arm.publish(data=True)
+        said = run.communicate(timeout=PATIENCE)[0]
+    finally:
+        run.kill()
+    assert run.returncode == 0, said
+    assert "ros2: right: 2 commands taken\n" in said
+    with LogReader(tmp_path / "a.mcap") as log:
+        types = {topic: [kind] for topic, kind in log.topics().items()}
+        inputs = {
+            name: [OperatorInput.decode(payload) for *_, payload in log.messages([f"/{name}/operator"])]
+            for name in ("left", "right", "scout")
+        }
+    types.pop("/wall_time")
+    assert types.items() <= topics.items()
+    commands = {name: [c.kind for message in told for c in message.commands] for name, told in inputs.items()}
+    assert commands == {"left": [], "right": ["takeoff", "arm"], "scout": []}
+    assert ("arming", "armed") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
 def test_the_second_node_on_a_machine_joins_the_first_ones_router(port):
