@@ -8,13 +8,14 @@ import zlib
 from collections.abc import Callable
 from typing import TypeVar
 
-from cosim.bus import ZenohBus
+from cosim.bus import LEASE_MS, ZenohBus
 from cosim.errors import LockStepError
 from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
 from cosim.participants import Participants
 from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
 from cosim.setup import Setup
+from cosim.tcp import limit_silence
 from dynamics.kernel import on_compile
 from messages.topics import Topic
 
@@ -163,6 +164,7 @@ class Process:
         self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", lambda _: packed)
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
         self._await([other for other in self.others if other != self.name], meanwhile)
+        limit_silence(LEASE_MS)
         if self.compares:
             self._compare()
 

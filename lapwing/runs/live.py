@@ -32,7 +32,7 @@ class LivePage:
         self._over = False
         token = secrets.token_urlsafe(16)
         page = live_page(setup, STREAM).encode()
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(f"/{token}/", page, self))
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), handler(f"/{token}/", page, self))
         self._server.daemon_threads = True
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/{token}/"
         threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True).start()
@@ -78,7 +78,9 @@ class LivePage:
         self._server.server_close()
 
 
-def _handler(root: str, page: bytes, live: LivePage) -> type[BaseHTTPRequestHandler]:
+def handler(root: str, page: bytes, live: LivePage) -> type[BaseHTTPRequestHandler]:
+    """Who answers a browser: the page at `root`, its steps below."""
+
     class Handler(BaseHTTPRequestHandler):
         """Gives the page, and the steps of the flight as server-sent events; nothing at any other address."""
 

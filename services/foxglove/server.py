@@ -35,6 +35,7 @@ class Server:
             from foxglove.websocket import Capability
         except ImportError:
             raise ValueError("--foxglove: foxglove-sdk is not installed; pip install lapwing[foxglove]") from None
+        foxglove.set_log_level("CRITICAL")  # a line for each thing that a client does wrong would have no end
         self._foxglove: Any = foxglove
         self._context = foxglove.Context()
         self._channels: dict[str, Any] = {}

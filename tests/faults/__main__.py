@@ -1,6 +1,6 @@
 """Runs with faults at random instants under random participants.
 
-    python -m tests.faults --seed S --trials N [--jobs J] [--kinds KIND ...]
+    python -m tests.faults --seed S --trials N [--jobs J] [--timeout SECONDS] [--kinds KIND ...]
 
 Each trial is made from one seed (S, S+1, ...), and is carried out again by `--seed THAT --trials 1`. Exit code 1
 where one has another end than it should.
@@ -9,8 +9,9 @@ where one has another end than it should.
 import argparse
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
-from tests.faults.trial import draw, fly
+from tests.faults.trial import TIMEOUT, draw, fly
 
 
 def main() -> None:
@@ -19,13 +20,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--trials", type=int, default=10)
     parser.add_argument("--jobs", type=int, default=1, help="trials at once")
+    parser.add_argument("--timeout", type=float, default=TIMEOUT, help="[s] for an end; more on a busy machine")
     parser.add_argument("--kinds", nargs="+", help="leave out all others")
     given = parser.parse_args()
     trials = [draw(given.seed + k, given.kinds) for k in range(given.trials)]
     counts: Counter = Counter()
     longest: dict[str, float] = {}
     with ThreadPoolExecutor(given.jobs) as pool:
-        for trial, outcome in zip(trials, pool.map(fly, trials), strict=True):
+        for trial, outcome in zip(trials, pool.map(partial(fly, timeout=given.timeout), trials), strict=True):
             counts[trial.kind, not outcome.wrong] += 1
             longest[trial.kind] = max(longest.get(trial.kind, 0.0), outcome.seconds)
             words = "; ".join(outcome.wrong) or "ok"

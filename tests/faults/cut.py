@@ -41,6 +41,7 @@ def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, f
     seconds = time.monotonic() - struck
     code, said = ends[WATCHER]
     wrong = [f"{name}: a traceback: {words}" for name, (_, words) in ends.items() if "Traceback" in words]
+    wrong += [f"{name} was left: {words}" for name, (c, words) in ends.items() if c < 0]
     if over or not ever:
         wrong += [f"{name} ended with exit code {c}: {words}" for name, (c, words) in ends.items() if c]
     elif code == 1:

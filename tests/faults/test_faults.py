@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults import cut
 from tests.faults.trial import Trial, draw, fly
+from tests.hosts.network import why_not
 
 FEW = {
     "a service waits for a frozen one that goes on": Trial(0, "hover", "pause", 0.0, 4.0),
@@ -15,6 +17,7 @@ FEW = {
     "the plant is stopped and started again": Trial(0, "cooperative_load", "restart frozen", 0.99, 4.0),
     "interrupted while it starts": Trial(0, "gyrostat_attitude", "Ctrl-C", 1.0, 0.4),
     "interrupted while it compiles": Trial(1, "gyrostat_attitude", "Ctrl-C", 1.0, 3.0),
+    "whoever watches is cut off for good, with much unsent": Trial(4042, "delivery_mission", "cut off", 0.99, 1.7),
     "the disk is full": Trial(0, "hover", "full disk", 0.0, 3.0),
 }
 
@@ -25,6 +28,8 @@ def test_a_fault_has_the_end_that_it_should(trial):
         pytest.skip("finds processes in /proc")
     if trial.kind == "full disk" and os.geteuid() != 0:
         pytest.skip("mounts a small disk, as root")
+    if trial.kind in cut.KINDS and (reason := why_not()):
+        pytest.skip(reason)
     outcome = fly(trial)
     assert not outcome.wrong, outcome
 

@@ -30,7 +30,7 @@ SCENES = {  # overrides that make a flight of a few seconds
     "gyrostat_attitude": ["run.duration=5"],
 }
 LATEST = 9.0  # [s] after the start of its first process at which a run is struck
-TIMEOUT = 60.0  # [s] for a run to end after that, and for its processes
+TIMEOUT = 60.0  # [s] for a run to end after that, and for its processes, on a machine that does nothing else
 DISK = 1 << 24  # [bytes] of a disk that is filled
 RECOVERED = 0.5  # [s] before the fault up to which a log must be whole
 
@@ -65,8 +65,8 @@ def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
     return Trial(seed, chance.choice(sorted(SCENES)), kind, place, chance.uniform(0.2, LATEST))
 
 
-def fly(trial: Trial) -> Outcome:
-    """Carry a trial out in a folder of its own."""
+def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
+    """Carry a trial out in a folder of its own; `timeout` [s] is what its end may take."""
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     disk = folder / "disk"
     disk.mkdir()
@@ -77,14 +77,14 @@ def fly(trial: Trial) -> Outcome:
             return Outcome(victim, *cut.fly(victim, trial.kind, trial.delay / 2, folder))
         if full:
             subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", disk], check=True)
-        return _fly(trial, folder, disk / "log.mcap")
+        return _fly(trial, folder, disk / "log.mcap", timeout)
     finally:
         if full:
             subprocess.run(["umount", "--lazy", disk], check=False)
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _fly(trial: Trial, folder: Path, log: Path) -> Outcome:
+def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
     overrides = list(SCENES[trial.scene])
     if trial.kind in RESTARTED:
         overrides.append(f"run.restart={json.dumps(list(undisturbed(trial.scene).services))}")
@@ -121,12 +121,12 @@ def _fly(trial: Trial, folder: Path, log: Path) -> Outcome:
             _gone(participants(launcher.pid) | children, FROZEN)
             os.kill(launcher.pid, signal.SIGCONT)
         try:
-            launcher.wait(TIMEOUT)
+            launcher.wait(timeout)
         except subprocess.TimeoutExpired:
-            wrong.append(f"the launcher has not ended after {TIMEOUT:g} s")
+            wrong.append(f"the launcher has not ended after {timeout:g} s")
             launcher.kill()
             launcher.wait()
-        left = _gone(children, TIMEOUT)
+        left = _gone(children, timeout)
         seconds = time.monotonic() - struck
         wrong += [f"{name} is left" for name in left]
         for name in left:

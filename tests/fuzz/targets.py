@@ -1,12 +1,8 @@
 """What reads bytes from outside: each target takes any bytes, and refuses them with a ValueError or not at all."""
 
-import atexit
-import shutil
-import tempfile
-from collections.abc import Callable
+import os
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,31 +15,52 @@ from messages.topics import POSE
 from messages.types import TYPES
 from services import table
 from services.common import parameter_file, plan
-from services.mavlink.adapter import Adapter
-from services.mavlink.dialect import mavlink
-from services.mavlink.resolve import describe
+from tests.fuzz.sockets import frames, link, page, websocket
+from tests.fuzz.target import Target
 
 SCENES = Path("scenes")
-
-
-class Target(NamedTuple):
-    """Something that reads, and what it reads when all is well."""
-
-    read: Callable[[bytes], object]
-    seeds: tuple[bytes, ...]
+SMALL_SCENES = (  # of which more are tried in a second than of those that ship
+    b"""run = { duration = 2.0 }
+vehicle.airframe = 'hexacopter'
+effects = { gravity = {}, rotor_thrust = {} }
+autopilot = { gains = "tuned", estimator = "truth" }
+trajectory.phase = [{ name = "up", z = { kind = "ramp", to = 1e1, rate = 1 } }]
+""",
+    b"""run.duration = 2
+[vehicle]
+airframe = "delivery_drone"
+[effects.wind_random]
+mean = [3.0, 1.0, 0]
+[sensors.imu]
+preset = "mpu6000"
+[autopilot]
+gains = "tuned"
+estimator = "truth"
+[[trajectory.phase]]
+name = "wait"
+duration = 1.0
+""",
+    b"""run.duration = 2
+[vehicle]
+model = "gyrostat"
+[gyrostat]
+inertia = [500.0, 5e2, 1000.0]
+initial_rate = [0.0, 1e-3, 0.1]
+""",
+)
 
 
 @cache
-def _folder() -> Path:
-    made = Path(tempfile.mkdtemp(prefix="fuzz-"))
-    atexit.register(shutil.rmtree, made, ignore_errors=True)
-    return made
+def _memory(name: str) -> int:
+    return os.memfd_create(name)
 
 
 def _file(data: bytes, name: str) -> Path:
-    path = _folder() / name
-    path.write_bytes(data)
-    return path
+    """A file in memory, which is ten times as fast as one on a disk."""
+    file = _memory(name)
+    os.ftruncate(file, 0)
+    os.pwrite(file, data, 0)
+    return Path(f"/proc/self/fd/{file}")
 
 
 def cdr() -> Target:
@@ -73,26 +90,11 @@ def set_ups() -> Target:
     return Target(lambda data: from_json(data.decode()), (setup.encode(), to_json((1.0, {"a": [None]})).encode()))
 
 
-def link() -> Target:
-    adapter = Adapter(describe(table.load("hover")), lambda command: None)
-    codec = mavlink.MAVLink(None, 255, 190)
-    seeds = [mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(codec)]
-    seeds.append(mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0).pack(codec))
-    seeds.append(mavlink.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 2.5, 9).pack(codec))
-
-    def read(data: bytes) -> None:
-        endpoint = adapter.connect(True, True, lambda sent: None)
-        adapter.receive(endpoint, data)
-        adapter.disconnect(endpoint)
-
-    return Target(read, tuple(seeds))
-
-
 def scenes() -> Target:
     def read(data: bytes) -> None:
         table.parse(SCENES / "fuzz.toml", data.decode())
 
-    return Target(read, tuple((SCENES / f"{name}.toml").read_bytes() for name in ("hover", "gyrostat_blocked")))
+    return Target(read, SMALL_SCENES)
 
 
 def plans() -> Target:
@@ -107,7 +109,7 @@ def parameters() -> Target:
 
 
 def logs() -> Target:
-    path = _folder() / "seed.mcap"
+    path = _file(b"", "seed.mcap")
     with LogWriter(path, {"scene": "none"}, {"a.txt": b"text"}) as writer:
         for k in range(3):
             writer.write("/drone1/pose", PoseStamped, PoseStamped().encode(), k * 1_000_000)
@@ -120,4 +122,7 @@ def logs() -> Target:
     return Target(read, (path.read_bytes(),))
 
 
-TARGETS = {make.__name__: make for make in (cdr, batches, attachments, set_ups, link, scenes, plans, parameters, logs)}
+TARGETS = {
+    make.__name__: make
+    for make in (cdr, batches, attachments, set_ups, scenes, plans, parameters, logs, link, frames, page, websocket)
+}

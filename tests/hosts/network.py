@@ -6,6 +6,7 @@ is done to them; nothing of the kernel is needed but namespaces and TAP devices.
 
 import fcntl
 import heapq
+import itertools
 import os
 import random
 import select
@@ -22,6 +23,7 @@ from types import TracebackType
 _TUN = Path("/dev/net/tun")
 _TUNSETIFF, _TAP, _NO_HEADER = 0x400454CA, 0x0002, 0x1000
 _LARGEST = 65535  # [bytes] of a frame
+_networks = itertools.count()  # of this process, several of which may be there at once
 
 
 def why_not() -> str:
@@ -53,6 +55,7 @@ class Network:
         self._chance = random.Random(seed)
         self._devices: dict[int, str] = {}  # the host of a device, by its descriptor
         self._stack = ExitStack()
+        self._mark = f"{os.getpid()}-{next(_networks)}"
         self._wake, self._stop = os.pipe()
 
     def command(self, host: str, *words: str) -> list[str]:
@@ -60,13 +63,13 @@ class Network:
         return ["ip", "netns", "exec", self._namespace(host), *words]
 
     def _namespace(self, host: str) -> str:
-        return f"lapwing-{os.getpid()}-{host}"
+        return f"lapwing-{self._mark}-{host}"
 
     def __enter__(self) -> "Network":
         self._stack.callback(lambda: [os.close(fd) for fd in (self._wake, self._stop)])
         try:
             for k, (host, address) in enumerate(self.addresses.items()):
-                self._add(host, address, f"lw{os.getpid()}-{k}")
+                self._add(host, address, f"lw{self._mark}-{k}")
         except BaseException:
             self._stack.close()
             raise

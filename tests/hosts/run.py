@@ -59,9 +59,13 @@ class Run:
         return self.log.stat().st_size if self.log.exists() else 0
 
     def ends(self):
-        """Exit code and last words of everybody."""
+        """Exit code and last words of everybody; who does not end is killed."""
         found = {}
         for name, process in self.participants.items():
-            _, said = process.communicate(timeout=SLOWEST)
+            try:
+                _, said = process.communicate(timeout=SLOWEST)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                said = process.communicate()[1] + f"still there after {SLOWEST:g} s"
             found[name] = process.returncode, said
         return found

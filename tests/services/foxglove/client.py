@@ -5,6 +5,10 @@ import json
 import os
 import socket
 
+CLOSE, PONG = 8, 10  # kinds of frames
+PING = bytes([0x89, 0x80, *bytes(4)])
+PATIENCE = 0.05  # [s] for a pong, which a server does not give that waits for the rest of a frame
+
 
 class Client:
     """As small a client as will do (RFC 6455; no message of ours is fragmented)."""
@@ -24,14 +28,10 @@ class Client:
         """A text as JSON has it, or bytes; None at the end."""
         while True:
             try:
-                first, size = self._read(2)
+                kind, data = self._frame()
             except (EOFError, ConnectionResetError):
                 return None
-            if size >= 126:
-                size = int.from_bytes(self._read(2 if size == 126 else 8), "big")
-            data = self._read(size)
-            kind = first & 0x0F
-            if kind == 8:
+            if kind == CLOSE:
                 return None
             if kind in (1, 2):
                 return json.loads(data) if kind == 1 else data
@@ -39,7 +39,26 @@ class Client:
     def say(self, **message):
         data = json.dumps(message).encode()
         assert len(data) < 65536
-        self._socket.sendall(bytes([0x81, 0xFE]) + len(data).to_bytes(2, "big") + bytes(4) + data)
+        self.send(bytes([0x81, 0xFE]) + len(data).to_bytes(2, "big") + bytes(4) + data)
+
+    def send(self, data):
+        """Bytes as they are."""
+        self._socket.sendall(data)
+
+    def answers(self):
+        """Whether a ping is answered before the server closes, or waits for more."""
+        self._socket.settimeout(PATIENCE)
+        try:
+            self.send(PING)
+            while (kind := self._frame()[0]) != PONG:
+                if kind == CLOSE:
+                    return False
+        except (EOFError, OSError):
+            return False
+        return True
+
+    def close(self):
+        self._socket.close()
 
     def subscribe(self, *topics):
         """All of these are advertised, and subscribed to by their place."""
@@ -51,6 +70,13 @@ class Client:
         wanted = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
         self.say(op="subscribe", subscriptions=wanted)
         return [channels[topic] for topic in topics]
+
+    def _frame(self):
+        """Its kind, and what it holds."""
+        first, size = self._read(2)
+        if size >= 126:
+            size = int.from_bytes(self._read(2 if size == 126 else 8), "big")
+        return first & 0x0F, self._read(size)
 
     def _read(self, size):
         data = b""

@@ -49,6 +49,17 @@ def test_payloads_go_on_as_they_are_with_the_simulation_time():
         assert times == sorted(times)
 
 
+def test_what_is_no_frame_is_answered_with_the_end_and_not_told(capfd):
+    with Server("127.0.0.1:0") as server:
+        for rubbish in (b"GET", bytes(20), b"\x81\x84" + bytes(4) + b"null", b"\xff" * 10):
+            client = Client(server.port)
+            client.send(rubbish)
+            client.answers()
+            client.close()
+        assert Client(server.port).answers()
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.fixture
 def log(tmp_path):
     path = tmp_path / "flight.mcap"

@@ -1,0 +1,155 @@
+"""Whether a long flight stays as it began: memory, open files, threads, speed and the growth of the log.
+
+    python -m benchmarks.soak [--minutes M | --hours H]
+
+The delivery mission, which hovers in random wind until it is ended, at full speed: M minutes of wall time with a
+process for each service, or H simulated hours in one process.
+"""
+
+import argparse
+import os
+import signal
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from statistics import mean
+from typing import NamedTuple
+
+from benchmarks._bars import Row, show
+from cosim.interrupt import Interrupted
+from cosim.log import LogReader
+from cosim.watch import WATCHER
+from lapwing.runs.observer import Silent
+from lapwing.runs.processes import fly_processes
+from lapwing.runs.single import fly_single
+from services.participant import Participation
+from services.table import load, resolve
+
+SCENE, HOVER = "delivery_mission", "trajectory.phase.2.duration=1e6"
+LINES = 40  # samples of a run
+TICKS = os.sysconf("SC_CLK_TCK")
+PAGE_MB = os.sysconf("SC_PAGESIZE") / 1e6
+
+
+class Sample(NamedTuple):
+    """A run at one moment, all its processes together."""
+
+    wall: float  # [s] since its first
+    simulated: float  # [s]
+    memory: float  # [MB] resident
+    files: int  # open
+    threads: int
+    processor: float  # [s]
+    log: float  # [MB]
+
+
+class Sampler(Silent):
+    """Takes samples of the flight and of this process, and ends it after so many minutes of wall time, if any."""
+
+    def __init__(self, log: Path, minutes: float = 0.0, hours: float = 0.0):
+        """Of a flight of so many minutes of wall time, or of so many simulated hours."""
+        self._log, self._minutes = log, minutes
+        self._period = (60.0 * minutes or 3600.0 * hours) / LINES
+        self._began, self._next = time.monotonic(), 0.0
+        self.samples: list[Sample] = []
+
+    def begin(self) -> None:
+        """The first tick is being flown."""
+        self._began = time.monotonic()
+        print(" ".join(f"{name:>10}" for name in Sample._fields), flush=True)
+
+    def say(self, line: str) -> None:
+        """Print it."""
+        print(line, flush=True)
+
+    def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
+        """The run is at `time_ns`."""
+        wall, simulated = time.monotonic() - self._began, time_ns * 1e-9
+        if (wall if self._minutes else simulated) < self._next:
+            return
+        self._next += self._period
+        self.samples.append(sample(wall, simulated, self._log))
+        print(" ".join(f"{value:10.1f}" for value in self.samples[-1]), flush=True)
+        if self._minutes and wall >= 60.0 * self._minutes:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def sample(wall: float, simulated: float, log: Path) -> Sample:
+    """This process and its children now."""
+    memory, files, threads, processor = 0.0, 0, 0, 0.0
+    mine = Path(f"/proc/{os.getpid()}")
+    children = (mine / "task" / mine.name / "children").read_text().split()
+    for folder in (mine, *(Path("/proc", child) for child in children)):
+        fields = (folder / "stat").read_text().rpartition(")")[2].split()  # from the third of proc(5) on
+        processor += (int(fields[11]) + int(fields[12])) / TICKS
+        threads += int(fields[17])
+        memory += int(fields[21]) * PAGE_MB
+        files += len(list((folder / "fd").iterdir()))
+    return Sample(wall, simulated, memory, files, threads, processor, log.stat().st_size / 1e6)
+
+
+def rows(samples: list[Sample], name: str) -> list[Row]:
+    """The last quarter of the samples beside the second, in which all that is loaded once is there."""
+    quarter = len(samples) // 4
+    early, late = samples[quarter : 2 * quarter + 1], samples[-quarter - 1 :]
+
+    def rate(some: list[Sample], what: str, per: str) -> float:
+        first, last = some[0]._asdict(), some[-1]._asdict()
+        return (last[what] - first[what]) / (last[per] - first[per])
+
+    def grown(what: str) -> float:
+        return mean(getattr(s, what) for s in late) / mean(getattr(s, what) for s in early)
+
+    def ratio(what: str) -> float:
+        return rate(late, what, "simulated") / rate(early, what, "simulated")
+
+    speed, last = rate(samples, "simulated", "wall"), samples[-1]
+    cost, size = rate(samples, "processor", "simulated"), rate(samples, "log", "simulated")
+    print(f"{name}: {last.simulated:.0f} s in {last.wall:.0f} s, {speed:.1f} times real time; a simulated second takes")
+    print(f"{1e3 * cost:.1f} ms of processor time and {1e3 * size:.0f} kB of log; the last quarter to the second:")
+    return [
+        Row(f"{name}: memory", grown("memory"), "", 1.02),
+        Row(f"{name}: open files", grown("files"), "", 1.0),
+        Row(f"{name}: threads", grown("threads"), "", 1.0),
+        Row(f"{name}: processor time", ratio("processor"), "", 1.1),
+        Row(f"{name}: log", ratio("log"), "", 1.02),
+    ]
+
+
+def processes(minutes: float, log: Path) -> list[Sample]:
+    """A process for each service, at full speed."""
+    sampler = Sampler(log, minutes=minutes)
+    setup = resolve(load(SCENE, [HOVER, "run.duration=1e6"]))
+    with suppress(Interrupted):
+        fly_processes(Participation(WATCHER, setup, {}, "soak", log=str(log)), sampler)
+    return sampler.samples
+
+
+def single(hours: float, log: Path) -> list[Sample]:
+    """All services in this process."""
+    sampler = Sampler(log, hours=hours)
+    fly_single(resolve(load(SCENE, [HOVER, f"run.duration={3600.0 * hours}"])), log, observer=sampler)
+    return sampler.samples
+
+
+def main(minutes: float = 2.0, hours: float = 0.0) -> list[Row]:
+    """One of the two; each ends with a log that opens and holds all."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder, "log.mcap")
+        samples = single(hours, log) if hours else processes(minutes, log)
+        simulated = samples[-1].simulated
+        with LogReader(log) as read:
+            last = max(time_ns for _, _, time_ns, _ in read.messages(start_ns=int(1e9 * (simulated - 10.0)))) * 1e-9
+        print(f"the log opens, complete: {read.complete}, to {last:.1f} s")
+    found = rows(samples, "soak, one process" if hours else "soak, processes")
+    show(found)
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.soak")
+    parser.add_argument("--minutes", type=float, default=2.0, help="of wall time, a process for each service")
+    parser.add_argument("--hours", type=float, default=0.0, help="simulated, in one process, instead")
+    given = parser.parse_args()
+    main(given.minutes, given.hours)

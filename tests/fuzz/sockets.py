@@ -1,0 +1,101 @@
+"""What reads bytes that programs send: the MAVLink link, the page that shows a flight, viewers' WebSocket."""
+
+import atexit
+import io
+from collections.abc import Callable
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any
+
+from lapwing.runs.live import OVER, handler
+from messages import Estimate, header
+from messages.topics import ESTIMATE
+from services import table
+from services.foxglove.server import Server
+from services.mavlink.adapter import Adapter
+from services.mavlink.dialect import mavlink
+from services.mavlink.protocols import handlers
+from services.mavlink.resolve import describe
+from tests.fuzz.target import Target
+from tests.services.foxglove.client import Client
+
+CONVERSATION = 64  # inputs that one endpoint sends before the next comes
+STEP = 100_000_000  # [ns] of simulated time from one to the next
+_SENDER = bytes([255, 190])  # system and component of a ground station
+
+
+def _conversations() -> Callable[[bytes], None]:
+    """Gives bytes to a vehicle, of which estimates come, as those of one endpoint after the other."""
+    adapter = Adapter(describe(table.load("hover")), lambda command: None)
+    now = SimpleNamespace(endpoint=None, count=0)
+
+    def read(data: bytes) -> None:
+        if now.count % CONVERSATION == 0:
+            if now.endpoint:
+                adapter.disconnect(now.endpoint)
+            time_ns = now.count // CONVERSATION * STEP
+            adapter.take(ESTIMATE, time_ns, Estimate(header(time_ns, "world")).encode(), time_ns * 1e-9)
+            now.endpoint = adapter.connect(True, True, lambda sent: None)
+        now.count += 1
+        adapter.receive(now.endpoint, data)
+
+    return read
+
+
+def link() -> Target:
+    codec = mavlink.MAVLink(None, *_SENDER)
+    seeds = [mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(codec)]
+    seeds.append(mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0).pack(codec))
+    seeds.append(mavlink.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 2.5, 9).pack(codec))
+    return Target(_conversations(), tuple(seeds))
+
+
+def frames() -> Target:
+    """Frames with a sound checksum of the messages that have a handler, with any payload."""
+    numbers, receive = sorted(handlers()), _conversations()
+
+    def read(data: bytes) -> None:
+        number, payload = numbers[data[0] % len(numbers) if data else 0], data[1:256]
+        body = bytes([len(payload), 0, 0, 0]) + _SENDER + number.to_bytes(3, "little") + payload
+        check = mavlink.x25crc(body)
+        check.accumulate(bytes([mavlink.mavlink_map[number].crc_extra]))
+        receive(b"\xfd" + body + check.crc.to_bytes(2, "little"))
+
+    sizes = [mavlink.mavlink_map[number].unpacker.size for number in numbers]
+    return Target(read, tuple(bytes([k]) + bytes(size) for k, size in enumerate(sizes)))
+
+
+def page() -> Target:
+    """Requests to the page of `lapwing run --view`."""
+    live: Any = SimpleNamespace(steps=lambda: iter(["data: {}\n\n", OVER]))
+    reader = handler("/token/", b"<!doctype html>", live)
+
+    def read(data: bytes) -> None:
+        connection = SimpleNamespace(makefile=lambda *_: io.BytesIO(data), sendall=lambda sent: None)
+        reader(connection, ("127.0.0.1", 1), SimpleNamespace())  # type: ignore[arg-type]
+
+    host = b"Host: 127.0.0.1:8000\r\nConnection: keep-alive\r\n\r\n"
+    return Target(read, (b"GET /token/ HTTP/1.1\r\n" + host, b"GET /token/steps HTTP/1.0\r\n" + host))
+
+
+def websocket() -> Target:
+    """Frames of a client of `--foxglove`; one that is sent away comes again, to a server that must still be there."""
+    server = Server("127.0.0.1:0").__enter__()
+    atexit.register(server.__exit__)
+    server.declare("/drone1/estimate", ESTIMATE.message.type_name)
+    now = SimpleNamespace(client=Client(server.port))
+
+    def read(data: bytes) -> None:
+        if not now.client.answers():
+            now.client.close()
+            now.client = Client(server.port)
+        with suppress(ConnectionError):  # what came before may be answered while it goes
+            now.client.send(data)
+
+    texts = (
+        b'{"op":"subscribe","subscriptions":[{"id":0,"channelId":1}]}',
+        b'{"op":"unsubscribe","subscriptionIds":[0]}',
+        b'{"op":"getParameters","parameterNames":["a"],"id":"1"}',
+    )
+    frames = [bytes([0x81, 0x80 | len(text), *bytes(4)]) + text for text in texts]
+    return Target(read, (*frames, bytes([0x82, 0x85, *bytes(4)]) + b"\1\0\0\0\0"))
