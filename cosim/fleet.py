@@ -17,8 +17,14 @@ from messages.topics import CLOCK, Topic, of_vehicle
 
 
 def within(vehicle: str, name: str) -> str:
-    """What a port or a part of a vehicle is called in its fleet."""
-    return f"{vehicle}/{name}"
+    """What a port or a part of a vehicle is called in its fleet; that of another vehicle has its whole name already,
+    after a slash: "/left/truth"."""
+    return name[1:] if name.startswith("/") else f"{vehicle}/{name}"
+
+
+def of_other(vehicle: str, name: str) -> str:
+    """What a vehicle calls the port of another one."""
+    return f"/{within(vehicle, name)}"
 
 
 def joined(members: Sequence[Setup], resolved: Mapping[str, Any]) -> Setup:

@@ -83,10 +83,10 @@ def _run(run: Callable[[], None], standard_input: int, said: int) -> NoReturn:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         for here, there in ((standard_input, 0), (said, 1), (said, 2)):
             os.dup2(here, there)
-        for number in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of those before it
-            if number > 2:
+        for file in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of those before it
+            if file > 2:
                 with suppress(OSError):
-                    os.close(number)
+                    os.close(file)
         sys.stdout, sys.stderr = (open(number, "w", buffering=1, closefd=False) for number in (1, 2))  # noqa: SIM115
         code = _code_of(run)
         sys.stdout.flush()

@@ -105,9 +105,34 @@ def resolve(scene: Scene, plan: tuple[Any, ...] = ()) -> Setup:
     if scene.vehicles:
         if plan:
             raise SceneError("vehicle", "a plan is flown by one vehicle, and the scene has several")
-        return fleet.joined([resolve(vehicle) for vehicle in scene.vehicles], scene.resolved)
+        members = []
+        for vehicle in scene.vehicles:
+            with vehicle.located():
+                members.append(_resolve(vehicle, ()))
+        with scene.located():
+            return fleet.joined(_acquainted(members, "vehicle.{}."), scene.resolved)
     with scene.located():
-        return _resolve(scene, plan)
+        return _acquainted([_resolve(scene, plan)], "")[0]
+
+
+def _acquainted(members: list[Setup], key: str) -> list[Setup]:
+    """The set-ups of a run's vehicles, once services whose `resolve.py` has `fleet` have seen those of all.
+
+    `key`: what the keys of a vehicle begin with, with its number for {}.
+    """
+    keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
+    for name in dict.fromkeys(name for member in members for name in member.services):
+        module = importlib.import_module(f"{entry(name).package}.resolve")
+        if hasattr(module, "fleet"):
+            shares = {member.vehicle: member.services[name] for member in members if name in member.services}
+            found = module.fleet(shares, keys)
+            members = [
+                member._replace(services={**member.services, name: found[member.vehicle]})
+                if member.vehicle in found
+                else member
+                for member in members
+            ]
+    return members
 
 
 def _resolve(scene: Scene, plan: tuple[Any, ...]) -> Setup:

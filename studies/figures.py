@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -133,3 +134,9 @@ def end_state(flight: Flight) -> str:
     truth = flight.truth
     numbers = [truth.times[-1:], truth.position[-1], truth.orientation[-1], truth.velocity[-1], truth.rotor_speed[-1]]
     return hashlib.blake2b(np.concatenate(numbers).astype("<f8").tobytes(), digest_size=8).hexdigest()
+
+
+def joint_end_state(flights: Sequence[Flight]) -> str:
+    """That of a flight; of the flights of several vehicles a digest of theirs."""
+    states = [end_state(flight) for flight in flights]
+    return states[0] if len(states) == 1 else hashlib.blake2b("".join(states).encode(), digest_size=8).hexdigest()

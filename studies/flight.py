@@ -7,13 +7,14 @@ from typing import Any, Self
 
 import numpy as np
 
+from cosim.fleet import members
 from cosim.graph import Graph
 from cosim.log import LogReader
 from cosim.provenance import DIVERGED, FAILURE, RESTARTS
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
-from messages.topics import ACTUATORS, BODIES, SETPOINT, TRUTH, Topic, topic_named
+from messages.topics import ACTUATORS, BODIES, SETPOINT, TRUTH, Topic, of_all, topic_named
 from studies import tracking
 from studies.events import Event, events, ordered, restarts, slack
 from studies.origin import Origin
@@ -109,6 +110,23 @@ class Flight:
         """
         said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
         return cls(said, Origin.of_setup(graph.setup), failure, diverged)
+
+    @classmethod
+    def of_each(
+        cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
+    ) -> list[Self]:
+        """The flights of all vehicles of a run; arguments as of `of`."""
+        if graph.setup.vehicle:
+            return [cls.of(graph, only, failure, diverged)]
+        said = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
+        found = []
+        for own in members(graph.setup):
+            views = {_short(of_all(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
+            found.append(cls(views, Origin.of_setup(own), failure, diverged))
+        truths = {flight.vehicle: flight.truth for flight in found if flight.has("truth")}
+        for flight in found:
+            flight.fleet, flight.others = truths, tuple(other for other in found if other is not flight)
+        return found
 
     def __repr__(self) -> str:
         said = str(self.verdict) if len(self.truth) else "nothing was flown"

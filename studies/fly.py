@@ -9,7 +9,7 @@ from cosim.errors import DivergedError, LockStepError
 from cosim.graph import Graph
 from cosim.scene import Scene
 from cosim.setup import Setup
-from messages.topics import Topic
+from messages.topics import Topic, of_all
 from services.common.operator import Operator, nobody
 from services.processes import create_all
 from services.table import resolve
@@ -36,13 +36,27 @@ def fly(
         kind: the class of the flight, where more is to be had of it.
         rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
     """
+    return kind.of(*_flown(run, only, operator, rows))
+
+
+def fly_each(
+    setup: Setup, only: Collection[Topic] | None = None, rows: dict[str, np.ndarray] | None = None
+) -> list[Flight]:
+    """The flights of all vehicles of a run, one or several; arguments as of `fly`."""
+    return Flight.of_each(*_flown(setup, only, nobody, rows))
+
+
+def _flown(
+    run: Setup | Scene, only: Collection[Topic] | None, operator: Operator, rows: dict[str, np.ndarray] | None
+) -> tuple[Graph, Collection[Topic] | None, str, bool]:
+    """(the graph at its end, only, why that was before its time, whether a state is not sound)."""
     setup = run if isinstance(run, Setup) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
-    wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else wire.topic in only)}
+    wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else of_all(wire.topic) in only)}
     graph, failure, diverged = Graph(setup, services, PAGE, wanted, rows), "", False
     try:
         graph.advance(setup.last_tick + 1)
     except LockStepError as error:
         failure, diverged = str(error), isinstance(error, DivergedError)
-    return kind.of(graph, only, failure, diverged)
+    return graph, only, failure, diverged

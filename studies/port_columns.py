@@ -10,7 +10,7 @@ from cosim.graph import Graph
 from cosim.wire import Wire, due_ticks, encode
 from dynamics.rows import columns
 from messages.history import History, history, history_of_pages
-from messages.topics import Topic
+from messages.topics import Topic, of_all
 
 
 def columns_of(
@@ -20,17 +20,17 @@ def columns_of(
 
     Args:
         graph: has kept all rows of what these topics are made of.
-        only: the topics wanted, None for all that are recorded.
+        only: the topics wanted, of every vehicle, None for all that are recorded.
     """
     interval = graph.setup.interval_ns
     for service in graph.services:
         for wire in service.wires:
-            if graph.tick and (wire.topic.recorded if only is None else wire.topic in only):
+            if graph.tick and (wire.topic.recorded if only is None else of_all(wire.topic) in only):
                 columns = PortColumns(graph, wire)
                 yield wire.topic, columns.ticks * interval, columns
         for topic in service.spoken:
             said = [(tick, payload) for of, tick, payload in service.messages if of is topic]
-            if said and (only is None or topic in only):
+            if said and (only is None or of_all(topic) in only):
                 ticks = np.array([tick for tick, _ in said], np.int64)
                 yield topic, ticks * interval, history(topic.message, [payload for _, payload in said])
 

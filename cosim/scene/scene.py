@@ -132,7 +132,8 @@ class Scene:
     def replaced(self, section: Section) -> "Scene":
         """The same scene with this table in the place of its own; not checked against the others."""
         tables = {**self._tables, type(section): section}
-        return Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate)
+        vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
+        return Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -93,7 +93,7 @@ def run(
         from services.processes import needed
         from services.ros2.config import Bus
         from services.table import load, resolve
-        from studies.figures import end_state, figures
+        from studies.figures import figures, joint_end_state
 
         links = {"--mavlink": mavlink, "--external": external, "--foxglove": foxglove, "--view": view}
         check_mode(
@@ -190,7 +190,7 @@ def run(
         if flights and run_ is not None and campaign is not None:
             from studies.campaign import again
 
-            same = end_state(flights[0]) == again.end_state_of(run_, campaign)
+            same = joint_end_state(flights) == again.end_state_of(run_, campaign)
             typer.echo(f"run {run_} of {campaign}: {'the same end, to the bit' if same else 'ends in another state'}")
         for flown, flier in zip(flights, loaded.vehicles or (loaded,), strict=False):
             if unmet := flier[Success].unmet(figures(flown)):

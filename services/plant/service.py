@@ -7,8 +7,10 @@ from typing import Any
 from numba import types
 
 from cosim.errors import DivergedError
+from cosim.fleet import of_other
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
+from cosim.schedule import Input, Port
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks
@@ -21,11 +23,14 @@ from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters, 
 from services.common import ports
 from services.common.ports import PerRotor
 from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
+from services.plant.cores.interaction import Interaction
 from services.plant.cores.multirotor import MultirotorPlantState
-from services.plant.setup import PlantEvent, PlantSetup
+from services.plant.cores.presence import PresenceView
+from services.plant.setup import Others, PlantEvent, PlantSetup
 from services.plant.wire import wires
 
 NAME = "plant"
+PRESENCE = "presence"  # the port that other vehicles of the fleet read
 
 
 def create(setup: Setup) -> Service:
@@ -42,10 +47,25 @@ def create(setup: Setup) -> Service:
     parts: list[Any] = [part]
     if plant.events:
         parts.insert(0, Breakages(plant, part))
+    if plant.others:
+        before, after = _beside_others(plant, plant.others, state)
+        parts = [before, *parts, after]
     if bodies and not own:
         inputs = given.inputs[:1]
         parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     return Service(NAME, parts, wires(setup, plant.wiring))
+
+
+def _beside_others(plant: PlantSetup, others: Others, state: Cell) -> tuple[Part, Part]:
+    """(what the others do to the vehicle, before it steps; what they may know of it, after)."""
+    names = [PRESENCE, *(of_other(name, PRESENCE) for name in others.names)]
+    vehicle, port = plant.core.vehicle, Port(PRESENCE, others.presence)
+    interaction = Interaction(vehicle.effects, plant.core.interval)
+    view = PresenceView(vehicle, others.presence)
+    return (
+        Part(f"{NAME}.interaction", interaction, state, tuple(Input(name, 1) for name in names)),
+        Part(f"{NAME}.{PRESENCE}", view, state, (Input(ports.TRUTH),), (port,)),
+    )
 
 
 def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:

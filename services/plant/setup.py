@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from dynamics.effects._interaction import Presence
 from services.plant.wire import PlantWiring
 
 
@@ -11,6 +12,13 @@ class PlantEvent(NamedTuple):
     tick: int
     propeller: int  # from 0, in the order of the airframe
     becomes: str  # "locked", "free" or "torn_off"
+
+
+class Others(NamedTuple):
+    """The vehicles of the fleet that a plant's effects know of."""
+
+    names: tuple[str, ...]
+    presence: Presence  # what these may know of its vehicle, with the numbers that do not change
 
 
 class PlantSetup(NamedTuple):
@@ -23,3 +31,4 @@ class PlantSetup(NamedTuple):
     bodies: Any = None  # parameters of the part that tells of single bodies, None without it
     events: tuple[PlantEvent, ...] = ()
     euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
+    others: Others | None = None

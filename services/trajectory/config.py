@@ -11,14 +11,16 @@ duration = 5.0
 ```
 
 Values are displacements from the vehicle's pose at the start, in world axes: z = 0 stands on the ground again.
+With `follow` they are displacements from where it stands beside another vehicle at the start, as that one flies on.
 A channel that a phase does not name holds. A channel may have a list of segments, joined in time. A phase lasts
 `duration`, or else as long as its longest channel; channels that end earlier hold.
 """
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import named
+from dynamics.errors import KeyedError
 from services.trajectory.mission import CHANNELS, compile
 from services.trajectory.phases import Phases
 from services.trajectory.table_file import parse
@@ -29,6 +31,8 @@ class Trajectory(Phases, Section):
 
     TABLE: ClassVar[str] = "trajectory"
     OPTIONAL: ClassVar[bool] = True
+    follow: str | None = None  # name of the vehicle of the fleet relative to whose trajectory the phases are
+    frame: Literal["heading", "world"] | None = None  # of the phases' axes: turning with the leader [heading], or not
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
@@ -45,5 +49,7 @@ class Trajectory(Phases, Section):
                         segment["points"] = parse(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:
-        """The segments join, phases are long enough."""
+        """The segments join, phases are long enough; a frame is that of a leader."""
         compile(self)
+        if self.frame and not self.follow:
+            raise KeyedError("trajectory.frame", "there is no leader whose it could be", "trajectory.follow, or none")

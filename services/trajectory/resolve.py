@@ -1,8 +1,14 @@
 """From a scene's `[trajectory]` to what is evaluated at every tick."""
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from cosim.scene import Scene
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup
+from dynamics.errors import KeyedError
+from dynamics.vector import subtract
 from services.common import ports
 from services.common.exchange import Exchange
 from services.common.ports import Reference
@@ -10,7 +16,9 @@ from services.common.sections import follows_trajectory
 from services.common.vehicle import start_place
 from services.trajectory.config import Trajectory
 from services.trajectory.core import TrajectoryPath
+from services.trajectory.following import FollowedPath
 from services.trajectory.mission import compile
+from services.trajectory.piece import Parameters
 from services.trajectory.service import TrajectorySetup
 
 LEAD = 0.1  # [s] the references are ahead of the plant at the most
@@ -21,11 +29,46 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     if not follows_trajectory(scene):
         return None
     exchange = scene[Exchange]
-    compiled = compile(scene[Trajectory], start_place(scene))
+    trajectory = scene[Trajectory]
+    compiled = compile(trajectory, start_place(scene))
     core = TrajectoryPath(compiled.parameters, compiled.final, exchange.interval)
     ahead = max(1, round(LEAD * exchange.rate))
     return ServiceSetup(
-        TrajectorySetup(core, compiled.phases),
+        TrajectorySetup(core, compiled.phases, *_leader(trajectory)),
         (Input(ports.TRUTH, ahead),),
         (Port(ports.TRAJECTORY, Reference()),),
     )
+
+
+def _leader(trajectory: Trajectory) -> tuple[str, bool]:
+    """(its name, whether the axes turn with it)."""
+    return (trajectory.follow, trajectory.frame != "world") if trajectory.follow else ("", False)
+
+
+def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
+    """The trajectories of a run's vehicles, by their names: those that follow another one are given its path.
+
+    Raises:
+        KeyedError: no such leader; `keys` has what each vehicle's keys begin with.
+    """
+    return {name: _following(name, shares, keys[name]) if share.parameters.follow else share
+            for name, share in shares.items()}  # fmt: skip
+
+
+def _following(name: str, shares: Mapping[str, ServiceSetup], key: str) -> ServiceSetup:
+    own = shares[name].parameters
+    others = [other for other, share in shares.items() if other != name and not share.parameters.follow]
+    if own.follow not in others:
+        expected = f"one that flies along a trajectory of its own: {', '.join(others) or 'there is none'}"
+        raise KeyedError(f"{key}trajectory.follow", f"got {own.follow}", expected)
+    leader, core = shares[own.follow].parameters.core, own.core
+    if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(leader.path), strict=True)):
+        message = f"the phases are those of {own.follow}, which it would fly twice as far"
+        raise KeyedError(f"{key}trajectory.phase", message, "phases of its own, relative to the leader")
+    origin = subtract(core.path.origin_world, leader.path.origin_world)
+    relative = core._replace(path=core.path._replace(origin_world=origin))
+    return shares[name]._replace(parameters=own._replace(core=FollowedPath(leader, relative, own.heading)))
+
+
+def _numbers(path: Parameters) -> list[np.ndarray]:
+    return [part for channel in (path.x, path.y, path.z, path.yaw) for part in channel]

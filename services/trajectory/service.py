@@ -10,6 +10,7 @@ from messages.topics import TRAJECTORY
 from services.common import ports
 from services.common.references import reference_wire
 from services.trajectory.core import TrajectoryPath
+from services.trajectory.following import FollowedPath
 
 NAME = "trajectory"
 
@@ -17,8 +18,10 @@ NAME = "trajectory"
 class TrajectorySetup(NamedTuple):
     """What the service is given."""
 
-    core: TrajectoryPath
+    core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names, by number
+    follow: str = ""  # name of the vehicle relative to whose trajectory it is
+    heading: bool = False  # whether its axes turn with that one
 
 
 def create(setup: Setup) -> Service:

@@ -24,7 +24,7 @@ from services.common.success import Success
 from studies.campaign import table
 from studies.campaign.distributions import parse
 from studies.campaign.plan import Plan
-from studies.campaign.runs import Reference, Row, columns, scene_of, sources
+from studies.campaign.runs import Reference, Row, columns, scene_of, sources, vehicles
 
 MANIFEST = "campaign.json"
 SHARDS = 32  # of a small campaign
@@ -41,7 +41,7 @@ class Folder:
     @cached_property
     def kinds(self) -> dict[str, type]:
         """Type of each column of the table."""
-        return columns(self.plan)
+        return columns(self.plan, self.about["vehicles"])
 
     @cached_property
     def shards(self) -> list[range]:
@@ -99,13 +99,15 @@ class Folder:
 
 def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
     """What a campaign is, as plain data."""
+    scene = scene_of(plan)
     said: dict[str, Any] = {
-        "scene": scene_of(plan).name,
+        "scene": scene.name,
         **plan._asdict(),
         "vary": {key: str(distribution) for key, distribution in plan.vary},
         "sources": sources(plan),
-        "published": scene_of(plan)[Published].resolved(),
-        "success": scene_of(plan)[Success].require,
+        "vehicles": vehicles(plan),
+        "published": {} if scene.vehicles else scene[Published].resolved(),
+        "success": list(dict.fromkeys(text for each in scene.vehicles or (scene,) for text in each[Success].require)),
         **reference._asdict(),
     }
     return json.loads(json.dumps(said))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.campaign.fleet import NEAREST
 from studies.campaign.folder import Folder
 from studies.campaign.runs import REFUSED
 from studies.campaign.statistics import Interval, Spread, interval, spread
@@ -12,7 +13,7 @@ from studies.figures import FIGURES
 from studies.tracking import AXES
 from studies.verdict import KINDS
 
-LEAST_IS_WORST = tuple(f"inside.{axis}" for axis in "xyz")  # of all other figures the greatest is the worst
+LEAST_IS_WORST = (NEAREST, *(f"inside.{axis}" for axis in "xyz"))  # of all other figures the greatest is the worst
 
 
 class Results:
@@ -42,6 +43,11 @@ class Results:
     def scene(self) -> str:
         """Its name."""
         return str(self.folder.about["scene"])
+
+    @property
+    def vehicles(self) -> list[str]:
+        """The names of the vehicles of a fleet, whose columns are named `left.rmse.x`; [] of a scene of one."""
+        return list(self.folder.about["vehicles"])
 
     @property
     def published(self) -> dict[str, float]:

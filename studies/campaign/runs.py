@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import math
 import platform
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -16,12 +17,13 @@ from cosim.provenance import package_version
 from cosim.scene import Scene, SceneError
 from cosim.setup import Setup
 from services.common.success import Success
+from services.common.vehicle import Vehicle
 from services.table import load, reseed
+from studies.campaign import fleet
 from studies.campaign.plan import Plan
 from studies.campaign.setup import TOPICS, campaign_setup
-from studies.figures import FIGURES, check_success, end_state, figures
-from studies.flight import Flight
-from studies.fly import fly
+from studies.figures import FIGURES, check_success, figures, joint_end_state
+from studies.fly import fly_each
 
 REFUSED = "refused"  # the verdict on a run whose values the scene refuses
 TRIED = 16  # runs, of which the scene has to take one at least
@@ -49,15 +51,20 @@ def versions() -> dict[str, str]:
     return found | {name: version(name) for name in _NUMBERS_OF}
 
 
-def columns(plan: Plan) -> dict[str, type]:
-    """Name and type of every column of the table."""
+def vehicles(plan: Plan) -> tuple[str, ...]:
+    """The names of the vehicles of a fleet; () of a scene of one."""
+    return tuple(vehicle[Vehicle].name for vehicle in scene_of(plan).vehicles)
+
+
+def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
+    """Name and type of every column of the table; `vehicles` of a fleet."""
     found: dict[str, type] = {"run": int, "seed": int}
     for key in plan.keys:
         drawn = next((d for k, d in plan.vary if k == key), None)
         values = [entry[key] for entry in plan.sweep if key in entry] if drawn is None else drawn.values
         found[key] = float if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values) else str
     found |= {"success": bool, **{name: str if name in ("verdict", "told") else float for name in FIGURES}}
-    return {**found, "end_state": str}
+    return {**found, **fleet.columns(tuple(vehicles)), "end_state": str}
 
 
 def first_setup(plan: Plan) -> tuple[int, Setup]:
@@ -78,7 +85,7 @@ def first_setup(plan: Plan) -> tuple[int, Setup]:
 
 def reference(run: int, setup: Setup) -> Reference:
     """What a run comes to here; flies it."""
-    return Reference(versions(), run, end_state(fly(setup, TOPICS)))
+    return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
 
 
 def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Row]:
@@ -104,12 +111,25 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     try:
         setup = setup_of(plan, run)
     except SceneError as error:
-        return {**row, **dict.fromkeys(FIGURES, math.nan), "verdict": REFUSED, "told": str(error), "end_state": ""}
-    flight: Flight = fly(setup, TOPICS, rows=rows)
-    found = figures(flight)
-    unmet = scene_of(plan)[Success].unmet(found)
+        return {**row, **_of_refused(vehicles(plan)), "told": str(error)}
+    flights = fly_each(setup, TOPICS, rows)
+    row["end_state"] = joint_end_state(flights)
+    scene = scene_of(plan)
+    if scene.vehicles:
+        by_name = {flight.vehicle: flight for flight in flights}
+        required = {vehicle[Vehicle].name: vehicle[Success] for vehicle in scene.vehicles}
+        return row | fleet.joined(by_name, {name: figures(flight) for name, flight in by_name.items()}, required)
+    found = figures(flights[0])
+    unmet = scene[Success].unmet(found)
     told = f"{found['told']}; not {', not '.join(unmet)}" if unmet else ""
-    return {**row, **found, "success": not unmet, "told": told, "end_state": end_state(flight)}
+    return {**row, **found, "success": not unmet, "told": told}
+
+
+def _of_refused(names: tuple[str, ...]) -> Row:
+    found: Row = dict.fromkeys(FIGURES, math.nan)
+    for name, kind in fleet.columns(names).items():
+        found[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
+    return {**found, "verdict": REFUSED, "end_state": ""}
 
 
 def setup_of(plan: Plan, run: int) -> Setup:
@@ -143,7 +163,8 @@ def sources(plan: Plan) -> dict[str, str]:
 @cache
 def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
     found = load(scene, overrides)
-    check_success(found)
+    for vehicle in found.vehicles or (found,):
+        check_success(vehicle)
     return found
 
 
@@ -162,6 +183,6 @@ def _check(plan: Plan, reference: Reference) -> None:
         if (found := versions().get(name)) != wanted:
             raise ValueError(f"{where}: has {name} {found}; the campaign was begun with {wanted}")
     if reference.end_state not in _agreed:
-        if (found := end_state(fly(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
+        if (found := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
             raise ValueError(f"{where}: run {reference.run} goes another way there than where the campaign was begun")
         _agreed.add(reference.end_state)

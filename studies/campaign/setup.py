@@ -17,6 +17,14 @@ def campaign_setup(scene: Scene) -> Setup:
     Raises:
         ValueError: nobody flies along a trajectory in this scene.
     """
+    if scene.vehicles:
+        for vehicle in scene.vehicles:
+            _check(vehicle)
+    else:
+        _check(scene)
+    return resolve(scene.replaced(scene[Rates].model_copy(update={"estimate": scene[Exchange].rate})))
+
+
+def _check(scene: Scene) -> None:
     if not scene.has(Autopilot) or not follows_trajectory(scene):
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
-    return resolve(scene.replaced(scene[Rates].model_copy(update={"estimate": scene[Exchange].rate})))

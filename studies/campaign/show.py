@@ -7,9 +7,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from studies.campaign.fleet import NEAREST
 from studies.campaign.results import Results
 from studies.tracking import AXES, shown
 
+VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
 LISTED = 10  # failures, refusals
 
 
@@ -27,6 +29,8 @@ def show(console: Console, found: Results) -> None:
         least = {axis: found.spread(f"inside.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
         console.print(f"Least of a flight: {text}", highlight=False)
+    if found.vehicles:
+        _vehicles(console, found)
     if len(found) > 1 and not found.figures:
         console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
     console.print(f"{found.scene}: {len(found) + len(found.refused['run'])} runs: {found.told}", highlight=False)
@@ -40,6 +44,22 @@ def show(console: Console, found: Results) -> None:
         )
     _list(console, "run", found["run"][failed], found["told"][failed])
     _list(console, "refused: run", found.refused["run"], found.refused["told"])
+
+
+def _vehicles(console: Console, found: Results) -> None:
+    table = Table(title="The vehicles: worst run of each, and in how many runs it did not fail", title_justify="left")
+    table.add_column("vehicle", no_wrap=True)
+    for column in ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for vehicle in found.vehicles:
+        spreads = [found.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
+        share = f"{found[f'{vehicle}.success'].astype(bool).mean():.1%}"
+        table.add_row(vehicle, *(f"{s.worst:.4f}" if s else "" for s in spreads), share)
+    console.print(table)
+    least = found.spread(NEAREST)
+    if least:
+        text = f"{least.worst:.2f} m apart (run {least.run}), in half of the runs below {least.median:.2f} m"
+        console.print(f"Nearest of any two vehicles: {text}", highlight=False)
 
 
 def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str]) -> None:

@@ -1,0 +1,71 @@
+"""The jet below a vehicle against momentum theory and the conservation of its momentum."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynamics.effects import from_scene
+from dynamics.effects._interaction import Presence
+from dynamics.effects.rotor_wash import blown
+from dynamics.vehicles.airframe import load_airframe
+
+ROOT = Path(__file__).parents[3]
+QUAD = load_airframe(ROOT / "scenes/vehicles/quad_x.toml")
+WASH = from_scene({"rotor_wash": {}}, QUAD)[0]
+NO_WIND = (0.0, 0.0, 0.0)
+WEIGHT, DENSITY = 1.5 * 9.80665, 1.2
+R = WASH.disc_radius
+INDUCED = math.sqrt(WEIGHT / (2.0 * DENSITY * math.pi * R * R))  # momentum theory
+
+
+def hovering(thrust=(0.0, 0.0, WEIGHT), disc_radius=R):
+    return Presence((1.0, 2.0, 50.0), NO_WIND, thrust, 1.5, DENSITY, disc_radius=disc_radius)
+
+
+def wind(offset, *others):
+    place = tuple(float(a + b) for a, b in zip((1.0, 2.0, 50.0), offset, strict=True))
+    return np.array(blown(WASH, NO_WIND, Presence(place), others or (hovering(),), 0.004))
+
+
+def test_the_disc_is_as_large_as_those_of_four_rotors():
+    assert math.pi * R * R == pytest.approx(4.0 * math.pi * 0.128**2)
+
+
+def test_on_the_axis_it_goes_from_the_induced_velocity_to_twice_that_and_spreads():
+    assert wind((0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, -INDUCED))
+    assert np.linalg.norm(wind((0.0, 0.0, 10.0 * R))) < 0.01 * INDUCED  # above
+    for way in (5.0, 20.0):
+        developed = 1.0 + way / math.hypot(way, R)
+        expected = developed * INDUCED * R / (R + 0.113 * way)
+        assert wind((0.0, 0.0, -way)) == pytest.approx((0.0, 0.0, -expected))
+
+
+def test_half_of_the_speed_is_where_the_round_jet_of_pope_has_it():
+    """Half width 0.094 m a metre of way, once the disc's own size no longer counts."""
+    far = 1000.0
+    half = 0.094 * (far + R / 0.113)
+    assert wind((half, 0.0, -far))[2] == pytest.approx(0.5 * wind((0.0, 0.0, -far))[2], rel=0.01)
+
+
+@pytest.mark.parametrize("way", [3.0, 10.0])
+def test_its_momentum_is_the_thrust(way):
+    """The flux of momentum through a plane below."""
+    radius = np.linspace(0.0, 6.0 * (R + 0.113 * way), 2001)
+    speed = np.array([-wind((r, 0.0, -way))[2] for r in radius])
+    flux = np.trapezoid(DENSITY * speed**2 * 2.0 * math.pi * radius, radius)
+    developed = 0.5 * (1.0 + way / math.hypot(way, R))
+    assert flux == pytest.approx(WEIGHT * developed**2, rel=1e-5)
+    assert flux == pytest.approx(WEIGHT, rel=0.01)
+
+
+def test_it_blows_against_the_thrust_and_many_add_up():
+    leaning = hovering((WEIGHT, 0.0, 0.0))
+    assert wind((-2.0, 0.0, 0.0), leaning)[0] < -0.5 * INDUCED
+    assert wind((2.0, 0.0, 0.0), leaning) == pytest.approx((0.0, 0.0, 0.0), abs=0.02 * INDUCED)
+    assert wind((0.0, 0.0, -3.0), hovering(), hovering()) == pytest.approx(2.0 * wind((0.0, 0.0, -3.0)))
+
+
+def test_no_jet_without_thrust_or_of_one_that_names_no_wash():
+    assert not wind((0.0, 0.0, -1.0), hovering(NO_WIND), hovering(disc_radius=0.0)).any()

@@ -1,0 +1,98 @@
+"""Vehicles of a fleet that touch one another, and feel the air that others move."""
+
+import numpy as np
+import pytest
+
+from cosim.fleet import members
+from cosim.serialise import first_difference, from_json, to_json
+from services.table import from_resolved, parse, reseed, resolve
+from tests.cosim.memory_log import fly
+from tests.cosim.test_agreement import fly_apart
+
+SCENE = """
+[run]
+duration = 4.0
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.rotor_inflow]
+[effects.body_drag]
+[effects.ground_contact]
+[effects.rotor_wash]
+[effects.collision]
+[autopilot]
+gains = "tuned"
+estimator = "truth"
+[[vehicle]]
+name = "above"
+airframe = "delivery_drone"
+[[vehicle.trajectory.phase]]
+name = "up"
+z = { kind = "minimum_jerk", to = 4.0, duration = 2.0 }
+[[vehicle.trajectory.phase]]
+name = "over"
+y = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
+[[vehicle]]
+name = "below"
+airframe = "delivery_drone"
+start = [0.0, 3.0]
+[[vehicle.trajectory.phase]]
+name = "up"
+z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
+[[vehicle.trajectory.phase]]
+name = "wait"
+duration = 10.0
+"""
+
+
+def scene(tmp_path, *overrides):
+    return parse(tmp_path / "two.toml", SCENE, overrides)
+
+
+@pytest.fixture(scope="module")
+def setup(tmp_path_factory):
+    return resolve(scene(tmp_path_factory.mktemp("scene")))
+
+
+@pytest.fixture(scope="module")
+def flown(setup):
+    return fly(setup)
+
+
+def test_who_is_below_feels_the_wash_and_who_is_above_does_not(flown):
+    above, below = (flown.view(f"{name}/truth").wind for name in ("above", "below"))
+    assert -0.2 < above[-1, 2] < 0.0  # what the one below draws down
+    assert below[-1, 2] < -2.0
+    assert np.abs(below[:200]).max() < 0.05  # 3 m beside
+    height = flown.view("below/truth").position[:, 2]
+    assert height[-1] < height[500] - 0.02  # pushed down
+
+
+def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+    assert fly_apart(setup, None).digest == flown.digest
+
+
+def test_who_meets_nobody_flies_as_one_without_the_effects(tmp_path, setup):
+    """No wash and no contact: the same bits as if they knew nothing of one another."""
+    far = ["vehicle.1.start=[0.0, 500.0]", "run.duration=1.0"]
+    there = fly(resolve(scene(tmp_path, *far)))
+    alone = fly(members(resolve(scene(tmp_path, *far)))[1]._replace(services=_unacquainted(setup, tmp_path, far)))
+    assert there.payloads("below/truth") == alone.payloads("truth")
+
+
+def _unacquainted(setup, tmp_path, far):
+    return resolve(scene(tmp_path, *far).vehicles[1]).services
+
+
+def test_a_set_up_survives_text_and_another_seed(setup, tmp_path):
+    assert first_difference(from_json(to_json(setup)), setup) is None
+    assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
+    assert first_difference(reseed(setup, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
+
+
+def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
+    meeting = fly(resolve(scene(tmp_path, "vehicle.0.trajectory.phase.0.z.to=1.0")))
+    a, b = (meeting.view(f"{name}/truth").position for name in ("above", "below"))
+    gap = np.linalg.norm(a - b, axis=1)
+    radius = resolve(scene(tmp_path).vehicles[0]).services["plant"].parameters.core.vehicle.effects[1].radius
+    assert gap.min() == pytest.approx(2.0 * radius, rel=0.02)
+    assert b[-1, 1] > 3.1  # pushed aside
