@@ -108,10 +108,8 @@ def test_a_plan_for_one_vehicle_refuses_several():
 
 
 def test_what_is_for_one_vehicle_is_refused_in_one_line():
-    for arguments in (["tune", "fleet"], ["campaign", "fleet", "--runs", "2", "--out", "nowhere"]):
-        done = subprocess.run(
-            [sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 2, done.stderr
-        assert "vehicle: there are 3; expected a scene of one vehicle" in done.stderr
-        assert len(done.stderr.splitlines()) == 1
+    command = [sys.executable, "-m", "lapwing", "tune", "fleet"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "vehicle: there are 3; expected a scene of one vehicle" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
