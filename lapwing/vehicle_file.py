@@ -8,7 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from dynamics.validation import fault
-from dynamics.vehicles.airframe import Airframe, Propeller
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.airframe_tables import Propeller
 from dynamics.vehicles.propeller import from_stand
 from lapwing.vehicle_figures import CELL_VOLTAGE, FIGURES, Values
 

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
-    from dynamics.vehicles.airframe import Propeller
+    from dynamics.vehicles.airframe_tables import Propeller
 
 
 def blade_angle(propeller: "Propeller") -> float:

@@ -58,7 +58,10 @@ SHOWN = {  # of classes that have more than what a user calls
     "LockStepError": (),
 }
 VIEW = ("times", "stamps", "position", "orientation", "attitude", "fields", "flat")
-READINGS = (ports.ImuReading, ports.MagnetometerReading, ports.GpsReading, ports.BarometerReading, ports.SonarReading)
+READINGS = (
+    *(ports.ImuReading, ports.MagnetometerReading, ports.GpsReading, ports.BarometerReading),
+    *(ports.DistanceReading, ports.OpticalFlowReading),
+)
 
 
 def api() -> str:

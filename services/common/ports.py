@@ -98,11 +98,11 @@ class BarometerReading(NamedTuple):
     valid: bool = False
 
 
-class SonarReading(NamedTuple):
-    """One reading of a sonar, as sensor_msgs/Range has it."""
+class DistanceReading(NamedTuple):
+    """One reading of a sonar or a rangefinder, as sensor_msgs/Range has it."""
 
-    range: float = 0.0  # [m], rounded to float32; +inf: no echo, -inf: nearer than range_min
-    variance: float = 0.0  # [m^2], of the white noise, rounded to float32
+    range: float = 0.0  # [m]; +inf: nothing in range, -inf: nearer than range_min; a sonar's rounded to float32
+    variance: float = 0.0  # [m^2], of the white noise; a sonar's rounded to float32
     valid: bool = False
 
 
@@ -113,14 +113,6 @@ class OpticalFlowReading(NamedTuple):
     rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same
     distance: float = 0.0  # [m] along the camera's axis
     variance: float = 0.0  # [(rad/s)^2] of the flow's white noise, per axis
-    valid: bool = False
-
-
-class RangefinderReading(NamedTuple):
-    """One reading of a laser rangefinder, as sensor_msgs/Range has it."""
-
-    range: float = 0.0  # [m]; +inf: nothing in range, -inf: nearer than range_min
-    variance: float = 0.0  # [m^2], of the white noise
     valid: bool = False
 
 

@@ -13,19 +13,18 @@ from cosim.wire import Fields, Wire
 from dynamics.generate import implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotate
-from dynamics.noise import TURN_ON, Key, normal
+from dynamics.noise import Key
 from dynamics.terrain import Level, ray
 from dynamics.vector import ZERO, Vec3, add
 from messages import Range, header
 from messages import topics as topic
 from messages.records import stamp_columns
-from services.common.ports import RangefinderReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.common.ports import DistanceReading
+from services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from services.sensors.line import DEPTH, Fault
 from services.sensors.truth import Place, Truth
 
-CHANNELS = ("range",)
-FARTHEST = 1000.0  # [m] that the ground is looked for
+__all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "wires"]
 
 
 class Rangefinder(NamedTuple):
@@ -45,19 +44,7 @@ class Rangefinder(NamedTuple):
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
-class RangefinderState(NamedTuple):
-    """State of a rangefinder."""
-
-    scale: float
-    line: Line  # the first of the three
-
-
-READING = RangefinderReading()
-
-
-def blank() -> RangefinderState:
-    """A state without meaning, to be overwritten at the first tick."""
-    return RangefinderState(0.0, BLANK)
+READING = DistanceReading()
 
 
 def to_ground(terrain: Any, origin: Vec3, direction: Vec3) -> float:
@@ -93,29 +80,20 @@ def _distance(p: Rangefinder, truth: Truth) -> float:
 
 
 @kernel
-def initial(p: Rangefinder, key: Key, truth: Truth) -> RangefinderState:
+def initial(p: Rangefinder, key: Key, truth: Truth) -> DistanceState:
     """State before the first sample."""
-    return RangefinderState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((_distance(p, truth), 0.0, 0.0)))
+    return switched_on(p, key, _distance(p, truth))
 
 
 @kernel
 def sample(
-    p: Rangefinder, s: RangefinderState, key: Key, tick: int, truth: Truth
-) -> tuple[RangefinderState, RangefinderReading]:
+    p: Rangefinder, s: DistanceState, key: Key, tick: int, truth: Truth
+) -> tuple[DistanceState, DistanceReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
-    measured = (s.scale * _distance(p, truth) + noise, 0.0, 0.0)
-    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
-    distance = errors.quantise(arrived[0], p.resolution)
-    if distance > p.range_max:
-        distance = math.inf
-    elif distance < p.range_min:
-        distance = -math.inf
-    variance = errors.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
-    return RangefinderState(s.scale, line), RangefinderReading(distance, variance, valid)
+    return measured(p, s, key, tick, _distance(p, truth))
 
 
-def _fields(r: RangefinderReading, time_ns: np.ndarray) -> Fields:
+def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:
     """Distance; nothing seen +Inf, too near -Inf, no reading NaN."""
     distance = np.where(np.asarray(r.valid) != 0.0, r.range, math.nan)
     return {**stamp_columns(time_ns), "range": distance, "variance": r.variance}

@@ -29,7 +29,7 @@ READINGS = {
     ports.MAGNETOMETER: ports.MagnetometerReading(),
     ports.GPS: ports.GpsReading(),
     ports.BAROMETER: ports.BarometerReading(),
-    ports.SONAR: ports.SonarReading(),
+    ports.SONAR: ports.DistanceReading(),
 }
 
 

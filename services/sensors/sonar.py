@@ -11,15 +11,15 @@ from numba import types
 from dynamics.generate import implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
-from dynamics.noise import TURN_ON, Key, normal
+from dynamics.noise import Key
 from dynamics.terrain import Level, ray, surface
 from dynamics.vector import add, apply, dot, scale
-from services.common.ports import SonarReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
+from services.common.ports import DistanceReading
+from services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from services.sensors.line import DEPTH, Fault
 from services.sensors.truth import Truth
 
-CHANNELS = ("range",)
+__all__ = ["CHANNELS", "PRESETS", "Sonar", "blank", "initial", "sample"]
 
 
 class Sonar(NamedTuple):
@@ -37,20 +37,7 @@ class Sonar(NamedTuple):
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
-class SonarState(NamedTuple):
-    """State of a sonar."""
-
-    scale: float
-    line: Line  # the first of the three
-
-
-def blank() -> SonarState:
-    """A state without meaning, to be overwritten at the first tick."""
-    return SonarState(0.0, BLANK)
-
-
 RAYS = 8  # along the edge of the beam, for bodies that stand beside its axis
-FARTHEST = 1000.0  # [m] that an echo is looked for
 
 
 def _distance(p: Sonar, truth: Truth) -> float:
@@ -97,24 +84,16 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
 
 
 @kernel
-def initial(p: Sonar, key: Key, truth: Truth) -> SonarState:
+def initial(p: Sonar, key: Key, truth: Truth) -> DistanceState:
     """State before the first sample."""
-    return SonarState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((_distance(p, truth), 0.0, 0.0)))
+    return switched_on(p, key, _distance(p, truth))
 
 
 @kernel
-def sample(p: Sonar, s: SonarState, key: Key, tick: int, truth: Truth) -> tuple[SonarState, SonarReading]:
+def sample(p: Sonar, s: DistanceState, key: Key, tick: int, truth: Truth) -> tuple[DistanceState, DistanceReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
-    measured = (s.scale * _distance(p, truth) + noise, 0.0, 0.0)
-    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
-    distance = errors.quantise(arrived[0], p.resolution)
-    if distance > p.range_max:
-        distance = math.inf
-    elif distance < p.range_min:
-        distance = -math.inf
-    variance = errors.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
-    return SonarState(s.scale, line), SonarReading(float(np.float32(distance)), float(np.float32(variance)), valid)
+    s, r = measured(p, s, key, tick, _distance(p, truth))
+    return s, DistanceReading(float(np.float32(r.range)), float(np.float32(r.variance)), r.valid)
 
 
 # MaxBotix MB1202 (I2CXL-MaxSonar-EZ0) data sheet: 42 kHz, 0.20 to 7.65 m, 1 cm, widest beam of its family; from there

@@ -25,7 +25,7 @@ from messages import (
 from messages import topics as topic
 from messages.records import stamp_columns
 from services.common import ports
-from services.common.ports import BarometerReading, GpsReading, ImuReading, MagnetometerReading, SonarReading
+from services.common.ports import BarometerReading, DistanceReading, GpsReading, ImuReading, MagnetometerReading
 
 UNKNOWN = -1.0  # first element of a covariance: there is no such measurement
 
@@ -164,7 +164,7 @@ def _sonar_sample(frame: str, sonar: SonarWiring | None) -> Any:
     return Range(header(0, frame), radiation_type=Range.ULTRASOUND, field_of_view=view, min_range=least, max_range=most)
 
 
-def _sonar(r: SonarReading, time_ns: np.ndarray) -> Fields:
+def _sonar(r: DistanceReading, time_ns: np.ndarray) -> Fields:
     """Distance downwards; no echo +Inf, too near -Inf, no reading NaN."""
     return {
         **stamp_columns(time_ns),

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dynamics.vehicles import performance
-from dynamics.vehicles.airframe import Airframe, Propeller
+from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.airframe_tables import Propeller
 from dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
 from lapwing.docs.schema import airframe_schema
 from services.table import load

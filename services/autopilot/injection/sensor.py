@@ -11,9 +11,9 @@ from dynamics.kernel import ByClass, leaf
 from dynamics.noise import Key
 from services.autopilot.injection.memory import Memory, garbage, silent
 from services.common.failures import DELAYED, GARBAGE, STUCK, WRONG, Faults
-from services.common.ports import BarometerReading, GpsReading, MagnetometerReading, SonarReading
+from services.common.ports import BarometerReading, DistanceReading, GpsReading, MagnetometerReading
 
-Reading = BarometerReading | GpsReading | MagnetometerReading | SonarReading
+Reading = BarometerReading | DistanceReading | GpsReading | MagnetometerReading
 
 EXCESS_PRESSURE = 500.0  # [Pa] of a wrong barometer, which reads some 40 m too low
 EXCESS_RANGE = 1.5  # [m] of a wrong sonar
@@ -58,13 +58,13 @@ def _sonar_kind(faults: Faults) -> int:
 
 
 @leaf
-def _wrong_sonar(r: SonarReading) -> SonarReading:
-    return SonarReading(r.range + EXCESS_RANGE, r.variance, r.valid)
+def _wrong_sonar(r: DistanceReading) -> DistanceReading:
+    return DistanceReading(r.range + EXCESS_RANGE, r.variance, r.valid)
 
 
 @leaf
-def _garbage_sonar(r: SonarReading, key: Key, tick: int) -> SonarReading:
-    return SonarReading(abs(garbage(key, tick, 0, RANGES)[0]), r.variance, r.valid)
+def _garbage_sonar(r: DistanceReading, key: Key, tick: int) -> DistanceReading:
+    return DistanceReading(abs(garbage(key, tick, 0, RANGES)[0]), r.variance, r.valid)
 
 
 @leaf
@@ -107,7 +107,7 @@ def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
 FAILURES = ByClass()
 """The failures by the class of a reading."""
 FAILURES[BarometerReading] = _Failure(_barometer_kind, _wrong_barometer, _garbage_barometer)
-FAILURES[SonarReading] = _Failure(_sonar_kind, _wrong_sonar, _garbage_sonar)
+FAILURES[DistanceReading] = _Failure(_sonar_kind, _wrong_sonar, _garbage_sonar)
 FAILURES[MagnetometerReading] = _Failure(_magnetometer_kind, _wrong_magnetometer, _garbage_magnetometer)
 FAILURES[GpsReading] = _Failure(_gps_kind, _wrong_gps, _garbage_gps)
 

@@ -1,4 +1,4 @@
-"""The readings of a barometer, a sonar, a magnetometer or optical flow: each kind has its update of the filter."""
+"""The readings of a barometer, a magnetometer, a distance or optical flow: each kind has its update of the filter."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,13 +13,12 @@ from services.autopilot.estimator import Estimator, State
 from services.autopilot.navigation.state import NavigationState
 from services.common.ports import (
     BarometerReading,
+    DistanceReading,
     MagnetometerReading,
     OpticalFlowReading,
-    RangefinderReading,
-    SonarReading,
 )
 
-Reading = BarometerReading | MagnetometerReading | OpticalFlowReading | RangefinderReading | SonarReading
+Reading = BarometerReading | DistanceReading | MagnetometerReading | OpticalFlowReading
 
 
 class Correction(NamedTuple):
@@ -39,7 +38,7 @@ def _magnetometer(p: Estimator, x: State, r: MagnetometerReading) -> State:
 
 
 @leaf
-def _distance(p: Estimator, x: State, r: SonarReading | RangefinderReading) -> State:
+def _distance(p: Estimator, x: State, r: DistanceReading) -> State:
     return estimator.update_sonar(p, x, r.range, r.variance, r.valid)
 
 
@@ -52,8 +51,7 @@ UPDATES = ByClass()
 """The compiled update of the filter by the class of a reading."""
 UPDATES[BarometerReading] = _barometer
 UPDATES[MagnetometerReading] = _magnetometer
-UPDATES[SonarReading] = _distance
-UPDATES[RangefinderReading] = _distance
+UPDATES[DistanceReading] = _distance
 UPDATES[OpticalFlowReading] = _flow
 
 

@@ -11,7 +11,8 @@ from dynamics.integrators import get
 from dynamics.lie.quaternion import Quaternion
 from dynamics.noise import stream_key
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe, Mass, load_airframe
+from dynamics.vehicles.airframe import Airframe, load_airframe
+from dynamics.vehicles.airframe_tables import Mass
 from services.common.sections import SHIPPED
 
 DRONE = load_airframe(SHIPPED / "vehicles/delivery_drone.toml")

@@ -15,7 +15,8 @@ from dynamics.lie.quaternion import Quaternion
 from dynamics.noise import stream_key
 from dynamics.validation import fault
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe, CarriedBox, load_airframe
+from dynamics.vehicles.airframe import Airframe, load_airframe
+from dynamics.vehicles.airframe_tables import CarriedBox
 from services.table import load, resolve
 
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")

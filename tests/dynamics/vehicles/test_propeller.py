@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dynamics.vehicles.airframe import Propeller, load_airframe
+from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.airframe_tables import Propeller
 from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
 
 PROPELLER = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml").propeller

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from flights import ENABLED, error, fly_by_sensors, inject, mode, place, said
 
+import lapwing
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import exp, from_roll_pitch_yaw, multiply, rotation_matrix
 from dynamics.noise import TURN_ON, normal3, stream_key
@@ -124,3 +125,27 @@ def test_a_flight_goes_on_without_a_receiver_where_it_has_optical_flow():
     blind = fly_by_sensors(18, script, ENABLED)
     assert any("position is lost" in text for text in said(blind))
     assert error(seeing, 9.0) < 0.5 * error(blind, 9.0)
+
+
+@pytest.mark.long
+def test_under_the_bridge_the_flow_carries_the_flight():
+    """The scene that ships, and the same with a camera that sees nothing."""
+
+    def drift(flight):
+        """(longest time without a fix [s], largest horizontal error of the estimate meanwhile [m])."""
+        fix = flight.topic("gps/fix")
+        lost = fix.times[fix["status.status"] < 0]
+        estimate, truth = flight.estimate, flight.truth
+        inside = (estimate.times > lost[0]) & (estimate.times < lost[-1])
+        true = np.array([np.interp(estimate.times[inside], truth.times, truth.position[:, i]) for i in range(2)]).T
+        return np.ptp(lost), np.linalg.norm(estimate.position[inside, :2] - true, axis=1).max()
+
+    seeing = lapwing.fly("bridge")
+    assert seeing.landed
+    lost, error = drift(seeing)
+    assert lost > 20.0
+    assert error < 0.25
+    dark = [{"kind": "dropout", "start": 5.0}]
+    blind = lapwing.fly("bridge", {"sensors.optical_flow.faults": dark, "run.duration": 20.0})
+    assert any(event.text == "the position is lost" for event in blind.events)
+    assert drift(blind)[1] > 3.0 * error

@@ -1,0 +1,46 @@
+"""What sonar and rangefinder share: the way from a true distance to their reading (theory.md, section 3.2)."""
+
+import math
+from typing import Any, NamedTuple
+
+from dynamics.kernel import leaf
+from dynamics.noise import TURN_ON, Key, normal
+from services.common.ports import DistanceReading
+from services.sensors import errors
+from services.sensors.line import BLANK, Line, carry, new_line
+
+CHANNELS = ("range",)
+FARTHEST = 1000.0  # [m] that the ground is looked for
+
+
+class DistanceState(NamedTuple):
+    """State of a sensor of distance."""
+
+    scale: float
+    line: Line  # the first of the three
+
+
+def blank() -> DistanceState:
+    """A state without meaning, to be overwritten at the first tick."""
+    return DistanceState(0.0, BLANK)
+
+
+@leaf
+def switched_on(p: Any, key: Key, distance: float) -> DistanceState:
+    """State before the first sample, at a true distance [m]; `p`: parameters of the sensor."""
+    return DistanceState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((distance, 0.0, 0.0)))
+
+
+@leaf
+def measured(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
+    """Next state and reading of a true distance [m]; other arguments as of `imu.sample`."""
+    noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
+    true = (s.scale * distance + noise, 0.0, 0.0)
+    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, true)
+    found = errors.quantise(arrived[0], p.resolution)
+    if found > p.range_max:
+        found = math.inf
+    elif found < p.range_min:
+        found = -math.inf
+    variance = errors.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
+    return DistanceState(s.scale, line), DistanceReading(found, variance, valid)
