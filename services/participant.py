@@ -99,7 +99,8 @@ def take_part(given: Participation) -> None:
     with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security) as bus:
         watched = WATCHER in given.peers and not given.with_parent
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
-        compares = not given.with_parent or bool(encoded)
+        # all that one launcher has started have the same set-up; a program of somebody else's may have another
+        compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
         journal = Journal(given.name, given.journal) if given.journal >= 0 else None
         process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
