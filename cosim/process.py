@@ -5,7 +5,7 @@ import signal
 import threading
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from cosim.bus import LEASE_MS, ZenohBus
@@ -47,7 +47,7 @@ class Process:
         others: list[str],
         speed: float | None = None,
         core: int | None = None,
-        compares: bool = False,
+        compares: Sequence[str] = (),
         realtime: bool = False,
         restarts: bool = False,
         journal: Journal | None = None,
@@ -62,7 +62,7 @@ class Process:
             others: participants without which the run cannot begin.
             speed: simulated seconds per second, None for as fast as it goes.
             core: the core that all services of a sequential lock step share, None to leave it to the system.
-            compares: whether the others may have another set-up, which is to be found out at joining.
+            compares: those of the others who may have another set-up, which is to be found out at joining.
             realtime: whether it is to run in the scheduler's real-time class.
             restarts: whether some service of the run is started again where it is killed.
             journal: of this service, where it is one of them.
@@ -185,7 +185,7 @@ class Process:
     def _compare(self) -> None:
         """Refuse to fly with those who have resolved another scene."""
         own = to_json(self.setup)
-        for other in self.others:
+        for other in self.compares:
             if other == self.name:
                 continue
             given = self.bus.ask(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)

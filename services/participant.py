@@ -105,7 +105,8 @@ def take_part(given: Participation) -> None:
         door = given.with_parent and processes.ROUTER in given.peers  # one that cannot be opened ends the run
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
         others += [processes.ROUTER] if door else []
-        compares = not given.with_parent or bool(encoded)
+        # all that one launcher has started have the same set-up; a program of somebody else's may have another
+        compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
         journal = Journal(given.name, given.journal) if given.journal >= 0 else None
         process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)

@@ -29,19 +29,27 @@ if TYPE_CHECKING:
     from services.mavlink.options import Options
 
 
-def _recorded_hub(log: Path, options: "Options") -> "Hub":
+def _recorded_hubs(log: Path, options: "Options", stack: ExitStack) -> "dict[str, Hub]":
+    """The links of each vehicle of a log, by its name; those of a fleet wait with the first's."""
+    from cosim.fleet import members
     from cosim.log import LogReader
     from cosim.provenance import SETUP_FILE
     from lapwing.runs.refly import recorded_setup
     from services.mavlink.hub import Hub
+    from services.mavlink.links import numbered
     from services.mavlink.vehicle import VehicleDescription
 
     with LogReader(log) as recorded:
-        if SETUP_FILE not in recorded.attachments:  # another tool's, or a part of one
-            named = next((topic.split("/")[1] for topic in recorded.topics() if topic.endswith("/status")), "drone1")
-            return Hub(VehicleDescription(named), options, None)
-        setup = recorded_setup(recorded)
-    return Hub(setup.beside.get("mavlink", VehicleDescription(setup.vehicle)), options, None)
+        if SETUP_FILE in recorded.attachments:
+            flown = {m.vehicle: m.beside.get("mavlink") for m in members(recorded_setup(recorded))}
+        else:  # another tool's, or a part of one
+            flown = {next((t.split("/")[1] for t in recorded.topics() if t.endswith("/status")), "drone1"): None}
+    hubs: dict[str, Hub] = {}
+    for i, (name, description) in enumerate(flown.items()):
+        own = options._replace(urls=tuple(numbered(url, i) for url in options.urls))
+        hub = Hub(description or VehicleDescription(name), own, None, next(iter(hubs.values()), None))
+        hubs[name] = stack.enter_context(hub)
+    return hubs
 
 
 def _topics(log: Path) -> dict[str, str]:
@@ -92,11 +100,17 @@ def replay(
         check_links(mavlink, mavlink_key, insecure and ros2_router is None)
         router = check_ros2(ros2, ros2_router, insecure)
         with ExitStack() as stack:
-            hub = None
+            hubs: dict[str, Hub] = {}
             if mavlink:
-                options = mavlink_options(mavlink, mavlink_key, insecure, log, factor)
-                hub = stack.enter_context(_recorded_hub(log, options))
-            listeners: list[Callable[[str, int, bytes], None]] = [hub.replay] if hub else []
+                hubs = _recorded_hubs(log, mavlink_options(mavlink, mavlink_key, insecure, log, factor), stack)
+            listeners: list[Callable[[str, int, bytes], None]] = [hub.replay for hub in hubs.values()]
+
+            def wait(seconds: float) -> None:
+                leading, *others = hubs.values()
+                leading.wait(seconds)
+                for other in others:
+                    other.adapter.tick(time.monotonic())
+
             viewers: list[Any] = []
             if foxglove is not None or ros2 is not None:
                 kinds = _topics(log)
@@ -114,7 +128,7 @@ def replay(
                 listeners.append(viewer.put)
             stop = stack.enter_context(Stop())
             keyboard = stack.enter_context(Keyboard())
-            pace = Pace(keyboard.keys, typer.echo, hub.wait if hub else time.sleep)
+            pace = Pace(keyboard.keys, typer.echo, wait if hubs else time.sleep)
             count = play(
                 log,
                 key_prefix,
@@ -128,8 +142,9 @@ def replay(
                 pace,
                 topics.split(",") if topics is not None else None,
             )
-            for line in hub.report() if hub else ():
-                typer.echo(f"mavlink: {line}")
+            for name, hub in hubs.items():
+                for line in hub.report():
+                    typer.echo(f"mavlink: {f'{name}: ' if len(hubs) > 1 else ''}{line}")
             stop.check()
         typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
 

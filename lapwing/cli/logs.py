@@ -19,7 +19,7 @@ LogFile = Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a 
 @app.command()
 def info(log: LogFile) -> None:
     """Tell what a log holds: its making, its topics, what happened, and where messages are missing."""
-    from lapwing.cli.summary import flown, show_events
+    from lapwing.cli.summary import fleet, show_events
     from studies.logs.info import info as look
     from studies.terminal import console
 
@@ -29,8 +29,10 @@ def info(log: LogFile) -> None:
             typer.echo(f"  {label:<9} {line}")
         for line in _topics(found):
             typer.echo(line)
-        flight = flown(log)
-        if flight is not None:
+        flights = fleet(log)
+        for flight in flights:
+            if len(flights) > 1:
+                typer.echo(f"{flight.vehicle}:")
             show_events(console(), [event._asdict() for event in flight.events])
 
 

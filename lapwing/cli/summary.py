@@ -24,15 +24,6 @@ MOST = 60  # events that are printed
 COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all others
 
 
-def flown(log: Path) -> Flight | None:
-    """The flight of a log, None where nothing was flown."""
-    try:
-        found = Flight.read(log)
-    except ValueError:
-        return None
-    return found if len(found.truth) else None
-
-
 def fleet(log: Path) -> list[Flight]:
     """The flights of all vehicles of a log; empty where nothing was flown."""
     try:

@@ -135,7 +135,7 @@ const fly = (section, given, live) => {
     if (flight.links.length) add("link", "", flight, line("#9AA5AF", 3));
     if (flight.asked) add("asked", "", flight, { ...line("#333333", 2, "setpoint"), mode: "markers", marker: { size: 4, symbol: "diamond-open", color: "#333333" } });
     if (flight.wind) add("wind", "", flight, line("#56B4E9", 5, "wind"));
-    if (flight.bodies.some((body) => body.f)) add("force", "", flight, line("#CC79A7", 4, "contact force"));
+    if (flight.bodies.some((body) => body.f)) add("force", "", flight, line("#CC79A7", 4, "force of contact or joint"));
     whom.add(new Option(flight.name, whom.length));
   }
   whom.hidden = flights.length < 2;

@@ -59,7 +59,9 @@ def test_the_report_shows_all_paths(flown):
 def test_info_verify_and_refly_take_its_log(flown):
     folder, _, figures = flown
     log = folder / "a.mcap"
-    assert "left, right, scout" in command("info", log)
+    told = command("info", log)
+    assert "left, right, scout" in told
+    assert [told.count(f"\n{name}:\n") for name in ("left", "right", "scout")] == [1, 1, 1]  # events of each
     assert figures["digest"] in command("verify", log)
     assert f"the same digest {figures['digest']}" in command("refly", log)
 
@@ -80,10 +82,12 @@ def test_a_fleet_of_one_is_told_as_a_fleet(tmp_path):
 
 
 def test_a_replay_publishes_every_vehicle(flown):
-    folder, _, _ = flown
+    folder, _, figures = flown
     said = command("replay", folder / "a.mcap", "--speed", "max", "--topics", "/left/truth,/scout/imu",
-                   "--listen", "tcp/127.0.0.1:0", "--record", folder / "r.mcap")  # fmt: skip
+                   "--listen", "tcp/127.0.0.1:0", "--record", folder / "r.mcap",
+                   "--mavlink", "udpout:127.0.0.1:14599")  # fmt: skip
     assert "messages published" in said
+    assert [f"mavlink: {name}: " in said for name in figures["vehicles"]] == [True] * 3
     assert "/scout/imu" in command("info", folder / "r.mcap")
 
 

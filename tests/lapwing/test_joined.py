@@ -100,4 +100,4 @@ def test_viewers_are_told_of_events_while_it_flies(tmp_path):
     assert set(told) <= set(kept)
     kinds = [Log.decode(payload).name for _, payload in told]
     assert "arming" in kinds
-    assert [kind for step in shown for _, kind, _ in step["events"]][: len(kinds)] == kinds
+    assert [kind for step in shown for _, _, kind, _ in step["events"]][: len(kinds)] == kinds

@@ -11,10 +11,14 @@ import numpy as np
 import pytest
 
 from cosim.log import LogReader
+from cosim.watch import WATCHER
 from messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
 from messages.types import FOLDER
+from services.processes import ROS2, needed
 from services.ros2.commands import SOURCE
 from services.ros2.node import ROUTER, Node, parse_router
+from services.table import load, resolve
+from tests.endpoints import loopback_endpoints
 
 DOMAIN = 7
 PATIENCE = 120.0  # [s] the run gets to compile and to begin
@@ -87,15 +91,19 @@ def fly(tmp_path, port, *more, scene="groundstation"):
     words = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}", "--log", str(tmp_path / "a.mcap"), *more]
     command = [sys.executable, "-m", "lapwing", "run", scene, "--set", "success.require=[]", *words]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    await_listener(run, port)
+    return run
+
+
+def await_listener(process, port):
     deadline = time.monotonic() + PATIENCE
-    while run.poll() is None and time.monotonic() < deadline:
+    while process.poll() is None and time.monotonic() < deadline:
         try:
-            socket.create_connection(("127.0.0.1", port)).close()
-            return run
+            return socket.create_connection(("127.0.0.1", port)).close()
         except ConnectionRefusedError:
             time.sleep(0.1)
-    run.kill()
-    raise AssertionError(run.communicate()[0])
+    process.kill()
+    raise AssertionError(process.communicate()[0])
 
 
 def plain(message):
@@ -185,11 +193,12 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
     try:
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/right/events", Log)
         arm, mode = graph.publisher("/right/command/arm", Bool), graph.publisher("/right/command/mode", String)
-        topics = {}
-        while clock.get(timeout=PATIENCE).clock.sec < 3:
-            if not topics:
-                topics = graph.topics()
-                mode.publish(data="takeoff")
+        topics, asked = {}, False
+        while (now := clock.get(timeout=PATIENCE).clock).sec < 3:
+            topics = topics or graph.topics()
+            if not asked and now.sec >= 1:
+                asked = True
+                mode.publish(data="hold")
                 arm.publish(data=True)
         said = run.communicate(timeout=PATIENCE)[0]
     finally:
@@ -205,7 +214,48 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
     types.pop("/wall_time")
     assert types.items() <= topics.items()
     commands = {name: [c.kind for message in told for c in message.commands] for name, told in inputs.items()}
-    assert commands == {"left": [], "right": ["takeoff", "arm"], "scout": []}
+    assert commands == {"left": [], "right": ["hold", "arm"], "scout": []}
+    assert ("mode", "hold") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
+
+
+def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tmp_path, port, graph):
+    sets = ["--set", "run.duration=4", "--set", "autopilot.operator=true", "--set", "autopilot.estimator=truth"]
+    names = [*needed(resolve(load("groundstation", sets[1::2]))), ROS2]
+    table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, WATCHER]).items())
+    common = ["groundstation", *sets, "--set", "success.require=[]", "--peers", table, "--key-prefix", "elsewhere"]
+    log = ["--log", str(tmp_path / "a.mcap")]
+    graph_at = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}"]
+    own = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}
+    lapwing, pipe = [sys.executable, "-m", "lapwing"], subprocess.PIPE
+    started = []
+
+    def start(*words):
+        command = [*lapwing, *words, *common, "--insecure"]
+        started.append(subprocess.Popen(command, stdout=pipe, stderr=subprocess.STDOUT, text=True))
+        return started[-1]
+
+    try:
+        node = start("service", ROS2, *own[ROS2])
+        await_listener(node, port)
+        for name in names[:-1]:
+            start("service", name, *own.get(name, []))
+        run = start("run", *log)
+        clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/events", Log)
+        arm, asked = graph.publisher("/drone1/command/arm", Bool), False
+        while clock.get(timeout=PATIENCE).clock.sec < 3:
+            if not asked:
+                asked = True
+                arm.publish(data=True)
+        said, told = run.communicate(timeout=PATIENCE)[0], node.communicate(timeout=PATIENCE)[0]
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+    assert (run.returncode, node.returncode) == (0, 0), said
+    assert "1 commands taken\n" in told
+    with LogReader(tmp_path / "a.mcap") as log:
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+    assert [(c.source, c.kind) for message in inputs for c in message.commands] == [(SOURCE, "arm")]
     assert ("arming", "armed") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
@@ -244,21 +294,55 @@ def test_another_machine_needs_to_be_asked_for():
         parse_router("robot:7447", False)
 
 
+SIMULATION_TIME = """
+import rclpy
+from rclpy.parameter import Parameter
+
+rclpy.init()
+node = rclpy.create_node("probe", parameter_overrides=[Parameter("use_sim_time", value=True)])
+while not (now := node.get_clock().now().nanoseconds):
+    rclpy.spin_once(node, timeout_sec=1.0)
+print(now)
+"""
+
+
 @pytest.mark.skipif(os.environ.get("LAPWING_ROS2") != "1", reason="needs ROS 2 with rmw_zenoh, and LAPWING_ROS2=1")
-def test_ros2_itself_sees_the_run_and_arms_it(tmp_path, port):
-    nodes = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ROS_DOMAIN_ID": str(DOMAIN)}
+def test_ros2_itself_sees_the_run_and_commands_it(tmp_path, port):
+    nodes = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ROS_DOMAIN_ID": str(DOMAIN), "PYTHONUNBUFFERED": "1"}
     nodes["ZENOH_CONFIG_OVERRIDE"] = f'connect/endpoints=["tcp/127.0.0.1:{port}"]'
+    environment = os.environ | nodes
 
-    def ros2(*words):
-        command = ["ros2", "topic", *words]
-        return subprocess.run(command, env=os.environ | nodes, check=True, capture_output=True, text=True).stdout
+    def said_by(*command):
+        return subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, timeout=PATIENCE).stdout
 
-    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=60")
+    def publish(topic, kind, value):
+        said_by("ros2", "topic", "pub", "--once", "-w", "1", f"/drone1/command/{topic}", kind, value)
+
+    target = None
+    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=90")
     try:
-        assert {"/clock", "/drone1/imu", "/drone1/command/arm"} <= set(ros2("list", "--no-daemon").split())
-        assert "frame_id: world" in ros2("echo", "--once", "/drone1/pose", "geometry_msgs/msg/PoseStamped")
-        ros2("pub", "--once", "-w", "1", "/drone1/command/arm", "std_msgs/msg/Bool", "{data: true}")
+        listed = said_by("ros2", "topic", "list", "--no-daemon").split()
+        assert {"/clock", "/drone1/imu", "/drone1/command/arm"} <= set(listed)
+        pose = ("/drone1/pose", "geometry_msgs/msg/PoseStamped")
+        assert "frame_id: world" in said_by("ros2", "topic", "echo", "--no-daemon", "--once", *pose)
+        assert "average rate: " in said_by("timeout", "--signal=INT", "8", "ros2", "topic", "hz", pose[0])
+        assert 0 < int(said_by("/usr/bin/python3", "-c", SIMULATION_TIME)) < 90e9
+        there = "{pose: {position: {x: 2.0, y: 1.0, z: 3.0}, orientation: {w: 1.0}}}"
+        command = ["ros2", "topic", "pub", "-r", "20", "/drone1/command/pose", pose[1], there]
+        target = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
+        time.sleep(5.0)  # the mode is accepted while setpoints come
+        publish("mode", "std_msgs/msg/String", "{data: offboard}")
+        publish("arm", "std_msgs/msg/Bool", "{data: true}")
         said = run.communicate(timeout=PATIENCE)[0]
     finally:
         run.kill()
-    assert "ros2: 1 commands taken\n" in said
+        if target:
+            target.kill()
+    assert run.returncode == 0, said
+    assert "commands taken\n" in said
+    with LogReader(tmp_path / "a.mcap") as log:
+        _, flown = log.history("/drone1/pose")
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+    kinds = [command.kind for message in inputs for command in message.commands]
+    assert [kind for kind in kinds if kind != "offboard_position"] == ["offboard", "arm"]
+    assert flown["pose.position"][-1] == pytest.approx([2.0, 1.0, 3.0], abs=0.5)
