@@ -66,7 +66,10 @@ sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
 	$(VENV)/audit/bin/cyclonedx-py requirements deploy/requirements.lock --pyproject pyproject.toml \
 		--output-reproducible --output-format JSON --output-file build/sbom.json
 
+DATABASE := https://pypi.org/pypi/pip/25.0/json
 audit: $(VENV)/audit/bin/pip-audit
+	@$(VENV)/audit/bin/python -c "from urllib.request import urlopen; urlopen('$(DATABASE)', timeout=15)" 2> /dev/null || \
+		{ echo "audit: $(DATABASE) gives no answer: known faults cannot be looked up from here" >&2; exit 2; }
 	$(VENV)/audit/bin/pip-audit --strict --require-hashes --disable-pip --requirement deploy/requirements.lock
 
 docker-build:

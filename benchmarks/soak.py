@@ -129,7 +129,8 @@ def processes(minutes: float, log: Path) -> list[Sample]:
 def single(hours: float, log: Path) -> list[Sample]:
     """All services in this process."""
     sampler = Sampler(log, hours=hours)
-    fly_single(resolve(load(SCENE, [HOVER, f"run.duration={3600.0 * hours}"])), log, observer=sampler)
+    with suppress(Interrupted):
+        fly_single(resolve(load(SCENE, [HOVER, f"run.duration={3600.0 * hours}"])), log, observer=sampler)
     return sampler.samples
 
 

@@ -42,6 +42,8 @@ def _configuration(
         "transport/shared_memory/enabled": False,
         "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
+        # as long for one that takes nothing: after a cut of 2 s, TCP may wait for 3 s more before it tries again
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": 1000 * LEASE_MS,
         "transport/link/rx/max_message_size": LARGEST,
         **security,
     }.items():

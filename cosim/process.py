@@ -4,7 +4,6 @@ import os
 import signal
 import threading
 import time
-import zlib
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -15,6 +14,7 @@ from cosim.participants import Participants
 from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
 from cosim.setup import Setup
+from cosim.setup_message import pack, unpack
 from cosim.tcp import limit_silence
 from dynamics.kernel import on_compile
 from messages.topics import Topic
@@ -160,7 +160,7 @@ class Process:
             LockStepError: somebody did not come.
             ValueError: another participant has resolved something else; names the first difference.
         """
-        packed = _packed(self.setup)
+        packed = pack(self.setup)
         self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", lambda _: packed)
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
         self._await([other for other in self.others if other != self.name], meanwhile)
@@ -189,9 +189,12 @@ class Process:
             if other == self.name:
                 continue
             given = self.bus.ask(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
-            if given is None or (text := _unpacked(given)) == own:
-                continue
-            found = first_difference(self.setup, from_json(text, self.setup.modules))
+            try:
+                if given is None or (text := unpack(given)) == own:
+                    continue
+                found = first_difference(self.setup, from_json(text, self.setup.modules))
+            except ValueError as error:
+                raise ValueError(f"{self.name}: what {other} flies cannot be read: {error}") from None
             key, here, there = found or ("set-up", "?", "?")
             time.sleep(FOUND_OUT)  # this participant must still answer those who compare later
             raise ValueError(f"{self.name}: {key} is {here!r} here, {there!r} for {other}: resolve the same scene")
@@ -213,13 +216,3 @@ class Process:
                 self.tell_of_refused()
                 waited = 0.0
         raise Stopped
-
-
-def _packed(setup: Setup) -> bytes:
-    """A set-up in a message that needs no fragments."""
-    return zlib.compress(to_json(setup).encode())
-
-
-def _unpacked(message: bytes) -> str:
-    """The text of a set-up; a program of somebody else's may send it as it is."""
-    return (message if message.startswith(b"{") else zlib.decompress(message)).decode()
