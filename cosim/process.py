@@ -196,8 +196,9 @@ class Process:
             except ValueError as error:
                 raise ValueError(f"{self.name}: what {other} flies cannot be read: {error}") from None
             key, here, there = found or ("set-up", "?", "?")
-            time.sleep(FOUND_OUT)  # this participant must still answer those who compare later
-            raise ValueError(f"{self.name}: {key} is {here!r} here, {there!r} for {other}: resolve the same scene")
+            if self.name in self.compares:
+                time.sleep(FOUND_OUT)  # this participant must still answer those who compare later
+            raise ValueError(f"{key} is {here!r} here, {there!r} for {other}: resolve the same scene")
 
     def patient(self, get: Callable[[float], T | None], waiting_for: Callable[[], str]) -> T:
         """What `get(timeout)` gives; says on the bus what is waited for when that takes long.

@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 from cosim.bus import ZenohBus, mesh
-from cosim.keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, STEP_KEY
+from cosim.keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, SETUP_KEY, STEP_KEY
 from cosim.log import LogReader
 from cosim.participants import Participants, new_secret
 from cosim.private import private_endpoints
+from cosim.serialise import to_json
 from messages.attachment import pack
 from services.common.operator import OPERATOR_KEY
+from services.table import load, resolve
 from tests.participants import participants
 
 SCENE = "scenes/hover.toml"
@@ -139,6 +141,19 @@ def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path
         json.loads((tmp_path / "run.json").read_text())["digest"]
         == (json.loads((tmp_path / "calm/run.json").read_text())["digest"])
     )
+
+
+def test_somebodys_program_with_another_set_up_is_refused(tmp_path):
+    other = to_json(resolve(load(SCENE, {"run.duration": 9.0}))).encode()
+    with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
+        program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", lambda _: other)
+        run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
+        program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
+        _, said = run.communicate(timeout=120)
+    assert run.returncode == 2
+    assert said.startswith("lapwing: autopilot_messages: last_tick is ")
+    assert "2250 for autopilot: resolve the same scene" in said
+    assert said.count("\n") == 1
 
 
 def test_a_flight_that_somebodys_program_ends_early_has_failed(tmp_path):
