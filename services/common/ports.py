@@ -12,7 +12,7 @@ from dynamics.vector import ZERO, Vec3
 
 TRUTH, BATTERY, BODIES = "truth", "battery", "bodies"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
-OPTICAL_FLOW, RANGEFINDER = "optical_flow", "rangefinder"
+OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 LIFT = "lift"
 
@@ -121,6 +121,14 @@ class RangefinderReading(NamedTuple):
 
     range: float = 0.0  # [m]; +inf: nothing in range, -inf: nearer than range_min
     variance: float = 0.0  # [m^2], of the white noise
+    valid: bool = False
+
+
+class AirspeedReading(NamedTuple):
+    """One reading of a differential pressure."""
+
+    pressure: float = 0.0  # [Pa]
+    variance: float = 0.0  # [Pa^2], of the white noise
     valid: bool = False
 
 
