@@ -67,6 +67,7 @@ GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate=
 BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
 SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
 AIRSPEED = Topic("{vehicle}/airspeed", FluidPressure, rate="sensors.airspeed.rate")
+AIRSPEED_RECEIVED = Topic("{vehicle}/airspeed/received", FluidPressure, rate="sensors.airspeed.rate")
 RANGEFINDER = Topic("{vehicle}/rangefinder", Range, rate="sensors.rangefinder.rate")
 OPTICAL_FLOW = Topic("{vehicle}/optical_flow", OpticalFlow, rate="sensors.optical_flow.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")

@@ -37,6 +37,8 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
     inputs = [Input(ports.TRUTH)] if truth else [Input(name) for name in (carried if own else sensors)]
+    if ports.AIRSPEED in carried and config.operator and not own:
+        inputs.append(Input(ports.AIRSPEED))  # not flown by: told to the operator
     inputs += [Input(ports.BATTERY), *([Input(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)

@@ -27,6 +27,7 @@ from services.autopilot.navigation.truth import TrueEstimate
 from services.autopilot.setup import AutopilotSetup
 from services.autopilot.wire import wires
 from services.common import ports
+from services.common.airspeed import airspeed_wire
 from services.common.failures import SOUND, Faults
 from services.common.parameters import GPS_HEIGHT, SONAR_HEIGHT
 
@@ -48,7 +49,8 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
         return [*(given.plan if tick == 0 else ()), *operator(tick)]
 
     faults = Cell(Faults(motors=(SOUND,) * len(given.airframe.rotor_x))) if given.operator else None
-    injection = Injection(faults, setup, given.estimator is not None, given.airframe.motor)
+    read = () if given.own_estimator else [i.port for i in setup.services[NAME].inputs]
+    injection = Injection(faults, setup, read, given.airframe.motor)
     commanding = Commanding(given, law, thresholds, service, speak, injection)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
@@ -65,6 +67,9 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     service.parts = [*injection.before(NAME), *navigation, commanding, *control, *injection.after(NAME, actuators)]
     texts, words = commanding.phases.table, commanding.words.table
     service.wires = wires(setup, given.estimate_every, given.status_every, texts, words)
+    if ports.AIRSPEED in read:
+        told = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
+        service.wires.append(airspeed_wire(topic.AIRSPEED_RECEIVED, setup.vehicle, told))
     service.spoken = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
     return service
 

@@ -10,7 +10,7 @@ from cosim.wire import Fields, Wire
 from messages import Actuators, Estimate, Status, Vector3, header
 from messages import topics as topic
 from messages.records import stamp_columns
-from services.autopilot.estimator import SOURCES
+from services.autopilot.estimator import NAMES
 from services.common import ports
 from services.common.ports import AutopilotStatus, MotorCommand, StateEstimate
 from services.common.references import reference_wire
@@ -58,7 +58,7 @@ def _actuators(x: MotorCommand, time_ns: np.ndarray) -> Fields:
 
 
 def _estimate_sample(rejected: int) -> Any:
-    return Estimate(header(0, "world"), rejected=tuple(name for bit, name in enumerate(SOURCES) if rejected >> bit & 1))
+    return Estimate(header(0, "world"), rejected=tuple(name for bit, name in enumerate(NAMES) if rejected >> bit & 1))
 
 
 def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:

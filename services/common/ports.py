@@ -12,7 +12,7 @@ from dynamics.vector import ZERO, Vec3
 
 TRUTH, BATTERY, BODIES = "truth", "battery", "bodies"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
-OPTICAL_FLOW, RANGEFINDER = "optical_flow", "rangefinder"
+OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 LIFT = "lift"
 
@@ -113,6 +113,14 @@ class OpticalFlowReading(NamedTuple):
     rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same
     distance: float = 0.0  # [m] along the camera's axis
     variance: float = 0.0  # [(rad/s)^2] of the flow's white noise, per axis
+    valid: bool = False
+
+
+class AirspeedReading(NamedTuple):
+    """One reading of a differential pressure."""
+
+    pressure: float = 0.0  # [Pa]
+    variance: float = 0.0  # [Pa^2], of the white noise
     valid: bool = False
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from messages import OperatorInput, header
+from messages import CommandAcks, OperatorInput, header
 from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
 from services.mavlink.announcements import Announcements
 from services.mavlink.channel import Channel, Signature
@@ -26,6 +26,7 @@ LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as go
 HEARTBEAT_INTERVAL = 1.0  # [s]
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for everybody
+_NO_ACKS = len(CommandAcks(header(0, "world")).encode())  # bytes of acknowledgements without one
 _EMPTY = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
 
 
@@ -134,6 +135,8 @@ class Adapter:
                 given = topic.message.decode(payload).commands
                 self.missions.observe([command for command in given if command.source not in ours], ())
             return
+        if topic is COMMAND_ACKS and len(payload) == _NO_ACKS:
+            return
         self.vehicle.put(topic, payload)
         if topic is ESTIMATE:
             self.commands.started = True
@@ -166,9 +169,7 @@ class Adapter:
     def _step(self) -> None:
         built: dict[int, list[Any]] = {}
         for endpoint, session in self.sessions.items():
-            session.schedule.send_due(endpoint.send, built)
-            for message in session.log.step():
-                endpoint.send(message)
+            endpoint.send(*session.schedule.due(built), *session.log.step())
         self.commands.step()
         self.missions.step()
         self.parameters.step()

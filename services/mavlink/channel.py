@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from services.mavlink.dialect import mavlink
+from services.mavlink.framing import frame
 
 _YEAR_2015 = 1420070400  # [s] Unix time from which signatures count, in steps of 10 us
 MIN_PASSPHRASE = 8  # characters of a passphrase
@@ -69,15 +70,18 @@ class Channel:
         """
         self._codec = _Codec(None, system, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._codec.robust_parsing = True
+        self._signs = signature is not None
         if signature:
             self._codec.signing = signature.state
         self._datagrams, self._counts = datagrams, counts
 
     def encode(self, message: Any) -> bytes:
         """The next frame."""
-        frame = message.pack(self._codec)
-        self._codec.seq = (self._codec.seq + 1) % 256
-        return frame
+        codec = self._codec
+        found = None if self._signs else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
+        found = found or message.pack(codec)
+        codec.seq = (codec.seq + 1) % 256
+        return found
 
     def decode(self, data: bytes) -> Iterator[Any]:
         """The sound messages of a piece of bytes; counts the others."""

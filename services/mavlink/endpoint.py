@@ -6,6 +6,8 @@ from typing import Any
 from services.mavlink.channel import Channel
 from services.mavlink.clock import Instant
 
+MAX_DATAGRAM = 1400  # [bytes] that any network carries in one piece
+
 
 class Endpoint:
     """Who is at the other end, and the way there."""
@@ -32,6 +34,14 @@ class Endpoint:
         """The sound messages in bytes that have come from it."""
         return self._channel.decode(data)
 
-    def send(self, message: Any) -> None:
-        """Send one message."""
-        self._put(self._channel.encode(message))
+    def send(self, *messages: Any) -> None:
+        """Send messages, several in a datagram as far as they fit."""
+        piece = b""
+        for message in messages:
+            frame = self._channel.encode(message)
+            if len(piece) + len(frame) > MAX_DATAGRAM:
+                self._put(piece)
+                piece = b""
+            piece += frame
+        if piece:
+            self._put(piece)

@@ -1,6 +1,5 @@
 """Which messages of the telemetry one endpoint gets, and when the next of each is due."""
 
-from collections.abc import Callable
 from typing import Any
 
 from services.mavlink.telemetry import streams
@@ -44,17 +43,17 @@ class Schedule:
         """Interval of a message [us], -1 for never."""
         return self._intervals.get(number, 0) // 1000 or -1
 
-    def send_due(self, send: Callable[[Any], None], built: dict[int, list[Any]]) -> None:
-        """Send what is due; `built` holds the messages of this moment, which all endpoints share."""
-        now = self._vehicle.time_ns
+    def due(self, built: dict[int, list[Any]]) -> list[Any]:
+        """The messages that are due; `built` holds those of this moment, which all endpoints share."""
+        now, found = self._vehicle.time_ns, []
         for number, interval in self._intervals.items():
             due = self._due[number]
             if interval and now >= due:
                 self._due[number] = max(due + interval, now - interval)  # keeps the mean rate, catches up no more
                 if number not in built:
                     built[number] = streams()[number].messages(self._vehicle)
-                for message in built[number]:
-                    send(message)
+                found += built[number]
+        return found
 
     def _plan(self) -> None:
         """Set all intervals anew."""

@@ -1,7 +1,7 @@
 """The MAVLink link of a run: telemetry to ground stations, their commands to the autopilot.
 
 It takes no part in the lock step: nobody waits for it, and when it dies the flight goes on. In real time it subscribes
-to what it shows at once; all else it reads from the services' batches, which wakes nobody up for a message.
+to what it shows or passes on at once, and an estimate wakes it up; all else it reads then, from the services' batches.
 """
 
 import time
@@ -21,7 +21,8 @@ from services.mavlink.hub import Hub
 from services.mavlink.links import numbered
 from services.mavlink.options import Options
 
-AT_ONCE = (ESTIMATE, STATUS, COMMAND_ACKS)
+AT_ONCE = (ESTIMATE, COMMAND_ACKS)
+ALL = (OPERATOR, STATUS, *AT_ONCE)  # of which no message is left out
 
 
 def run(process: Process, given: Any) -> None:
@@ -58,13 +59,16 @@ def run(process: Process, given: Any) -> None:
                 other.adapter.tick(time.monotonic())
 
         senders = process.participants.senders(BATCH_KEY, setup.services)
-        senders |= dict.fromkeys(topics, process.participants.author("autopilot"))
-        arrived = process.bus.receive(senders, notify=leading.wake)
+        author = process.participants.author("autopilot")
+        senders |= {key: author for key, (_, topic) in topics.items() if topic is not ESTIMATE}
+        estimates = {key: author for key, (_, topic) in topics.items() if topic is ESTIMATE}
+        estimated = process.bus.receive(estimates, notify=leading.wake)
+        arrived = process.bus.receive(senders, notify=None if estimates else leading.wake)
         process.join(wait)  # endpoints may connect while the others still load or compile
         flying = True
         while flying and not process.stopping:
             wait()
-            while flying and (news := arrived.get_with_key(timeout=0.0)) is not None:
+            while flying and (news := estimated.get_with_key(0.0) or arrived.get_with_key(0.0)) is not None:
                 name, time_ns, payload = news
                 flying = bool(payload)
                 if flying and name in topics:
@@ -78,16 +82,13 @@ def run(process: Process, given: Any) -> None:
 
 
 def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: tuple, interval_ns: int) -> None:
-    """Every command and, where they do not come at once, every status and answer; of all else the newest."""
+    """Every command and status, what comes at once only where it does not, of all else the newest."""
     _, pages = unpack_batch(payload)
     for page in pages:
         topic = of_all(page.topic)
-        if topic is OPERATOR or (topic in AT_ONCE and not at_once):
-            chosen = range(len(page.ticks))
-        elif topic not in AT_ONCE:
-            chosen = range(len(page.ticks) - 1, len(page.ticks))
-        else:
+        if topic in at_once:
             continue
+        chosen = range(0 if topic in ALL else len(page.ticks) - 1, len(page.ticks))
         for hub in [hubs[page.topic.vehicle]] if page.topic.vehicle else hubs.values():
             for i in chosen:
                 hub.take(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())

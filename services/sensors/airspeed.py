@@ -3,17 +3,16 @@
 import math
 from typing import Annotated, NamedTuple
 
-import numpy as np
 from annotated_types import Ge, Gt, Lt
 
 from cosim.schedule import Port
-from cosim.wire import Fields, Wire
+from cosim.wire import Wire
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotate_back
 from dynamics.noise import TURN_ON, Key, normal, normal3
-from messages import FluidPressure, header
 from messages import topics as topic
-from messages.records import stamp_columns
+from services.common.airspeed import airspeed_wire
+from services.common.ports import AirspeedReading
 from services.sensors import errors
 from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
 from services.sensors.truth import Truth
@@ -32,14 +31,6 @@ class Airspeed(NamedTuple):
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
-
-
-class AirspeedReading(NamedTuple):
-    """One reading of a differential pressure."""
-
-    pressure: float = 0.0  # [Pa]
-    variance: float = 0.0  # [Pa^2], of the white noise
-    valid: bool = False
 
 
 class AirspeedState(NamedTuple):
@@ -84,15 +75,9 @@ def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> 
     return AirspeedState(s.scale, s.turn_on, line), AirspeedReading(arrived[0], variance, valid)
 
 
-def _fields(r: AirspeedReading, time_ns: np.ndarray) -> Fields:
-    """Differential pressure; no reading: NaN."""
-    pressure = np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan)
-    return {**stamp_columns(time_ns), "fluid_pressure": pressure, "variance": r.variance}
-
-
 def wires(frame: str, port: Port, p: Airspeed) -> list[Wire]:
     """Its topic."""
-    return [Wire(topic.AIRSPEED, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))]
+    return [airspeed_wire(topic.AIRSPEED, frame, port)]
 
 
 # Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Resolution: 20 counts a pascal, the scale

@@ -10,9 +10,10 @@ from services.autopilot.estimator.height import follow_ground, update_barometer,
 from services.autopilot.estimator.parameters import PRESETS, Estimator
 from services.autopilot.estimator.predict import predict
 from services.autopilot.estimator.standstill import update_standstill
-from services.autopilot.estimator.state import SOURCES, State, estimate, initial
+from services.autopilot.estimator.state import NAMES, SOURCES, State, estimate, initial
 
 __all__ = [
+    "NAMES",
     "PRESETS",
     "SOURCES",
     "Estimator",

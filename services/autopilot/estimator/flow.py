@@ -1,12 +1,14 @@
 """Velocity over the ground by optical flow, while the satellite receiver gives none (theory.md, eq. (3.45))."""
 
+import math
+
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import Mat3, Vec3, cross, dot
 from services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import FLOW, GPS_VELOCITY, NEVER, THETA, VELOCITY, Memory, State, corrected
-from services.autopilot.estimator.watch import judge
+from services.autopilot.estimator.watch import judge, repeated
 
 _ALIKE = 100.0  # readings, 2 s of them, after which an error of scale counts as a new one
 
@@ -46,16 +48,18 @@ def update_flow(
         valid: whether there is a reading.
     """
     m = s.memory
+    seen, turned = (flow[0], flow[1], distance), (rate[0], rate[1], 0.0)
+    if not valid or not distance > 0.0 or repeated(m, FLOW, seen, turned, variance > 0.0, p.frozen):
+        judge(m, FLOW, False, 0.0)
+        return s
     received = m.refused[GPS_VELOCITY] == 0 and m.since[GPS_VELOCITY] != NEVER
     if received and m.since[GPS_VELOCITY] * p.interval <= p.patience:
-        return s
-    if not valid or not distance > 0.0:
-        judge(m, FLOW, False, 0.0)
+        m.refused[FLOW] = 0
         return s
     r, velocity = rotation_matrix(s.nominal.attitude), s.nominal.velocity_world
     passing = (flow[0] - rate[0], flow[1] - rate[1])
-    scaled = p.flow_scale_std * p.flow_scale_std * (passing[0] * passing[0] + passing[1] * passing[1])
-    noise = variance + _ALIKE * scaled
+    expected = math.hypot(flow_row(m, r, velocity, 0, distance), flow_row(m, r, velocity, 1, distance))
+    noise = variance + _ALIKE * (p.flow_scale_std * expected) ** 2  # of what is read, the gate would let all through
     nis, accepted = 0.0, True
     for axis in range(2):
         innovation = passing[axis] - flow_row(m, r, velocity, axis, distance)

@@ -22,7 +22,8 @@ HEADING, BAROMETER, SCALE = 21, 22, 23
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
 IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
 FLOW = len(SOURCES)  # kept books on as well, but it only stands in for GPS: its lack is no fault
-WATCHED = FLOW + 1
+NAMES = (*SOURCES, "optical_flow")  # of all that books are kept on
+WATCHED = len(NAMES)
 
 HISTORY = 128  # IMU readings that are remembered for late measurements
 NEVER = -1
@@ -190,6 +191,8 @@ def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> 
         lost = m.refused[i] == 1 or m.since[i] * p.interval > p.patience
         if lost and not (carried and i in (GPS, GPS_VELOCITY)):
             health |= 1 << i
+    if m.refused[FLOW] == 1:
+        rejected |= 1 << FLOW
     if max(position_std[0], position_std[1], position_std[2]) > p.position_std:
         health |= 64
     if max(attitude_std[0], attitude_std[1], attitude_std[2]) > p.attitude_std:

@@ -1,6 +1,6 @@
 """The parts that make failures or pass on motor commands from outside, and the ports that carry what arrives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from cosim.part import Part
@@ -22,27 +22,33 @@ _SENSORS: dict[str, Callable[[Any, Key], Any]] = {
     ports.BAROMETER: SensorInjection,
     ports.GPS: SensorInjection,
     ports.SONAR: SensorInjection,
+    ports.RANGEFINDER: SensorInjection,
+    ports.OPTICAL_FLOW: SensorInjection,
+    ports.AIRSPEED: SensorInjection,
 }
 _UNITS = {
     ports.IMU: ("gyro", "accelerometer"),
     ports.MAGNETOMETER: ("magnetometer",),
     ports.BAROMETER: ("barometer",),
     ports.GPS: ("gps",),
-    ports.SONAR: ("sonar",),
+    ports.SONAR: ("distance_sensor",),
+    ports.RANGEFINDER: ("distance_sensor",),
+    ports.OPTICAL_FLOW: ("optical_flow",),
+    ports.AIRSPEED: ("airspeed",),
 }
 
 
 class Injection:
     """Where failures are injected in a run; without a cell of `Faults`, nowhere."""
 
-    def __init__(self, faults: Cell | None, setup: Setup, fuses: bool, motor: Motor):
-        """`setup`: the run; `fuses`: the autopilot's estimator reads the sensors; `motor`: of every rotor."""
+    def __init__(self, faults: Cell | None, setup: Setup, read: Collection[str], motor: Motor):
+        """`setup`: the run; `read`: ports of the sensors that the autopilot reads; `motor`: of every rotor."""
         self.faults, self._motor = faults, motor
         rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
         self.released = Direct(False, (0.0,) * rotors)  # the controller's command reaches the motors
         self.direct = None if faults is None else Cell(self.released)
         self._setup, self._known = setup, setup.ports
-        self._sensors = [name for name in _SENSORS if name in self._known] if fuses and faults is not None else []
+        self._sensors = [name for name in _SENSORS if name in read] if faults is not None else []
 
     @property
     def units(self) -> tuple[str, ...]:

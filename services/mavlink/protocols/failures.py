@@ -11,7 +11,9 @@ _UNITS = {  # by FAILURE_UNIT
     mavlink.FAILURE_UNIT_SENSOR_MAG: "magnetometer",
     mavlink.FAILURE_UNIT_SENSOR_BARO: "barometer",
     mavlink.FAILURE_UNIT_SENSOR_GPS: "gps",
-    mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR: "sonar",
+    mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR: "distance_sensor",
+    mavlink.FAILURE_UNIT_SENSOR_OPTICAL_FLOW: "optical_flow",
+    mavlink.FAILURE_UNIT_SENSOR_AIRSPEED: "airspeed",
     mavlink.FAILURE_UNIT_SYSTEM_BATTERY: "battery",
     mavlink.FAILURE_UNIT_SYSTEM_MOTOR: "motor",
 }

@@ -44,7 +44,7 @@ def good_gps(v: VehicleView) -> bool:
     return m is not None and m.status.status >= NavSatStatus.STATUS_FIX
 
 
-@stream("HIGHRES_IMU", 50.0)
+@stream("HIGHRES_IMU", 1.5, 50.0)
 def highres_imu(v: VehicleView) -> Any:
     """Every inertial, magnetic and pressure reading; what is not there is 0 and not flagged."""
     if not good_imu(v):

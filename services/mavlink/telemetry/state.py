@@ -25,16 +25,16 @@ _CONTROL = (
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     | mavlink.MAV_SYS_STATUS_LOGGING
 )
-_SENSORS = {
-    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: good_imu,
-    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: good_mag,
-    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: good_baro,
-    mavlink.MAV_SYS_STATUS_SENSOR_GPS: good_gps,
+_SENSORS = {  # with the name that the estimator has for them
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: (good_imu, "imu"),
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: (good_mag, "magnetometer"),
+    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: (good_baro, "barometer"),
+    mavlink.MAV_SYS_STATUS_SENSOR_GPS: (good_gps, "gps"),
 }
 _OPTIONAL = {  # by the sensors that they stand for, and only where one of them is fitted
-    ("sonar", "rangefinder"): (mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION, good_distance),  # PX4's for any distance
-    ("optical_flow",): (mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW, good_flow),
-    ("airspeed",): (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, good_airspeed),
+    ("sonar", "rangefinder"): (mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION, good_distance, "sonar"),  # any distance
+    ("optical_flow",): (mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW, good_flow, "optical_flow"),
+    ("airspeed",): (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, good_airspeed, "airspeed"),
 }
 
 
@@ -65,6 +65,12 @@ def healthy(v: VehicleView) -> bool:
     return e is not None and e.health == 0
 
 
+def _refused(v: VehicleView, source: str) -> bool:
+    """Whether the estimator has no use for the newest reading of a sensor, or has got none."""
+    e = v.get(ESTIMATE)
+    return e is not None and source in e.rejected
+
+
 @stream("SYS_STATUS", 1.0, 5.0)
 def sys_status(v: VehicleView) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
@@ -73,12 +79,12 @@ def sys_status(v: VehicleView) -> Any:
     sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
     sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
     sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
-    for bits, good in _SENSORS.items():
-        sound |= bits if (good(v) if v.description.sensors else healthy(v)) else 0
-    for sensors, (bit, good) in _OPTIONAL.items():
+    for bits, (good, source) in _SENSORS.items():
+        sound |= bits if (good(v) and not _refused(v, source) if v.description.sensors else healthy(v)) else 0
+    for sensors, (bit, good, source) in _OPTIONAL.items():
         if set(sensors) & set(v.description.sensors):
             present |= bit
-            sound |= bit if good(v) else 0
+            sound |= bit if good(v) and not _refused(v, source) else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
     sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from messages.topics import AIRSPEED, OPTICAL_FLOW, RANGEFINDER, SONAR
+from messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, RANGEFINDER, SONAR
 from services.mavlink.dialect import mavlink
 from services.mavlink.frames import Quaternion, from_euler, saturated
 from services.mavlink.telemetry.stream import stream
@@ -30,15 +30,20 @@ def good_flow(v: VehicleView) -> bool:
     return m is not None and math.isfinite(m.flow[0])
 
 
+def _airspeed(v: VehicleView) -> Any:
+    """What the autopilot has got of the airspeed; what the sensor reads where no operator is listened to."""
+    return v.get(AIRSPEED_RECEIVED) or v.get(AIRSPEED)
+
+
 def good_airspeed(v: VehicleView) -> bool:
     """Whether the newest reading is one."""
-    m = v.get(AIRSPEED)
+    m = _airspeed(v)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
 def indicated_airspeed(v: VehicleView) -> float | None:
     """Speed [m/s] of the air along the tube by its pressure, at the density of the sea; None without a reading."""
-    return math.sqrt(max(0.0, 2.0 * v.get(AIRSPEED).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
+    return math.sqrt(max(0.0, 2.0 * _airspeed(v).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
 
 
 def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaternion]:

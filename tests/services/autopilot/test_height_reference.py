@@ -69,7 +69,7 @@ def test_over_rising_ground_the_sonar_holds_the_height_above_it(ground):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("unit", ["barometer", "sonar"])
+@pytest.mark.parametrize("unit", ["barometer", "distance_sensor"])
 def test_the_other_sensor_takes_over(unit):
     kind = WRONG if unit == "barometer" else OFF
     flown = fly_by_sensors(14, {8: [inject(unit, kind)]}, SONAR, ENABLED)

@@ -33,6 +33,7 @@ from services.common.failures import (
     GARBAGE,
     INTERMITTENT,
     KINDS,
+    OF_SYSTEMS,
     OFF,
     SLOW,
     SOUND,
@@ -46,7 +47,8 @@ from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
 
-SENSORS = ("imu", "magnetometer", "gps", "barometer", "sonar")
+SENSORS = ("imu", "magnetometer", "gps", "barometer", "sonar", "optical_flow", "airspeed")
+LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33"]  # what the scene does not carry
 
 
 def rejected(flown, start, source):
@@ -71,17 +73,20 @@ def test_it_is_guarded_by_the_parameter_at_any_time_and_knows_what_there_is():
     assert {k: v for k, v in results(flown).items() if k} == expected
     assert said(flown)[:6] == [
         "inject failure: SYS_FAILURE_EN is 0; set it to 1 first", "injected: motor off",
-        "inject failure: there is no gps", "inject failure: a battery can be sound, off, stuck, wrong",
-        "inject failure: a motor can be sound, off, stuck, wrong, slow",
+        "inject failure: there is no gps", "inject failure: battery can be sound, off, stuck, wrong",
+        "inject failure: motor can be sound, off, stuck, wrong, slow",
         "inject failure: there is no motor 5; expected 1 to 4, 0 for all",
     ]  # fmt: skip
 
 
+FAILING = [unit for unit in UNITS if unit not in OF_SYSTEMS]
+
+
 def received(kind, seconds=4.0, start=1.0):
     """What sensors and estimator hand over on the ground where every sensor fails in one way from `start` [s] on."""
-    scene = load("groundstation", [ENABLED, "autopilot.trajectory=false", f"run.duration={seconds}"])
+    scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.trajectory=false", f"run.duration={seconds}"])
     setup = resolve(scene)
-    operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(UNITS[:6])]})
+    operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(FAILING)]})
     graph = Graph(setup, create_all(setup, operator), PAGE, [*SENSORS, *(f"{name}.received" for name in SENSORS)])
     graph.advance(setup.last_tick + 1)
     for name in SENSORS:
@@ -91,7 +96,8 @@ def received(kind, seconds=4.0, start=1.0):
         yield name, round(DELAY * RATE / period), first, *rows
 
 
-VALUES = {"imu": 6, "magnetometer": 3, "gps": 3, "barometer": 1, "sonar": 1}  # numbers that a reading begins with
+# Numbers that a reading begins with
+VALUES = {"imu": 6, "magnetometer": 3, "gps": 3, "barometer": 1, "sonar": 1, "optical_flow": 2, "airspeed": 1}
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT], ids=KINDS[1:])
@@ -219,27 +225,28 @@ def test_without_gps_it_warns_and_descends_and_holds_once_it_is_back():
     ("unit", "kind"),
     [
         *[(unit, kind) for unit in ("gps", "magnetometer", "barometer") for kind in (STUCK, GARBAGE, WRONG)],
-        *[(unit, OFF) for unit in ("magnetometer", "barometer", "sonar")],
-        ("sonar", GARBAGE),
-        ("sonar", WRONG),
+        *[(unit, OFF) for unit in ("magnetometer", "barometer", "distance_sensor")],
+        ("distance_sensor", GARBAGE),
+        ("distance_sensor", WRONG),
     ],
     ids=lambda value: value if isinstance(value, str) else KINDS[value],
 )
 def test_a_sensor_that_fails_is_refused_and_the_others_carry_on(unit, kind):
     flown = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
     assert results(flown)[7] == ACCEPTED
-    assert rejected(flown, 10.0, unit) > 0.5
+    assert rejected(flown, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
     assert error(flown, 9.0) < (3.0 if (unit, kind) == ("gps", GARBAGE) else 1.0)  # one of many may pass the gate
     assert math.dist(place(flown, 13.0)[:2], place(flown, 9.0)[:2]) < 1.5
 
 
 @pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
-@pytest.mark.parametrize("units", [("gps", "magnetometer"), ("barometer", "sonar")])
+@pytest.mark.parametrize("units", [("gps", "magnetometer"), ("barometer", "distance_sensor")])
 def test_what_a_sensor_still_gives_is_taken_in(units, kind):
     flown = fly_by_sensors(13, {9: [inject(unit, kind, id=k + 1) for k, unit in enumerate(units)]}, ENABLED)
     assert error(flown, 9.0) < 0.2
     if kind != DELAYED:
-        assert all(0.1 < rejected(flown, 10.0, unit) < 1.0 for unit in units)
+        names = ["sonar" if unit == "distance_sensor" else unit for unit in units]
+        assert all(0.1 < rejected(flown, 10.0, name) < 1.0 for name in names)
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, SLOW, DELAYED], ids=lambda kind: KINDS[kind])

@@ -50,6 +50,7 @@ class StandIn:
         self.deaf = set()  # kinds that are not answered
         self.status, self.more = {}, []  # other fields of the status, and other messages
         self.kinds = {}
+        self.rejected = ()  # sources that the estimator refuses
 
     @property
     def seconds(self):
@@ -77,7 +78,7 @@ class StandIn:
         yield STATUS, status._replace(**self.status)
         yield from self.more
         yield COMMAND_ACKS, CommandAcks(head, tuple(self.answers), tuple(self.text))
-        yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity))
+        yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity), rejected=self.rejected)
         self.answers, self.text = [], []
 
     @property

@@ -282,9 +282,17 @@ def test_failures_bear_the_numbers_of_mavlink_and_impossible_ones_are_unsupporte
             assert number.name == f"FAILURE_TYPE_{'OK' if kind == 'sound' else kind.upper()}"
             assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, name, 0.0) == mavlink.MAV_RESULT_ACCEPTED
             assert asked(bench, "inject_failure") == (UNITS.index("barometer"), name, 0.0)
+    for unit, name in (
+        (mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR, "distance_sensor"),
+        (mavlink.FAILURE_UNIT_SENSOR_OPTICAL_FLOW, "optical_flow"),
+        (mavlink.FAILURE_UNIT_SENSOR_AIRSPEED, "airspeed"),
+    ):
+        assert station.command(420, unit, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert asked(bench, "inject_failure") == (UNITS.index(name), 1.0, 0.0)
+    assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_VIO, 1.0, 0.0) == mavlink.MAV_RESULT_UNSUPPORTED
     for unit, kinds, words in (
-        (mavlink.FAILURE_UNIT_SYSTEM_MOTOR, (0, 1, 2, 4, 5), "a motor can be sound, off, stuck, wrong, slow"),
-        (mavlink.FAILURE_UNIT_SYSTEM_BATTERY, (0, 1, 2, 4), "a battery can be sound, off, stuck, wrong"),
+        (mavlink.FAILURE_UNIT_SYSTEM_MOTOR, (0, 1, 2, 4, 5), "motor can be sound, off, stuck, wrong, slow"),
+        (mavlink.FAILURE_UNIT_SYSTEM_BATTERY, (0, 1, 2, 4), "battery can be sound, off, stuck, wrong"),
     ):
         for kind in range(8):
             expected = mavlink.MAV_RESULT_ACCEPTED if kind in kinds else mavlink.MAV_RESULT_UNSUPPORTED

@@ -221,7 +221,7 @@ def test_orbit_failures_and_the_log(tmp_path):
         await drone.failure.inject(FailureUnit.SYSTEM_MOTOR, FailureType.OFF, 2)
         assert vehicle.kinds["inject_failure"].values == (7.0, 1.0, 2.0)
         with pytest.raises(FailureError):
-            await drone.failure.inject(FailureUnit.SENSOR_AIRSPEED, FailureType.OFF, 0)
+            await drone.failure.inject(FailureUnit.SENSOR_VIO, FailureType.OFF, 0)
         (entry,) = await drone.log_files.get_entries()
         assert entry.size_bytes == path.stat().st_size
         copy = tmp_path / "copy.mcap"

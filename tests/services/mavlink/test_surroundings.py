@@ -5,8 +5,8 @@ import math
 import pytest
 from bench import Bench
 
-from messages import FluidPressure, OpticalFlow, Range, header
-from messages.topics import AIRSPEED, OPTICAL_FLOW, RANGEFINDER, SONAR
+from messages import FluidPressure, NavSatFix, NavSatStatus, OpticalFlow, Range, header
+from messages.topics import AIRSPEED, AIRSPEED_RECEIVED, GPS, OPTICAL_FLOW, RANGEFINDER, SONAR
 from services.mavlink.dialect import mavlink
 from services.mavlink.telemetry.surroundings import orientation
 
@@ -88,6 +88,15 @@ def test_airspeed_is_that_of_the_tube_and_over_the_ground_without_one():
     assert none.airspeed == none.groundspeed
 
 
+def test_airspeed_is_what_the_autopilot_gets_of_it():
+    read = (AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2, 0.0))
+    half = shown(read, (AIRSPEED_RECEIVED, FluidPressure(HEAD, 0.5 * 1.225 * 4.0**2, 0.0))).last("VFR_HUD")
+    assert half.airspeed == pytest.approx(4.0)
+    lost = shown(read, (AIRSPEED_RECEIVED, FluidPressure(HEAD, math.nan, 0.0)))
+    assert lost.last("VFR_HUD").airspeed == lost.last("VFR_HUD").groundspeed
+    assert not lost.last("SYS_STATUS").onboard_control_sensors_health & BITS["airspeed"]
+
+
 BITS = {
     "optical_flow": mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW,
     "airspeed": mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE,
@@ -107,3 +116,26 @@ def test_the_status_has_their_bits_where_they_are_fitted():
         (OPTICAL_FLOW, OpticalFlow(HEAD, (0.0, 0.0), (0.0, 0.0), 1.0, 0.0)),
     )
     assert station.last("SYS_STATUS").onboard_control_sensors_health & sum(BITS.values()) == sum(BITS.values())
+
+
+@pytest.mark.parametrize(
+    ("source", "bit"),
+    [
+        ("gps", mavlink.MAV_SYS_STATUS_SENSOR_GPS),
+        ("sonar", BITS["rangefinder"]),
+        ("optical_flow", BITS["optical_flow"]),
+    ],
+)
+def test_the_status_shows_what_the_estimator_refuses(source, bit):
+    bench = Bench(*FITTED)
+    bench.vehicle.more = [
+        (GPS, NavSatFix(HEAD, NavSatStatus(NavSatStatus.STATUS_FIX))),
+        (SONAR, Range(HEAD, range=1.0, max_range=2.0)),
+        (OPTICAL_FLOW, OpticalFlow(HEAD, (0.0, 0.0), (0.0, 0.0), 1.0, 0.0)),
+    ]
+    station = bench.station()
+    bench.step(120)
+    assert station.last("SYS_STATUS").onboard_control_sensors_health & bit
+    bench.vehicle.rejected = (source,)
+    bench.step(120)
+    assert not station.last("SYS_STATUS").onboard_control_sensors_health & bit

@@ -1,0 +1,48 @@
+"""Frames of messages of numbers, as nearly all of the telemetry: pymavlink's bytes in less than half of its time."""
+
+import struct
+from collections.abc import Callable
+from functools import cache
+from itertools import chain
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+from services.mavlink.dialect import mavlink
+
+_HEADER = struct.Struct("<BBBBBBBHB")  # MAVLink guide, "Packet Serialization": magic to message id (24 bits)
+_CHECKSUM = struct.Struct("<H")
+
+
+class _Kind(NamedTuple):
+    """What is the same in all messages of a class."""
+
+    fields: Callable[[Any], tuple]  # of a message, in the order of the wire
+    arrays: bool  # whether some of them are arrays
+    layout: struct.Struct
+    number: int  # a message's own `id` may be one of its fields
+    seed: int  # CRC_EXTRA
+
+
+@cache
+def _kind(found: Any) -> _Kind | None:
+    """A class of messages; None where it has texts or a single field."""
+    names = found.ordered_fieldnames
+    if len(names) < 2 or {"c", "s"} & set(found.native_format.decode()):
+        return None
+    return _Kind(attrgetter(*names), any(found.array_lengths), found.unpacker, found.id, found.crc_extra)
+
+
+def frame(message: Any, sequence: int, system: int, component: int) -> bytes | None:
+    """The unsigned MAVLink 2 frame of a message; None where it has texts or a single field."""
+    found: Any = type(message)
+    kind = _kind(found)
+    if kind is None:
+        return None
+    values = kind.fields(message)
+    if kind.arrays:
+        values = tuple(chain.from_iterable(v if isinstance(v, list | tuple) else (v,) for v in values))
+    payload = kind.layout.pack(*values).rstrip(b"\0") or b"\0"
+    low, high = kind.number & 0xFFFF, kind.number >> 16
+    header = _HEADER.pack(mavlink.PROTOCOL_MARKER_V2, len(payload), 0, 0, sequence, system, component, low, high)
+    content = header + payload
+    return content + _CHECKSUM.pack(mavlink.x25crc(content[1:] + bytes((kind.seed,))).crc)

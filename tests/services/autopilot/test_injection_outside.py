@@ -1,0 +1,130 @@
+"""Failures of the sensors that look outside: distance by a rangefinder, optical flow, airspeed."""
+
+import math
+
+import numpy as np
+import pytest
+from flights import (
+    ACCEPTED,
+    DENIED,
+    ENABLED,
+    NAN,
+    command,
+    error,
+    fly,
+    fly_by_sensors,
+    height,
+    inject,
+    mode,
+    place,
+    results,
+    said,
+)
+
+from services.autopilot.config import NEEDED
+from services.autopilot.injection.memory import SLOWED
+from services.autopilot.injection.readings import EXCESS_DYNAMIC, EXCESS_RANGE
+from services.common.failures import DELAYED, GARBAGE, INTERMITTENT, KINDS, OFF, SLOW, STUCK, WRONG
+
+pytestmark = pytest.mark.long
+
+FLOW, TUBE = "sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33"
+UP_TO_3 = [command("takeoff", 3.0), command("arm", NAN, 10.0)]
+ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
+
+
+def rejected(flown, start, source):
+    """Share of the estimates from a time on in which a source was refused or missing."""
+    found = flown.column("estimate", lambda m: source in m.rejected)[flown.times("estimate") >= start]
+    return float(np.mean(found))
+
+
+def by_flow(kind):
+    """A flight whose receiver falls silent, and whose optical flow, which stands in for it, fails then."""
+    script = {9: [inject("gps", OFF)], 13: [inject("optical_flow", kind, id=8)]}
+    flown = fly_by_sensors(26, script, ENABLED, FLOW)
+    assert results(flown)[8] == ACCEPTED
+    return flown
+
+
+@pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
+def test_without_a_receiver_a_flow_that_fails_is_refused_and_the_vehicle_descends(kind):
+    flown = by_flow(kind)
+    assert rejected(flown, 14.0, "optical_flow") > 0.9
+    told = said(flown)
+    assert told.index(f"injected: optical_flow {KINDS[kind]}") < told.index("the position is lost: descend in 9 s")
+    assert mode(flown, 26.0) == "descend"
+
+
+@pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
+def test_what_a_camera_still_gives_carries_the_flight(kind):
+    flown = by_flow(kind)
+    assert mode(flown, 26.0) == "hold"
+    assert math.dist(place(flown, 26.0), place(flown, 13.0)) < 2.0
+    assert error(flown, 9.0) < 1.5
+
+
+@pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
+def test_beside_a_receiver_a_flow_that_fails_changes_nothing(kind):
+    flown = fly_by_sensors(13, {9: [inject("optical_flow", kind)]}, ENABLED, FLOW)
+    sound = fly_by_sensors(13, {}, ENABLED, FLOW)
+    assert place(flown, 13.0) == place(sound, 13.0)
+    missing = rejected(flown, 10.0, "optical_flow")
+    assert missing == pytest.approx(
+        {OFF: 1.0, STUCK: 1.0, SLOW: 1.0 - 1.0 / SLOWED, INTERMITTENT: 0.5}.get(kind, 0.0), abs=0.25
+    )
+
+
+@pytest.mark.parametrize("kind", [OFF, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
+def test_a_rangefinder_that_looks_down_fails_as_the_distance_sensor(kind):
+    sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
+    laser = ["sensors.rangefinder.preset=lidar_lite_v3"]
+    script = {0.04: UP_TO_3, 8: [inject("distance_sensor", kind)]}
+    flown = fly(13, script, ENABLED, "autopilot.estimator=sensors", *sensors, *laser)
+    assert results(flown)[7] == ACCEPTED
+    assert rejected(flown, 9.0, "sonar") > 0.5
+    assert height(flown, 13.0) == pytest.approx(height(flown, 8.0), abs=0.3)
+
+
+def test_a_wrong_distance_is_followed_where_it_is_the_reference_of_the_height():
+    flown = fly_by_sensors(13, {8: [inject("distance_sensor", WRONG)]}, ENABLED, "autopilot.parameters.EKF2_HGT_REF=2")
+    assert height(flown, 13.0) == pytest.approx(height(flown, 8.0) - EXCESS_RANGE, abs=0.1)
+
+
+def test_a_stuck_distance_does_not_keep_the_vehicle_down():
+    script = {8: [inject("distance_sensor", STUCK)], 9: [command("goto", 0.0, 0.0, 6.0, 0.0, 2.0)]}
+    flown = fly_by_sensors(14, script, ENABLED)
+    assert height(flown, 14.0) == pytest.approx(6.0, abs=0.1)
+    assert error(flown, 9.0) < 0.1
+
+
+def test_a_rangefinder_that_the_autopilot_does_not_read_cannot_fail():
+    sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
+    ahead = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.elevation_deg=0"]
+    script = {0.1: [inject("distance_sensor", OFF)]}
+    flown = fly(0.3, script, ENABLED, "autopilot.estimator=sensors", *sensors, *ahead)
+    assert results(flown)[7] == DENIED
+    assert "inject failure: there is no distance_sensor" in said(flown)
+
+
+@pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
+def test_an_airspeed_that_fails_is_told_as_it_arrives_and_nothing_flies_by_it(kind):
+    flown = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
+    assert results(flown)[7] == ACCEPTED
+    after = flown.times("airspeed") > 9.1
+    read, got = (flown.column(name, lambda m: m.fluid_pressure)[after] for name in ("airspeed", "airspeed/received"))
+    there = np.isfinite(got)
+    assert np.isfinite(read).all()
+    if kind == OFF:
+        assert not there.any()
+    elif kind == STUCK:
+        assert len(set(got)) == 1
+    elif kind == WRONG:
+        assert got == pytest.approx(read + EXCESS_DYNAMIC)
+    elif kind in (SLOW, INTERMITTENT):
+        assert 0 < there.sum() < 0.8 * len(there)
+        assert np.array_equal(got[there], read[there])
+    else:
+        assert (got != read).mean() > 0.5
+    sound = fly_by_sensors(12, {}, ENABLED, TUBE)
+    assert place(flown, 12.0) == place(sound, 12.0)

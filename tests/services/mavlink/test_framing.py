@@ -1,0 +1,80 @@
+"""Frames against pymavlink's own, byte by byte."""
+
+import random
+import struct
+from collections import Counter
+
+import pytest
+from bench import Bench
+
+from services.mavlink.channel import Channel, Signature
+from services.mavlink.dialect import mavlink
+from services.mavlink.endpoint import MAX_DATAGRAM
+from services.mavlink.framing import frame
+
+SYSTEM = 7
+SIZES = {"b": 8, "B": 8, "h": 16, "H": 16, "i": 32, "I": 32, "q": 64, "Q": 64}
+
+
+def value(rng, code, length, empty):
+    """A value of a field, by struct's letter for it."""
+    if code in "cs":
+        size = rng.randrange(length + 1) if length else 1
+        return bytes(1) * (not length) if empty else bytes(rng.randrange(1, 128) for _ in range(size))
+    if length:
+        return [value(rng, code, 0, empty) for _ in range(length)]
+    if empty:
+        return 0
+    if code in "fd":
+        return rng.choice([rng.gauss(0.0, 1e3), float("nan"), float("inf"), -0.0])
+    bits = SIZES[code]
+    return rng.randrange(1 << bits) - (1 << bits - 1 if code.islower() else 0)
+
+
+def example(kind, seed, empty=False):
+    """A message of a class with random fields."""
+    rng, codes = random.Random(seed), kind.native_format.decode()[1:]
+    by_wire = [value(rng, code, kind.array_lengths[i], empty) for i, code in enumerate(codes)]
+    return kind(*[by_wire[i] for i in kind.orders])
+
+
+def test_every_message_of_the_dialect_has_the_bytes_of_pymavlink():
+    fast = 0
+    for kind in mavlink.mavlink_map.values():
+        for seed in range(4):
+            codec = mavlink.MAVLink(None, SYSTEM, 1)
+            codec.seq = 60 * seed
+            message = example(kind, seed, empty=seed == 0)
+            found = frame(message, codec.seq, SYSTEM, 1)
+            fast += found is not None
+            assert found in (None, example(kind, seed, empty=seed == 0).pack(codec)), kind.msgname
+    assert fast > 4 * 100
+
+
+@pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
+def test_a_channel_numbers_its_frames_and_a_codec_reads_them(signature):
+    channel, reader = Channel(SYSTEM, signature, True, Counter()), mavlink.MAVLink(None, 255, 190)
+    if signature:
+        reader.signing.secret_key = bytes(32)
+    for k in range(300):
+        message = mavlink.MAVLink_attitude_message(k, 0.1, -0.2, 3.0, 0.0, 0.0, 0.0)
+        (got,) = reader.parse_buffer(channel.encode(message))
+        assert (got.get_seq(), got.time_boot_ms, got.get_signed()) == (k % 256, k, signature is not None)
+
+
+def test_what_is_due_at_once_leaves_in_as_few_datagrams_as_any_network_carries():
+    bench, pieces = Bench(), []
+    bench.adapter.connect(True, True, pieces.append)
+    bench.step(100)
+    codec = mavlink.MAVLink(None, 255, 190)
+    counts = [len(codec.parse_buffer(piece)) for piece in pieces]
+    assert sum(counts) > 2.0 * len(counts)
+    assert 200 < max(map(len, pieces)) <= MAX_DATAGRAM
+
+
+def test_a_frame_is_written_out_as_the_guide_says():
+    """MAVLink guide, "Packet Serialization": marker, length, flags, number, sender, message id, payload, checksum."""
+    found = frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 65536, 4, 3), 5, 1, 1)
+    assert found[:10] == bytes([0xFD, 9, 0, 0, 5, 1, 1, 0, 0, 0])
+    assert found[10:19] == struct.pack("<IBBBBB", 65536, 2, 12, 81, 4, 3)
+    assert mavlink.x25crc(found[1:19] + bytes([50])).crc == struct.unpack("<H", found[19:])[0]  # 50: CRC_EXTRA
