@@ -293,7 +293,7 @@ def test_optical_flow_over_ground_that_passes():
 def test_optical_flow_without_texture_and_its_noise():
     p = optical_flow.PMW3901
     assert not read(optical_flow, p, truth((0.0, 0.0, 0.5), velocity=(4.0, 0.0, 0.0))).valid  # 8 rad/s
-    assert not read(optical_flow, p, truth((0.0, 0.0, 25.0))).valid
+    assert not read(optical_flow, p, truth((0.0, 0.0, 35.0))).valid
     assert not read(optical_flow, p, truth((0.0, 0.0, 5.0), from_roll_pitch_yaw(2.0, 0.0, 0.0))).valid
     noisy = optical_flow.OpticalFlow(noise_rad_per_s_per_sqrt_hz=0.01)
     s, found = optical_flow.initial(noisy, KEY, truth((0.0, 0.0, 5.0))), []
