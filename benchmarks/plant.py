@@ -44,6 +44,7 @@ EXCLUDED = (  # another one of their kind is among the rest, or the drone cannot
     "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
 ALL = {name: {} for name in effects.names() if name not in EXCLUDED} | {
+    "carried_load": {"mass": 2.0, "length": 3.0},
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_boundary_layer": {"speed": 5.0},
     "wind_random": {"beside_drag": True},

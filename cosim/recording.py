@@ -11,10 +11,17 @@ from cosim.wire import Page
 from messages import WallTime, header
 from messages.topics import TOPICS, WALL_TIME, Topic, place
 
-CHUNK = 1000  # ticks: chunks begin at multiples of it, so that a run gives the same file whenever its pages come
+CHUNK = 1000  # ticks of one vehicle: of several fewer, so that what is sorted at once stays in the processor's cache
+SHORTEST = 250  # ticks
 FLUSH_PERIOD = (
     0.25  # [s] of wall time after which what has come of a chunk is in the file, too; batches take 0.1 s more
 )
+SPARED = 10.0  # times as long as bringing it there has taken, where that is longer: a chunk's beginning is written anew
+
+
+def chunk(setup: Setup) -> int:
+    """Ticks of a chunk: chunks begin at multiples of it, so that a run gives the same file whenever its pages come."""
+    return max(SHORTEST, CHUNK // len(setup.vehicles))
 
 
 class Recording:
@@ -25,8 +32,10 @@ class Recording:
         self._writer, self._setup = writer, setup
         self._started = time.monotonic()
         self._flushed = self._started
+        self._tail_took = 0.0  # [s] of this thread for the newest tail
         self._waiting: list[Page] = []  # of the chunk that is not yet complete
-        self._cut = CHUNK  # the tick at which it ends
+        self._chunk = chunk(setup)
+        self._cut = self._chunk  # the tick at which it ends
         self.newest: dict[Topic, bytes] = {}
         self.time_ns = 0
         self._write_wall_time(0)
@@ -39,9 +48,11 @@ class Recording:
         self.time_ns = max(last, 0) * self._setup.interval_ns
         while last + 1 >= self._cut:
             self._write_chunk()
-        if time.monotonic() - self._flushed >= FLUSH_PERIOD:
+        now = time.monotonic()
+        if now - self._flushed >= max(FLUSH_PERIOD, SPARED * (self._tail_took + self._writer.tail_took)):
             self._writer.write_tail(self._parts(self._waiting))
             self._flushed = time.monotonic()
+            self._tail_took = self._flushed - now
 
     def finish(self) -> None:
         """Write what is left: the last chunk."""
@@ -61,7 +72,7 @@ class Recording:
             self._flushed = time.monotonic()
         self._write_wall_time(min(self.time_ns, (self._cut - 1) * self._setup.interval_ns))
         self._waiting = left
-        self._cut += CHUNK
+        self._cut += self._chunk
 
     def _parts(self, pages: list[Page]) -> list[tuple]:
         interval, vehicles = self._setup.interval_ns, self._setup.vehicles

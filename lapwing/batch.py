@@ -225,6 +225,8 @@ def _plant(scene: Scene) -> PlantSetup:
     plant: PlantSetup = resolve(scene).services["plant"].parameters
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
         raise SceneError("vehicle.model", f"got {plant.model!r}", '"reduced", the only one that batches step')
+    if plant.others:
+        raise SceneError("effects.carried_load", "batches step vehicles without what they carry", "a scene without it")
     return plant
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from operator import index
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 import services
@@ -92,27 +92,25 @@ def reseed(setup: Setup, seed: int) -> Setup:
     return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
 
 
-def resolve(scene: Scene, plan: tuple[Any, ...] = ()) -> Setup:
+def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> Setup:
     """The set-up of a run of this scene.
 
     Args:
         scene: what to fly.
-        plan: operator commands that the autopilot gets at the first tick.
+        plans: operator commands that the autopilot of a vehicle gets at the first tick, by the vehicle's name.
 
     Raises:
         SceneError: what is wrong with which key, and what would be right.
     """
     if scene.vehicles:
-        if plan:
-            raise SceneError("vehicle", "a plan is flown by one vehicle, and the scene has several")
         members = []
         for vehicle in scene.vehicles:
             with vehicle.located():
-                members.append(_resolve(vehicle, ()))
+                members.append(_resolve(vehicle, plans))
         with scene.located():
             return fleet.joined(_acquainted(members, "vehicle.{}."), scene.resolved)
     with scene.located():
-        return _acquainted([_resolve(scene, plan)], "")[0]
+        return _acquainted([_resolve(scene, plans)], "")[0]
 
 
 def _acquainted(members: list[Setup], key: str) -> list[Setup]:
@@ -135,7 +133,7 @@ def _acquainted(members: list[Setup], key: str) -> list[Setup]:
     return members
 
 
-def _resolve(scene: Scene, plan: tuple[Any, ...]) -> Setup:
+def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
     exchange, run = scene[Exchange], scene[Run]
     found: dict[str, Any] = {}
     beside: dict[str, Any] = {}
@@ -146,7 +144,7 @@ def _resolve(scene: Scene, plan: tuple[Any, ...]) -> Setup:
                 (found if process.lock_step else beside)[process.name] = given
     if unknown := [name for name in run.restart if name not in found]:
         raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(found)}")
-    if plan:
+    if plan := plans.get(scene[Vehicle].name):
         autopilot = found["autopilot"]
         found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
     return Setup(

@@ -53,6 +53,7 @@ class LogWriter:
         self._waiting = waiting
         self._failed = False  # a chunk could not be written
         self.waited = 0.0  # [s] for chunks that were not yet written when the next one came
+        self.tail_took = 0.0  # [s] to write the newest tail
         self._digest = Digest()
         self._topics: dict[str, WrittenTopic] = {}
         self._schemas: dict[str, int] = {}
@@ -225,10 +226,12 @@ class LogWriter:
             self.waited += time.perf_counter() - started
 
     def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
+        began = time.monotonic()
         counts = {part.topic: part.topic.count for part in parts}
         self._container.add_tail(declarations, arrange(parts))
         for topic, count in counts.items():  # its messages come again
             topic.count = count
+        self.tail_took = time.monotonic() - began
 
     def _write_chunk(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
         self._container.add_chunk(declarations, arrange(parts))

@@ -18,7 +18,7 @@ from dynamics.vector import ZERO, Vec3
 
 
 class Presence(NamedTuple):
-    """What others of a fleet may know of a vehicle at a tick."""
+    """What others of a fleet may know of a vehicle at a tick, or of the load that some carry together."""
 
     position_world: Vec3 = ZERO  # [m] of the centre of mass
     velocity_world: Vec3 = ZERO  # [m/s]
@@ -28,6 +28,13 @@ class Presence(NamedTuple):
     radius: float = 0.0  # [m] of the sphere that others touch; 0: they pass through
     restitution: float = 0.0  # speed after a collision over that before
     disc_radius: float = 0.0  # [m] of one disc as large as all rotors' together; 0: no wash
+    hook_body: Vec3 = ZERO  # [m] where its cable is fastened
+    hook_world: Vec3 = ZERO  # [m] the same in the world
+    hook_velocity: Vec3 = ZERO  # [m/s] world
+    hook_acceleration: Vec3 = ZERO  # [m/s^2] world
+    wind_world: Vec3 = ZERO  # [m/s]
+    time: float = 0.0  # [s]
+    is_load: bool = False
 
 
 INTERACT = HOOKS.setdefault("interact", ByClass())

@@ -46,9 +46,13 @@ Ros2Domain = Annotated[
 Ros2Router = Annotated[
     str | None, typer.Option("--ros2-router", metavar="HOST:PORT", help="its Zenoh router [127.0.0.1:7447]")
 ]
-PlanFile = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="fly this mission (.plan, .waypoints) instead of the scene's trajectory"),
+PlanFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plan",
+        metavar="[NAME=]FILE",
+        help="fly this mission (.plan, .waypoints) instead of the scene's trajectory; of several vehicles, NAME",
+    ),
 ]
 
 

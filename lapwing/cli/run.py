@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cosim.child import Child, started_early
+from lapwing.cli import plans
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided, warn_of_gains
 from lapwing.cli.errors import FLIGHT_FAILED, fail, user_errors
@@ -24,7 +25,7 @@ from lapwing.cli.options import (
     MavlinkUrls,
     Overrides,
     Peers,
-    PlanFile,
+    PlanFiles,
     Ros2Domain,
     Ros2Router,
     SceneFile,
@@ -67,7 +68,7 @@ def run(
     ros2: Ros2Domain = None,
     ros2_router: Ros2Router = None,
     keys: Keys = None,
-    plan: PlanFile = None,
+    plan: PlanFiles = None,
     external: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=ENDPOINT", help="a service that is a program of your own, listening there"),
@@ -83,12 +84,8 @@ def run(
         from cosim.realtime import why_not
         from cosim.watch import WATCHER
         from lapwing.runs.joined import check_complete, check_endpoint, elsewhere, parse_external, parse_peers
-        from services.common.environment import environment
-        from services.common.plan import OPERATED
-        from services.common.plan import read as read_plan
         from services.common.sections import Run
         from services.common.success import Success
-        from services.common.vehicle import start_height
         from services.participant import Participation
         from services.processes import needed
         from services.ros2.config import Bus
@@ -114,7 +111,10 @@ def run(
             from services.foxglove.server import parse_address
 
             parse_address(foxglove)
-        set_ = [*(set_ or []), *(OPERATED if plan else ["autopilot.operator=true"] if mavlink else [])]
+        set_ = [
+            *(set_ or []),
+            *(plans.overrides(plan, scene, set_ or []) if plan else ["autopilot.operator=true"] if mavlink else []),
+        ]
         if (run_ is None) != (campaign is None):
             raise ValueError("--run and --campaign: belong together; expected both")
         if run_ is not None and campaign is not None:
@@ -126,12 +126,9 @@ def run(
         if ros2 is None and loaded.has(Bus) and loaded[Bus].ros2:
             ros2 = loaded[Bus].ros2_domain
             check_mode(mode, peers is not None, False, {"--ros2": True})
-        if loaded.vehicles and plan:
-            raise ValueError(f"--plan: is for one vehicle, and {scene} has {len(loaded.vehicles)}")
-        commands = tuple(read_plan(plan, start_height(loaded), environment(loaded).home)) if plan else ()
         warn_of_gains(loaded)
         router = check_ros2(ros2, ros2_router, insecure)
-        setup = resolve(loaded, commands)
+        setup = resolve(loaded, plans.commands(plan or [], loaded))
         paced = mavlink or view or realtime or ros2 is not None
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if paced else None)
         if table is not None:

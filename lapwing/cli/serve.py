@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lapwing.cli import plans
 from lapwing.cli.app import app
 from lapwing.cli.choice import decided
 from lapwing.cli.errors import user_errors
@@ -17,7 +18,7 @@ from lapwing.cli.options import (
     MavlinkKey,
     MavlinkUrls,
     Overrides,
-    PlanFile,
+    PlanFiles,
     Ros2Domain,
     Ros2Router,
     SceneFile,
@@ -45,16 +46,12 @@ def service(
     ros2: Ros2Domain = None,
     ros2_router: Ros2Router = None,
     keys: Keys = None,
-    plan: PlanFile = None,
+    plan: PlanFiles = None,
 ) -> None:
     """Run one service of a scene (`run` starts them all)."""
     from cosim.key_prefix import check_key_prefix
     from lapwing.runs.joined import elsewhere, parse_peers
     from services import processes
-    from services.common.environment import environment
-    from services.common.plan import OPERATED
-    from services.common.plan import read as read_plan
-    from services.common.vehicle import start_height
     from services.participant import Participation, take_part
     from services.table import resolve
 
@@ -74,9 +71,8 @@ def service(
             raise ValueError("--ros2: the service needs a domain, ROS_DOMAIN_ID of the nodes")
         if name == processes.MAVLINK:
             check_links(mavlink, mavlink_key, insecure and bool(mavlink))
-        loaded = decided(scene, [*(set_ or []), *(OPERATED if plan else [])])
-        commands = tuple(read_plan(plan, start_height(loaded), environment(loaded).home)) if plan else ()
-        setup = resolve(loaded, commands)
+        loaded = decided(scene, [*(set_ or []), *plans.overrides(plan or [], scene, set_ or [])])
+        setup = resolve(loaded, plans.commands(plan or [], loaded))
         if entry.lock_step and entry.name not in setup.services:
             typer.echo(f"{name}: {scene} does not call for it")  # compose starts every service there is
             return

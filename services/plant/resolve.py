@@ -5,33 +5,31 @@ from collections.abc import Mapping
 
 from cosim.scene import Scene
 from cosim.setup import ServiceSetup
-from dynamics.effects._interaction import interacts, presence
+from dynamics.effects.carried_load import CarriedLoad
+from dynamics.errors import KeyedError
+from services.common import ports
 from services.common.vehicle import Vehicle
+from services.plant import interactions
 from services.plant.cores.multirotor import MultirotorPlant
-from services.plant.models._common import noise_key
-from services.plant.setup import Others
+from services.plant.models._common import bodies_port, noise_key
 
 
 def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the scene: every scene has one."""
-    return importlib.import_module(f"services.plant.models.{scene[Vehicle].model}").resolve(scene)
-
-
-def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
-    """The plants of a run's vehicles, by their names: whose effects know of others are told who else has such."""
-    having = [name for name, given in shares.items() if interacts(_effects(given))]
-    found = dict(shares)
-    for name in having:
-        plant, others = shares[name].parameters, tuple(other for other in having if other != name)
-        if others:
-            told = Others(others, presence(_effects(shares[name])))
-            found[name] = shares[name]._replace(parameters=plant._replace(others=told))
+    model = scene[Vehicle].model
+    found = importlib.import_module(f"services.plant.models.{model}").resolve(scene)
+    if any(isinstance(e, CarriedLoad) for e in interactions.effects_of(found)):
+        if any(port.name == ports.BODIES for port in found.ports):
+            raise KeyedError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
+        plant = found.parameters
+        parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
+        return ServiceSetup(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))
     return found
 
 
-def _effects(given: ServiceSetup) -> tuple:
-    core = given.parameters.core
-    return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
+def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
+    """The plants of a run's vehicles, by their names, once they know of one another; as of `interactions.told`."""
+    return interactions.told(shares, keys)
 
 
 def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:

@@ -7,13 +7,13 @@ from typing import Any
 from numba import types
 
 from cosim.errors import DivergedError
-from cosim.fleet import of_other
 from cosim.graph import NEVER, Graph, Service
 from cosim.part import Code, Part
 from cosim.schedule import Input, Port
 from cosim.setup import Setup
 from dynamics.cell import Cell, read, write
 from dynamics.effects import _hooks as hooks
+from dynamics.effects._interaction import Presence
 from dynamics.generate import implements
 from dynamics.integrators import not_finite
 from dynamics.kernel import kernel
@@ -26,11 +26,11 @@ from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they sa
 from services.plant.cores.interaction import Interaction
 from services.plant.cores.multirotor import MultirotorPlantState
 from services.plant.cores.presence import PresenceView
+from services.plant.interactions import LOAD, PRESENCE
 from services.plant.setup import Others, PlantEvent, PlantSetup
 from services.plant.wire import wires
 
 NAME = "plant"
-PRESENCE = "presence"  # the port that other vehicles of the fleet read
 
 
 def create(setup: Setup) -> Service:
@@ -48,24 +48,32 @@ def create(setup: Setup) -> Service:
     if plant.events:
         parts.insert(0, Breakages(plant, part))
     if plant.others:
-        before, after = _beside_others(plant, plant.others, state)
-        parts = [before, *parts, after]
-    if bodies and not own:
+        parts = _among_others(plant, plant.others, parts, state, bodies)
+    if bodies and plant.bodies and not own:
         inputs = given.inputs[:1]
         parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     return Service(NAME, parts, wires(setup, plant.wiring))
 
 
-def _beside_others(plant: PlantSetup, others: Others, state: Cell) -> tuple[Part, Part]:
-    """(what the others do to the vehicle, before it steps; what they may know of it, after)."""
-    names = [PRESENCE, *(of_other(name, PRESENCE) for name in others.names)]
-    vehicle, port = plant.core.vehicle, Port(PRESENCE, others.presence)
-    interaction = Interaction(vehicle.effects, plant.core.interval)
-    view = PresenceView(vehicle, others.presence)
-    return (
-        Part(f"{NAME}.interaction", interaction, state, tuple(Input(name, 1) for name in names)),
-        Part(f"{NAME}.{PRESENCE}", view, state, (Input(ports.TRUTH),), (port,)),
-    )
+def _among_others(plant: PlantSetup, others: Others, parts: list[Any], state: Cell, bodies: list[Port]) -> list[Any]:
+    """The plant's parts, what the others do to the vehicle before them, and after them what they may know of it."""
+    vehicle, interval = plant.core.vehicle, plant.core.interval
+    interaction = Interaction(vehicle.effects, interval)
+    view = PresenceView(vehicle, others.presence, interval)
+    found = [
+        Part(f"{NAME}.interaction", interaction, state, _a_tick_ago(PRESENCE, *others.ports)),
+        *parts,
+        Part(f"{NAME}.{PRESENCE}", view, state, (Input(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
+    ]
+    if others.load:
+        told = (Port(LOAD, Presence()), *bodies)
+        carriers = _a_tick_ago(*others.load_inputs)
+        found.append(Part(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
+    return found
+
+
+def _a_tick_ago(*names: str) -> tuple[Input, ...]:
+    return tuple(Input(name, 1) for name in names)
 
 
 def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:

@@ -15,10 +15,13 @@ class PlantEvent(NamedTuple):
 
 
 class Others(NamedTuple):
-    """The vehicles of the fleet that a plant's effects know of."""
+    """What a plant's effects know of the fleet."""
 
-    names: tuple[str, ...]
+    ports: tuple[str, ...]  # of the others' presence, as this vehicle calls them; that of a load among them
     presence: Presence  # what these may know of its vehicle, with the numbers that do not change
+    load: Any = None  # parameters of the load that this plant moves beside its vehicle, None without it
+    load_start: Any = None  # its state at tick 0
+    load_inputs: tuple[str, ...] = ()  # ports of its carriers' presence
 
 
 class PlantSetup(NamedTuple):

@@ -55,8 +55,8 @@ def run(process: Process, given: Any) -> None:
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)
-                    progress.recorded(pending.written)
                     process.tell_of_refused()
+                progress.recorded(pending.written)  # also where a batch completes nothing: it still takes in
         except Stopped:
             writer.metadata = failure("the run was ended") | writer.metadata
             raise

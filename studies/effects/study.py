@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from cosim.scene import Scene
 from dynamics import effects
+from dynamics.effects._interaction import INTERACT
 from services.autopilot.config import Autopilot
 from services.common.vehicle import Effects, Vehicle
 from studies.effects.cost import costs
@@ -59,7 +60,8 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         raise ValueError(f"{scene.path}: the model {scene[Vehicle].model} knows no effects; expected a multirotor")
     tables = scene[Effects].tables
     fewer = {name: _without(tables, name) for name in tables}
-    more = {name: {**tables, name: {}} for name in effects.names() if name not in tables}
+    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACT]  # nobody to meet
+    more = {name: {**tables, name: {}} for name in alone if name not in tables}
     refused = {name: why for name, v in (fewer | more).items() if (why := refusal(scene, v))}
     flying = {name: v for name, v in (fewer | more).items() if name not in refused}
     found: dict[str, Influence] = {}

@@ -29,6 +29,7 @@ NEEDED = {  # the keys that a scene cannot leave out
     "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
     "rotor_damage": {"rotor": 1},
     "rotor_table": {"advance": [0.0, 0.2], "thrust": [[0.1, 0.08]], "power": [[0.04, 0.038]]},
+    "carried_load": {"mass": 2.0, "length": 3.0},
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_dryden": {"wind_speed": 5.0},
     "wind_dryden_rates": {"wind_speed": 5.0},

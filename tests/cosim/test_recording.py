@@ -10,7 +10,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 from cosim.log import LogReader, LogWriter
-from cosim.recording import CHUNK, Recording
+from cosim.recording import CHUNK, SHORTEST, Recording, chunk
 from cosim.setup import Setup
 from cosim.wire import Page
 from messages import Clock, Imu, header
@@ -102,3 +102,29 @@ def test_what_has_come_is_in_the_file_before_its_chunk_is_complete(tmp_path, mon
     with LogReader(path) as log:
         assert log.complete
         assert log.digest() == log.metadata["digest"]
+
+
+def test_a_beginning_that_takes_long_is_written_seldom(tmp_path, monkeypatch):
+    """Else a recorder that has fallen behind writes the same chunk again and again, and never catches up."""
+    now, tails = [0.0], []
+    monkeypatch.setattr("cosim.recording.time.monotonic", lambda: now[0])
+
+    def slow(self, parts):
+        tails.append(round(now[0], 1))
+        now[0] += 1.0
+
+    monkeypatch.setattr(LogWriter, "write_tail", slow)
+    with LogWriter(tmp_path / "log", {}, {}) as writer:
+        recording = Recording(writer, SETUP)
+        for k in range(30):
+            now[0] += 0.5
+            recording.write(pages(10 * k, 10 * k + 10), 10 * k + 9)
+        recording.finish()
+    assert tails == [0.5, 11.5]
+
+
+def test_chunks_of_many_vehicles_have_fewer_ticks():
+    def vehicles(n):
+        return SETUP._replace(vehicle="", resolved={"vehicle": [{"vehicle": {"name": f"v{i}"}} for i in range(n)]})
+
+    assert [chunk(SETUP), chunk(vehicles(2)), chunk(vehicles(50))] == [CHUNK, CHUNK // 2, SHORTEST]

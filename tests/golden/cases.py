@@ -22,8 +22,10 @@ class Case(NamedTuple):
     def resolve(self) -> Setup:
         """The set-up of the flight."""
         scene = load(self.scene, list(self.overrides))
-        commands = tuple(plan.read(self.plan, start_height(scene), environment(scene).home)) if self.plan else ()
-        return resolve(scene, commands)
+        if self.plan is None:
+            return resolve(scene)
+        commands = tuple(plan.read(self.plan, start_height(scene), environment(scene).home))
+        return resolve(scene, {scene.lookup("vehicle.name"): commands})
 
 
 OVERRIDES = {"groundstation": ("run.duration=5.0",)}  # of scenes that fly until they are stopped

@@ -10,6 +10,7 @@ from dynamics.vehicles import multirotor
 from services.table import load, resolve
 
 N = 19  # more than a block, less than two
+LOADED = ["effects.carried_load.mass=1.0", "effects.carried_load.length=1.0"]
 MISSION = "delivery_mission"  # random wind, ground contact, air density
 VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.wind_random.sigma": lapwing.uniform(0.0, 2.0)}
 
@@ -81,6 +82,7 @@ def test_body_rates_are_followed_and_thrust_holds_the_weight():
     [
         (lambda b: lapwing.Batch("hover", 0), "n: expected at least 1 member, got 0"),
         (lambda b: lapwing.Batch("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
+        (lambda b: lapwing.Batch("hover", 2, overrides=LOADED), "effects.carried_load: .*without what they carry"),
         (lambda b: b.step(), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(thrust=np.zeros(N)), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(np.zeros((N, 3))), r"motor_voltages: expected numbers of shape \(19, 4\), got \(19, 3\)"),

@@ -105,12 +105,6 @@ def test_in_python_what_is_for_one_vehicle_refuses_several(name):
         OF_ONE[name]("fleet")
 
 
-def test_a_plan_for_one_vehicle_refuses_several():
-    command = [sys.executable, "-m", "lapwing", "run", "fleet", "--plan", "scenes/plans/delivery.plan"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (2, "lapwing: --plan: is for one vehicle, and fleet has 3\n")
-
-
 def test_what_is_for_one_vehicle_is_refused_in_one_line():
     command = [sys.executable, "-m", "lapwing", "tune", "fleet"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -9,6 +9,7 @@ from dynamics.effects._interaction import Presence
 from dynamics.effects._types import Loads
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import rotation_matrix
+from dynamics.vector import add, apply, cross
 from dynamics.vehicles.multirotor import MultirotorParameters
 
 
@@ -17,6 +18,7 @@ class PresenceView(NamedTuple):
 
     vehicle: MultirotorParameters
     like: Presence  # with the numbers that do not change
+    interval: float  # [s] a tick
 
 
 @leaf
@@ -25,9 +27,13 @@ def step(p: PresenceView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tu
     truth, vehicle = inputs[0].value, p.vehicle
     body = hooks.all_body(vehicle.effects, s.vehicle.memory, vehicle.body)
     thrust, _ = thrust_wrench(vehicle.layout, Loads(truth.rotor_thrust, truth.rotor_torque))
-    thrust_world = in_world(thrust, rotation_matrix(truth.attitude))
+    R, hook, omega = rotation_matrix(truth.attitude), p.like.hook_body, truth.omega_body
+    turning = cross(omega, hook)
+    swinging = add(cross(truth.angular_acceleration_body, hook), cross(omega, turning))
     told = Presence(
-        truth.position_world, truth.velocity_world, thrust_world, body.mass, truth.air_density,
+        truth.position_world, truth.velocity_world, in_world(thrust, R), body.mass, truth.air_density,
         p.like.radius, p.like.restitution, p.like.disc_radius,
+        hook, add(truth.position_world, apply(R, hook)), add(truth.velocity_world, apply(R, turning)),
+        add(truth.acceleration_world, apply(R, swinging)), truth.wind_world, tick * p.interval, False,
     )  # fmt: skip
     return s, (told,), GO_ON

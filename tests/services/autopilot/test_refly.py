@@ -30,7 +30,7 @@ def test_commands_come_again_at_their_ticks(tmp_path):
 
 def test_the_commands_of_a_plan_come_once(tmp_path):
     log = tmp_path / "plan.mcap"
-    setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), plan=tuple(UP[0.04]))
+    setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
     flown = fly(log, setup)
     assert refly(log) == (flown, flown)
 

@@ -1,0 +1,43 @@
+"""Plans of a fleet from the command line: which vehicle flies which, and that it does."""
+
+from pathlib import Path
+
+import pytest
+
+from lapwing.cli import plans
+from services.table import load, resolve
+from tests.cosim.memory_log import fly
+
+PLAN = "scenes/plans/delivery.plan"
+
+
+def test_one_vehicle_needs_no_name():
+    assert plans.overrides([PLAN], Path("hover"), []) == ["autopilot.operator=true", "autopilot.trajectory=false"]
+    assert list(plans.commands([PLAN], load("hover"))) == ["drone1"]
+    assert plans.overrides([], Path("hover"), []) == []
+    with pytest.raises(ValueError, match="expected one plan"):
+        plans.files([PLAN, PLAN], load("hover"))
+
+
+def test_of_several_those_that_are_named_are_operated():
+    given = [f"right={PLAN}"]
+    assert plans.overrides(given, Path("fleet"), []) == [
+        "vehicle.1.autopilot.operator=true",
+        "vehicle.1.autopilot.trajectory=false",
+    ]
+
+
+@pytest.mark.parametrize("given", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
+def test_refuses_a_plan_of_nobody(given):
+    with pytest.raises(ValueError, match=r"the scene has several vehicles; expected NAME=FILE, .*left, right, scout"):
+        plans.files(given, load("fleet"))
+
+
+def test_the_others_fly_on_along_their_trajectories():
+    given, only = [f"right={PLAN}"], ["run.duration=8.0"]
+    scene = load("fleet", [*only, *plans.overrides(given, Path("fleet"), only)])
+    flown = fly(resolve(scene, plans.commands(given, scene)))
+    assert flown.messages("right/status")[-1].mode == "mission"
+    assert flown.messages("left/status")[-1].phase == "ahead"
+    assert flown.view("right/truth").position[-1, 2] > 1.0
+    assert [str(name) for name in flown.topics if name.endswith("/trajectory")] == []

@@ -1,0 +1,135 @@
+"""A load under several autopilots: against the model that integrates vehicle and load as one, and against statics."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cosim.scene import SceneError
+from cosim.serialise import first_difference, from_json, to_json
+from dynamics.lie.quaternion import rotate
+from services.table import from_resolved, load, parse, resolve
+from tests.cosim.memory_log import fly
+from tests.cosim.test_agreement import fly_apart
+
+COMMON = """
+[run]
+duration = 7.0
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.ground_contact]
+[effects.body_drag]
+{load}
+[autopilot]
+gains = "tuned"
+estimator = "truth"
+[[trajectory.phase]]
+name = "climb"
+x = {{ kind = "minimum_jerk", to = 2.0, duration = 5.0 }}
+z = {{ kind = "minimum_jerk", to = 4.0, duration = 5.0 }}
+[[trajectory.phase]]
+name = "hold"
+duration = 10.0
+{vehicles}
+"""
+CABLE = "mass = 2.0\nlength = 2.0\ndrag_area = 0.05\nhook = [0.1, 0.0, -0.1]\n"
+SHARED = f"[effects.carried_load]\n{CABLE}"
+TWO = """
+[[vehicle]]
+name = "left"
+airframe = "delivery_drone"
+start = [0.0, 1.0]
+[[vehicle]]
+name = "right"
+airframe = "delivery_drone"
+start = [0.0, -1.0]
+"""
+
+
+def two(tmp_path, *overrides):
+    return parse(tmp_path / "two.toml", COMMON.format(load=SHARED, vehicles=TWO), overrides)
+
+
+@pytest.fixture(scope="module")
+def setup(tmp_path_factory):
+    return resolve(two(tmp_path_factory.mktemp("scene"), "trajectory.phase.0.x.to=0.0"))
+
+
+@pytest.fixture(scope="module")
+def flown(setup):
+    return fly(setup)
+
+
+def test_under_one_vehicle_it_moves_as_where_both_are_one_system(tmp_path):
+    """`slung_load` integrates vehicle and load together, and looks at nothing from ahead."""
+    alone = '[vehicle]\nairframe = "delivery_drone"\n'
+    together = alone + 'model = "slung_load"\n'
+    scenes = (
+        COMMON.format(load=SHARED, vehicles=alone),
+        COMMON.format(load=f"[slung_load]\n{CABLE}", vehicles=together),
+    )
+    beside, one = (fly(resolve(parse(tmp_path / "one.toml", text))) for text in scenes)
+    loads = [log.view("bodies").position[:, 0] for log in (beside, one)]
+    vehicles = [log.view("truth").position for log in (beside, one)]
+    assert loads[1][-1, 2] > 1.5
+    assert np.abs(loads[0] - loads[1]).max() < 0.002
+    assert np.abs(vehicles[0] - vehicles[1]).max() < 0.002
+
+
+def hook(truth):
+    """Where the cable is fastened at the end [m], world."""
+    x, y, z, w = map(float, truth.orientation[-1])
+    return truth.position[-1] + rotate((w, x, y, z), (0.1, 0.0, -0.1))
+
+
+def test_hanging_still_the_cables_carry_its_weight_and_lean_by_it(flown):
+    told, left, right = (flown.view(name) for name in ("left/bodies", "left/truth", "right/truth"))
+    assert told.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # it swings a little along x
+    assert told.force[-1, 0, 2] == pytest.approx(2.0 * 9.80665, abs=0.05)
+    place = told.position[-1, 0]
+    assert place[2] > 1.0
+    hooks = [hook(truth) for truth in (left, right)]
+    lengths = [np.linalg.norm(hook - place) for hook in hooks]
+    down = (hooks[0][2] - place[2]) / lengths[0]
+    stretch = 0.5 * 2.0 * 9.80665 / down / 2000.0  # of each cable, by Hooke
+    assert lengths == pytest.approx([2.0 + stretch] * 2, abs=5e-4)
+    # mirrored about the plane between the two
+    assert left.position[-1] * (1, -1, 1) == pytest.approx(right.position[-1], abs=1e-6)
+    assert left.position[-1, 1] < 0.999  # pulled inwards
+
+
+def test_only_the_first_tells_of_the_load(flown):
+    assert "left/bodies" in flown.topics
+    assert "right/bodies" not in flown.topics
+
+
+def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+    assert fly_apart(setup, None).digest == flown.digest
+
+
+def test_a_set_up_survives_text(setup):
+    assert first_difference(from_json(to_json(setup)), setup) is None
+    assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("vehicle.1.effects.carried_load.mass=3.0", r"vehicle\.1\.effects\.carried_load\.mass: .*the same load"),
+        ("vehicle.1.start=[0.0, -6.0]", r"effects\.carried_load\.length: .*m away, in the middle of its carriers"),
+        ("effects.carried_load.stiffness=1e5", r"effects\.carried_load\.stiffness: .*softer cable"),
+        ("vehicle.0.vehicle.model=multibody", "tells of bodies of its own"),
+    ],
+)
+def test_refuses_what_cannot_be_carried(tmp_path, override, message):
+    with pytest.raises(SceneError, match=message):
+        resolve(two(tmp_path, override))
+
+
+def test_the_shipped_scene_lifts_it(tmp_path):
+    setup = resolve(load("carried_load", ["run.duration=14.0"]))
+    log = fly(setup)
+    told = log.view("left/bodies")
+    assert math.isclose(told.position[0, 0, 2], 0.0)
+    assert told.position[-1, 0, 2] > 2.5
+    assert told.force[-1, 0, 2] == pytest.approx(3.0 * 9.80665, abs=3.0)
