@@ -36,9 +36,10 @@ from messages import (
     stamp,
     topics,
 )
+from messages.types import OpticalFlow
 
 UNKNOWN = (-1.0,) + (0.0,) * 8
-SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
+SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer", "optical_flow")
 
 
 def pose_of(position, q):
@@ -172,6 +173,28 @@ def sonar(given, time_ns, r):
     )
 
 
+def airspeed(given, time_ns, r):
+    return FluidPressure(header(time_ns, given.vehicle), r.pressure if r.valid else math.nan, r.variance)
+
+
+def rangefinder(given, time_ns, r):
+    p = given.rangefinder
+    return Range(
+        header(time_ns, given.vehicle),
+        radiation_type=Range.INFRARED,
+        field_of_view=p.beam_deg * math.pi / 180.0,
+        min_range=p.range_min,
+        max_range=p.range_max,
+        range=r.range if r.valid else math.nan,
+        variance=r.variance,
+    )
+
+
+def optical_flow(given, time_ns, r):
+    x, y = r.flow if r.valid else (math.nan, math.nan)
+    return OpticalFlow(header(time_ns, given.vehicle), (x, y), r.rate, r.distance, r.variance)
+
+
 def reference(given, time_ns, r):
     vectors = (r.position_world, r.velocity_world, r.acceleration_world)
     return Setpoint(
@@ -234,6 +257,9 @@ BUILDERS = {
     topics.GPS_VELOCITY: gps_velocity,
     topics.BARO: barometer,
     topics.SONAR: sonar,
+    topics.AIRSPEED: airspeed,
+    topics.RANGEFINDER: rangefinder,
+    topics.OPTICAL_FLOW: optical_flow,
     topics.TRAJECTORY: reference,
     topics.SETPOINT: reference,
     topics.ACTUATORS: actuators,
