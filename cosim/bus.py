@@ -51,6 +51,14 @@ def _configuration(
     return config
 
 
+_opened = False
+
+
+def in_use() -> bool:
+    """Whether this process has had a session: Zenoh keeps threads and files for the next one, which no fork has."""
+    return _opened
+
+
 class ZenohBus:
     """A session with explicit endpoints, publishers by key, and subscriptions that are queues.
 
@@ -78,6 +86,8 @@ class ZenohBus:
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
         """
+        global _opened
+        _opened = True
         listen, connect = list(listen), list(connect)
         try:
             self._session = zenoh.open(_configuration(listen, connect, mode, security))
@@ -275,6 +285,9 @@ def _mark_of(sample: zenoh.Sample) -> bytes:
 
 
 def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Where participant `name` listens and connects so that all are joined pairwise exactly once."""
-    names = list(endpoints)
+    """Where participant `name` listens and connects so that all are joined pairwise exactly once.
+
+    It does not depend on the order of `endpoints`, which need not be the same for all of them.
+    """
+    names = sorted(endpoints)
     return [endpoints[name]], [endpoints[other] for other in names[: names.index(name)]]

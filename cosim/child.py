@@ -4,14 +4,15 @@ import importlib
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import IO, NamedTuple
 
+from cosim.bus import in_use
 from cosim.forked import Forked
 
 PARTICIPANT = "services.participant"  # the module that a child runs
-FORKS = sys.platform == "linux"  # elsewhere libraries of the system may have threads before anything is flown
 
 
 class Child(NamedTuple):
@@ -38,6 +39,11 @@ def start(name: str, inherited: tuple[int, ...] = (), said: IO[bytes] | None = N
     return Child(process, said)
 
 
+def _may_fork() -> bool:
+    """Whether a fork finds all as it is here: other systems' libraries may have threads before anything is flown."""
+    return sys.platform == "linux" and threading.active_count() == 1 and not in_use()
+
+
 def _fork(name: str) -> Child:
     """The same, with all that this process has imported."""
     main = importlib.import_module(PARTICIPANT).main
@@ -49,9 +55,10 @@ def _fork(name: str) -> Child:
 def started_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
     """Children by name, of which `launch` takes those that it needs and ends the others.
 
-    They have what this process has imported, so it must not have begun threads of its own.
+    Where that is possible they have what this process has imported.
     """
-    children = {name: _fork(name) if FORKS else start(name) for name in names}
+    begin = _fork if _may_fork() else start
+    children = {name: begin(name) for name in names}
     try:
         yield children
     finally:

@@ -12,6 +12,7 @@ from cosim.bus import ZenohBus, mesh
 from cosim.child import Child, dismiss, start
 from cosim.errors import RunFailed
 from cosim.forked import Forked
+from cosim.keys import ALIVE_KEY
 from cosim.participants import Participants
 from cosim.private import private_endpoints
 from cosim.restarts import Restarts
@@ -54,7 +55,7 @@ def launch(
     children: dict[str, subprocess.Popen | Forked] = {}
     restarts = restarts or Restarts({}, lambda line: None)
     errors: dict[str, IO[bytes]] = {}
-    with private_endpoints([*everybody, WATCHER]) as own, ExitStack() as stack:
+    with private_endpoints([WATCHER, *everybody]) as own, ExitStack() as stack:
         stack.callback(_close, children, errors)
         endpoints = {**external, **own}
 
@@ -70,17 +71,20 @@ def launch(
                 with suppress(BrokenPipeError):  # it has ended already, and has said why
                     give(name, endpoints, stream)
 
-        ready = [name for name in everybody if name in (started or ())]
-        begin(ready)
-        begin([name for name in everybody if name not in ready])
-        dismiss(started or {})
         listen, connect = mesh(WATCHER, endpoints)
         with ZenohBus(listen, connect, mark=participants.mark(WATCHER)) as bus:
             try:
                 watch = Watch(bus, participants, [*names, *beside, *external])
+                bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it
+                ready = [name for name in everybody if name in (started or ())]
+                begin(ready)
+                begin([name for name in everybody if name not in ready])
+                dismiss(started or {})
                 _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
             finally:
-                early = {name: code for name in beside if (code := children[name].poll()) is not None}
+                early = {
+                    name: code for name in beside if name in children and (code := children[name].poll()) is not None
+                }
                 _ask_to_end(children)  # before this session closes, which takes a while
         _end(children)
         return {name: _farewell(early.get(name, 0), errors[name]) for name in beside}

@@ -102,9 +102,9 @@ def take_part(given: Participation) -> None:
         security = settings(setup, given.name, given.key_prefix, given.keys)
     with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security) as bus:
         watched = WATCHER in given.peers and not given.with_parent
-        door = given.with_parent and processes.ROUTER in given.peers  # one that cannot be opened ends the run
-        others = [*processes.needed(setup, given.external or ()), *([WATCHER] if watched else [])]
-        others += [processes.ROUTER] if door else []
+        others = [*processes.needed(setup, given.external or ()), *([WATCHER] if WATCHER in given.peers else [])]
+        if given.with_parent and processes.ROUTER in given.peers:
+            others.append(processes.ROUTER)  # one that cannot listen ends the run
         # all that one launcher has started have the same set-up; a program of somebody else's may have another
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)

@@ -35,7 +35,7 @@ def show(console: Console, found: Study) -> None:
 
 def _table(console: Console, title: str, found: Study, active: bool) -> None:
     console.print(title)
-    table = Table(box=SIMPLE, pad_edge=False)
+    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     table.add_column("effect", no_wrap=True)
     for column in ("hovering\n[ns]", "share", "standing\n[ns]", "path [m]", "end [m]", "energy"):
         table.add_column(column, justify="right", no_wrap=True)
