@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import IO, NamedTuple
 
-from cosim.bus import in_use
 from cosim.forked import Forked
 
 PARTICIPANT = "services.participant"  # the module that a child runs
@@ -41,6 +40,8 @@ def start(name: str, inherited: tuple[int, ...] = (), said: IO[bytes] | None = N
 
 def _may_fork() -> bool:
     """Whether a fork finds all as it is here: other systems' libraries may have threads before anything is flown."""
+    from cosim.bus import in_use  # not before: a command that flies nothing has no need of Zenoh
+
     return sys.platform == "linux" and threading.active_count() == 1 and not in_use()
 
 

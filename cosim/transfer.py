@@ -158,12 +158,17 @@ class Outlets:
             self._handed = stop
 
     def end(self, stop: int) -> None:
-        """Hand over what is left of the ticks before `stop`, and say that there will be no more."""
+        """Hand over what is left of the ticks before `stop`, and say that there will be no more.
+
+        Where who watches the run is gone, consumers are not told: they are to find that out, and not to take it for an
+        end of the run.
+        """
         self._hand_over(stop)
         self._process.tell_of_refused()
         time_ns = stop * self._interval_ns
         if self._held:
             self._held.add(b"", time_ns)
-        for put in (self._put_bundle, self._put_batch, *self._puts.values()):
-            if put:
-                put(b"", time_ns)
+        if self._put_bundle and not self._process.abandoned:
+            self._put_bundle(b"", time_ns)
+        for put in (self._put_batch, *self._puts.values()):
+            put(b"", time_ns)
