@@ -48,7 +48,7 @@ def _may_fork() -> bool:
 def _fork(name: str) -> Child:
     """The same, with all that this process has imported."""
     main = importlib.import_module(PARTICIPANT).main
-    said = tempfile.TemporaryFile()  # noqa: SIM115
+    said = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
     return Child(Forked(lambda: main(name), said), said)
 
 
