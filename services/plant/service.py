@@ -19,7 +19,8 @@ from dynamics.integrators import not_finite
 from dynamics.kernel import kernel
 from dynamics.multibody.five_bodies import FiveBodies
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters, MultirotorState
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
+from dynamics.vehicles.multirotor_multibody_equations import struck
 from services.common import ports
 from services.common.ports import PerRotor
 from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
@@ -149,5 +150,5 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
 
 @implements(_struck)
 def _struck_of(drive: types.Type, x: types.Type) -> Callable:
-    found = multirotor_multibody.struck if x.instance_class is FiveBodies else multirotor_euler.struck
+    found = struck if x.instance_class is FiveBodies else multirotor_euler.struck
     return lambda drive, x: found(drive, x)
