@@ -40,7 +40,8 @@ def create(setup: Setup) -> Service:
     plant: PlantSetup = given.parameters
     state = Cell(plant.start)
     bodies = [port for port in given.ports if port.name == ports.BODIES]
-    told = tuple(port for port in given.ports if port not in bodies)
+    feet = tuple(port for port in given.ports if port.name == ports.CONTACT)
+    told = tuple(port for port in given.ports if port not in bodies and port not in feet)
     own = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
     part = Part(
         NAME, plant.core, state, given.inputs, given.ports if own else told, failure=_diverged(setup, plant, state)
@@ -53,6 +54,8 @@ def create(setup: Setup) -> Service:
     if bodies and plant.bodies and not own:
         inputs = given.inputs[:1]
         parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
+    if plant.contact:
+        parts.append(Part(f"{NAME}.contact", plant.contact, state, (Input(ports.TRUTH),), feet, feet[0].period))
     return Service(NAME, parts, wires(setup, plant.wiring))
 
 
