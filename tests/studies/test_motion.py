@@ -301,7 +301,8 @@ def test_a_browser_draws_the_forces_on_the_feet_when_it_is_asked_to(tmp_path):
             const section = document.getElementById("motion"), forces = section.querySelector("[name=forces]");
             await until(() => section.dataset.time !== undefined);
             const drawn = () => {
-              const arrows = section.querySelector(".space").data.find(({ name }) => name === "force of contact or joint");
+              const { data } = section.querySelector(".space");
+              const arrows = data.find(({ name }) => name === "force of contact or joint");
               const { x, y, z } = arrows;
               return x.map((_, k) => [x[k], y[k], z[k]]).filter(([value]) => value !== null);
             };
