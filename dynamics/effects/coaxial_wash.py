@@ -38,7 +38,7 @@ class CoaxialWash(NamedTuple):
     Valid near hover; the wake of a vehicle that moves is carried away. The upper rotor is taken for one alone.
     """
 
-    static: float  # [m^4/rad^2] thrust constant
+    thrust_constant: float  # [m^4/rad^2]
     pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
     radius: float  # [m]
@@ -154,7 +154,7 @@ def _change(e, both, place):
     share = min(max((1.0 + CONTRACTED - drift) / (2.0 * CONTRACTED), 0.0), 1.0)
     thrust = inflow.thrust_in_wake(e.pitch, share * wash / (e.flow * speed))
     through = e.pitch - thrust * (e.pitch - 1.0)
-    static = e.static * speed * speed
+    static = e.thrust_constant * speed * speed
     return static * (thrust - 1.0), static * e.flow * (thrust * through - 1.0)
 
 

@@ -17,6 +17,7 @@ from services.autopilot.motor import thrust_at
 from services.common.vehicle import Effects, airframe
 from services.table import load, resolve
 from studies.performance import card
+from studies.tune import corners
 from studies.tune.linearise import hover
 
 DRONE = load("hover").lookup("airframe")
@@ -105,3 +106,9 @@ def test_the_tuner_sees_the_plant_that_the_autopilot_is_told_of():
     for axis, k in (("roll", 0), ("pitch", 1), ("yaw", 2)):
         assert getattr(found, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
     assert found.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)
+
+
+def test_a_corner_of_the_tuner_has_more_thrust_of_every_rotor():
+    active = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, airframe(load("hover", X8)))
+    wash, rotor = (corners._stronger(e, 1.2) for e in active)
+    assert wash.thrust_constant == rotor.thrust_constant == pytest.approx(1.2 * active[1].thrust_constant)
