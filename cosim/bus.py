@@ -240,9 +240,7 @@ class ZenohBus:
 class Subscription:
     """What has arrived on some keys and was not taken yet; who takes it leaves out what is not of its sender."""
 
-    def __init__(
-        self, arrived: queue.SimpleQueue, senders: dict[str, bytes | None] | None, refuse: Callable[[], None]
-    ):
+    def __init__(self, arrived: queue.SimpleQueue, senders: dict[str, bytes | None] | None, refuse: Callable[[], None]):
         """Of the samples in `arrived`; `senders` as of `ZenohBus.receive`, None for anybody."""
         self._arrived, self._senders, self._refuse = arrived, senders, refuse
         self._only_mark = next(iter(senders.values())) if senders and len(senders) == 1 else None
