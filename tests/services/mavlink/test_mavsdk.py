@@ -231,3 +231,36 @@ def test_orbit_failures_and_the_log(tmp_path):
         assert copy.read_bytes() == path.read_bytes()
 
     session(story, log=path)
+
+
+def test_events_and_arming_checks_are_read():
+    async def story(drone, vehicle):
+        vehicle.prearm = ("the vehicle does not stand level",)
+        report = await first(drone.events.health_and_arming_checks(), lambda report: report.all_problems)
+        assert [problem.message for problem in report.all_problems] == ["The vehicle does not stand level"]
+        assert not report.current_mode_intention.can_arm_or_run
+        assert {"gyro", "gps", "battery", "attitude_estimate"} <= {c.name for c in report.health_components}
+        vehicle.prearm = ()
+        await first(drone.events.health_and_arming_checks(), lambda r: r.current_mode_intention.can_arm_or_run)
+        told = []
+
+        async def listen():
+            async for event in drone.events.events():
+                told.append(event)
+
+        listening = asyncio.ensure_future(listen())
+        await asyncio.sleep(0.3)
+        await drone.action.arm()
+        await drone.action.takeoff()
+        await first(drone.telemetry.in_air(), bool)
+        vehicle.status = {"failsafe": True, "text": "the battery is critical"}
+        while not any(event.event_name == "failsafe" for event in told):
+            await asyncio.sleep(0.02)
+        listening.cancel()
+        texts = [event.message for event in told]
+        assert [text for text in texts if text in ("Armed", "Takeoff detected")] == ["Armed", "Takeoff detected"]
+        failsafe = next(event for event in told if event.event_name == "failsafe")
+        assert failsafe.message.startswith("Failsafe: the battery is critical, now ")
+        assert (failsafe.event_namespace, str(failsafe.log_level)) == ("lapwing", "CRITICAL")
+
+    session(story)
