@@ -21,7 +21,7 @@ from services.mavlink.events.definition import (
 from services.mavlink.telemetry.state import healthy, sensor_health
 from services.mavlink.view import VehicleView
 
-INTERVAL = 1_000_000_000  # [ns] between two reports at least, but to a station that is new
+INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
 WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
 MODES = tuple(dict.fromkeys(mode.kind for mode in flavours.get("px4").MODES))
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer", "optical_flow", "airspeed")
@@ -95,17 +95,21 @@ class ArmingWatch:
     """Reports when something has changed, and to whoever is new."""
 
     def __init__(self) -> None:
+        self._told: tuple = ()  # what a change of is reported at once
         self._reported: tuple = ()
         self._next = 0  # [ns]
 
     def step(self, v: VehicleView) -> Iterator[Happened]:
         """The next report, where one is due."""
+        told = v.stations, tuple(v.status.prearm)
+        if told == self._told and v.time_ns < self._next:
+            return
+        self._next = v.time_ns + INTERVAL
         health = tuple((source, sound) for source, _, sound in sensor_health(v))
-        report = v.stations, v.status.prearm, healthy(v), health
-        is_new = self._reported[:1] != report[:1]
-        if report != self._reported and (is_new or v.time_ns >= self._next):
-            self._reported, self._next = report, v.time_ns + INTERVAL
-            yield from _report(tuple(v.status.prearm), healthy(v), health)
+        report = *told, healthy(v), health
+        if report != self._reported:
+            self._told, self._reported = told, report
+            yield from _report(told[1], healthy(v), health)
 
 
 def _report(reasons: tuple[str, ...], located: bool, health: tuple[tuple[str, bool], ...]) -> Iterator[Happened]:
