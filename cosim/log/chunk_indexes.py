@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import SpooledTemporaryFile
 from typing import NamedTuple
 
-IN_MEMORY = 1 << 18  # [bytes]: some 700 chunks and as many wall times
+IN_MEMORY = 1 << 16  # [bytes]: some 170 chunks and as many wall times
 
 
 class Extent(NamedTuple):
