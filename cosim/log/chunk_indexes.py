@@ -8,9 +8,9 @@ IN_MEMORY = 1 << 16  # [bytes]: some 170 chunks and as many wall times
 
 
 class Extent(NamedTuple):
-    """How many chunks are counted, the bytes of their records, and the times of the first and last message."""
+    """How many chunks count, the bytes of their records, and the times of the first and last message."""
 
-    count: int = 0
+    chunks: int = 0
     size: int = 0  # [bytes]
     start_ns: int | None = None
     end_ns: int = 0
@@ -26,7 +26,7 @@ class ChunkIndexes:
     def __init__(self, folder: Path) -> None:
         """None as yet; those that memory is too small for go into `folder`, the log's: it has the room for them."""
         self.extent = Extent()
-        self._file = SpooledTemporaryFile(IN_MEMORY, dir=folder, prefix="lapwing-")  # noqa: SIM115 (closed in close)
+        self._file = SpooledTemporaryFile(IN_MEMORY, dir=str(folder), prefix="lapwing-")  # noqa: SIM115 (closed in close)
 
     def add(self, record: bytes, start_ns: int, end_ns: int) -> None:
         """Keep the index of a chunk with messages of these times [ns].
@@ -34,11 +34,11 @@ class ChunkIndexes:
         Raises:
             OSError: it cannot be written; it does not count then.
         """
-        count, size, first_ns, last_ns = self.extent
+        chunks, size, first_ns, last_ns = self.extent
         self._file.seek(size)
         self._file.write(record)
         first_ns = start_ns if first_ns is None else min(first_ns, start_ns)
-        self.extent = Extent(count + 1, size + len(record), first_ns, max(last_ns, end_ns))
+        self.extent = Extent(chunks + 1, size + len(record), first_ns, max(last_ns, end_ns))
 
     def records(self) -> bytes:
         """All that count, in order. Raises OSError where they cannot be read."""

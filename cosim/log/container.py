@@ -199,15 +199,15 @@ class Container:
         self._chunks.close()
 
     def _statistics(self) -> Statistics:
-        chunks = self._chunks.extent
+        extent = self._chunks.extent
         return Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=chunks.count,
+            chunk_count=extent.chunks,
             message_count=sum(self._counts.values()),
-            message_start_time=chunks.start_ns or 0,
-            message_end_time=chunks.end_ns,
+            message_start_time=extent.start_ns or 0,
+            message_end_time=extent.end_ns,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
