@@ -1,5 +1,4 @@
-"""docker-compose.yml, without Docker: it is sound, and on this machine its commands make a ground station's vehicle, and
-fly a campaign on a cluster."""
+"""docker-compose.yml, without Docker: sound, and on this machine its commands make a vehicle and fly a campaign."""
 
 import math
 import re
@@ -94,7 +93,8 @@ def test_a_cluster_flies_a_campaign(tmp_path):
     def begun(name, *more):
         words = [word.replace("scheduler:8786", f"127.0.0.1:{port}") for word in services[name]["command"]]
         words = [port if word == "8786" else word.replace("recordings/", f"{tmp_path}/") for word in words]
-        words = [str(tmp_path) if word == "/tmp" else word for word in words]
+        other = {"/tmp": str(tmp_path), SET["SCENE"]: "scenes/hover.toml"}
+        words = [other.get(word, word) for word in words]
         program = [sys.executable, *words[1:]] if words[0] == "python" else [sys.executable, "-m", *words]
         with (tmp_path / f"{name}.txt").open("w") as said:
             return subprocess.Popen([*program, *more], cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
