@@ -68,8 +68,8 @@ def _distributions(found: Results, names: list[str], caption: str) -> Plot:
 
 
 def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
-    """(legend, figure of the runs, colour) of each vehicle of a fleet; of the run where there is one, or where there are
-    more than can be told apart."""
+    """(legend, figure of the runs, colour) of each vehicle of a fleet; of the run where there is one vehicle, or more
+    than can be told apart."""
     own = found.of_vehicles(name)
     if not 0 < len(own) <= len(COLOURS):
         return [("the worst vehicles" if own else "runs", found[name], FLOWN)]
