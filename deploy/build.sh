@@ -22,9 +22,10 @@ if [ -z "${BASE:-}" ]; then
 fi
 export BASE
 
-# What has not changed since the last build is not compiled again.
-PREVIOUS=
-if docker image inspect "${IMAGE:-lapwing}" > /dev/null 2>&1; then PREVIOUS=${IMAGE:-lapwing}; fi
+# What has not changed since the last build is not compiled again. The name stays with that build's image while this one's
+# are made, so that the second of them finds the steps of the first.
+PREVIOUS=${IMAGE:-lapwing}-previous
+docker tag "${IMAGE:-lapwing}" "$PREVIOUS" 2> /dev/null || PREVIOUS=
 export PREVIOUS
 
 # With the host's pip the wheels are fetched by its settings; without, pip in the build asks the index itself.

@@ -66,6 +66,21 @@ def test_with_certificates_every_service_is_given_its_own_and_no_other():
         assert service["volumes"] == [f"./keys/{participant}:/app/keys/{participant}:ro"]
 
 
+def test_containers_are_closed():
+    for name, service in compose().items():
+        assert service["cap_drop"] == ["ALL"], name
+        assert service["security_opt"] == ["no-new-privileges:true"], name
+        assert all(port.startswith("127.0.0.1:") for port in service.get("ports", ())), name
+        assert not {"privileged", "network_mode"} & {*service}, name
+        if name != "tests":
+            assert service["read_only"], name
+            assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
+        # who starts as root has what is needed to become another, and no more (deploy/entrypoint.sh)
+        added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder", "campaign") else []
+        assert service.get("cap_add", []) == added, name
+        assert ("user" in service) == bool(added), name
+
+
 def endpoints():
     """The names in the table of participants, and who is started by `docker compose up mission`."""
     mission = compose()["mission"]
