@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from services.common.events import KINDS
 from studies.faults import planned
 from studies.saturation import saturation, stretches
 from studies.tension import pushes, told
@@ -15,26 +16,14 @@ from studies.touches import touches
 from studies.warnings import warnings
 
 BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
-ORDER = (
-    "restart",
-    "fault",
-    "warning",
-    "failsafe",
-    "mode",
-    "phase",
-    "arming",
-    "contact",
-    "slack",
-    "motors",
-    "battery",
-)  # at the same time
+ORDER = tuple(KINDS)  # at the same time
 
 
 class Event(NamedTuple):
     """Something that happened."""
 
     time: float  # [s]
-    kind: str  # arming, mode, phase, failsafe, fault, warning, slack, battery, motors, contact, restart
+    kind: str  # of services.common.events.KINDS
     text: str
 
 

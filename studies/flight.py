@@ -14,7 +14,20 @@ from cosim.provenance import DIVERGED, FAILURE, RESTARTS
 from cosim.setup import Setup
 from messages import TYPES
 from messages.digest import Digest
-from messages.topics import ACTUATORS, BODIES, SETPOINT, TRUTH, Topic, of_all, topic_named
+from messages.topics import (
+    ACTUATORS,
+    BODIES,
+    CONTACT,
+    ESTIMATE,
+    EVENTS,
+    LIFT,
+    SETPOINT,
+    STATUS,
+    TRUTH,
+    Topic,
+    of_all,
+    topic_named,
+)
 from studies import tracking
 from studies.events import Event, events, ordered, restarts, slack
 from studies.origin import Origin
@@ -23,7 +36,10 @@ from studies.topic_view import TopicView
 from studies.verdict import Verdict, judge
 
 AXES = tuple(tracking.AXES)
-IN_SPACE = (TRUTH, BODIES, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
+IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
+
+
+SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which verdict, events, figures and report are made
 
 
 class Flight:
@@ -69,8 +85,12 @@ class Flight:
             return cls._of_log(log, str(path), log.histories(own), named, fleet)
 
     @classmethod
-    def read_all(cls, path: str | Path) -> list[Self]:
+    def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
         """The recorded flights of all vehicles of a log, which is read once.
+
+        Args:
+            path: of the MCAP log.
+            only: the topics wanted, of every vehicle, None for all.
 
         Raises:
             ValueError: as of `read`.
@@ -80,7 +100,8 @@ class Flight:
             fleet = _vehicles(known, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
-            histories = log.histories(known)
+            wanted = None if only is None else {topic.key(name) for topic in only for name in fleet}
+            histories = log.histories(name for name in known if wanted is None or name in wanted)
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod

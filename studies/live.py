@@ -8,13 +8,13 @@ from cosim.setup import Setup
 from cosim.wire import Page
 from messages.history import history
 from messages.topics import STATUS, Topic, of_all
+from services.common.events import KINDS
 from studies.events import Event
 from studies.flight import IN_SPACE, Flight
 from studies.origin import Origin
 from studies.topic_view import TopicView
 
 TAKEN = (*IN_SPACE, STATUS)
-AFTERWARDS = ("motors",)  # kinds of events that are known only when they are over
 
 
 class LiveFlight:
@@ -54,4 +54,4 @@ class LiveFlight:
 
 def new_events(flight: Flight, after: float) -> list[Event]:
     """What happened in a step after the time `after` [s]."""
-    return [event for event in flight.events if event.time > after and event.kind not in AFTERWARDS]
+    return [event for event in flight.events if event.time > after and not KINDS[event.kind].afterwards]

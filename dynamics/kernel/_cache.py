@@ -15,7 +15,8 @@ from numba.core.serialize import dumps
 
 from dynamics.kernel import _files, _sources
 from dynamics.kernel._key import Key, NotKeptError, key
-from dynamics.kernel._pipeline import InnerLibrary, is_nested, reduced, restored
+from dynamics.kernel._libraries import InnerLibrary
+from dynamics.kernel._pipeline import is_nested, reduced, restored
 
 
 class Statistics(NamedTuple):

@@ -13,21 +13,15 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
-from llvmlite import binding
-from llvmlite.binding.newpassmanagers import FunctionPassManager, ModulePassManager, NewPassManager
 from numba.core import ir, sigutils
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, DefaultPassBuilder, PassManager
 from numba.core.compiler_machinery import register_pass
-from numba.core.environment import lookup_environment
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
 from dynamics.kernel._calls import InnerLower, KernelLower, is_whole, offer
-
-# llvmlite 0.50 frees no pass manager: what would stands behind another base class's method, which does nothing.
-FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._dispose
+from dynamics.kernel._libraries import InnerLibrary, KernelLibrary
 
 
 class _Depth(threading.local):
@@ -63,85 +57,6 @@ def _no_collection() -> Iterator[None]:
 def is_nested() -> bool:
     """Does a compilation in this thread wait for the next one?"""
     return _depth.value > 0
-
-
-class KernelLibrary(JITCodeLibrary):
-    """Code of a kernel, to which the functions apart that it reaches are linked only when all else is optimised."""
-
-    def __init__(self, codegen: Any, name: str):
-        super().__init__(codegen, name)
-        self._apart: dict[str, InnerLibrary] = {}  # by the symbol of the function
-
-    def add_linking_library(self, library: Any) -> None:
-        """Link a library, or declare its function if that is apart: LLVM would optimise it again in every caller."""
-        library._ensure_finalized()
-        self._apart |= getattr(library, "_apart", {})
-        if getattr(library, "apart", ""):
-            self._apart[library.apart] = library
-        else:
-            super().add_linking_library(library)
-
-    def _optimize_functions(self, module: Any) -> None:
-        """As numba does, which makes a pass manager for each function that is declared only, too: most of its time."""
-        module.data_layout = self._codegen._data_layout
-        for function in module.functions:
-            if not function.is_declaration:
-                manager, builder = self._codegen._function_pass_manager()
-                manager.run(function, builder)
-
-    def _finalize_final_module(self) -> None:
-        for library in reversed(self._apart.values()):  # callers first: of a module only what is called is linked
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        super()._finalize_final_module()
-
-
-class InnerLibrary(KernelLibrary):
-    """Optimised code to link into others, never emitted.
-
-    Attributes:
-        apart: the symbol of its function if that is apart, else "".
-        forwards: whether its function only calls another, which is optimised, and is inlined itself.
-    """
-
-    apart, forwards = "", False
-
-    def _optimize_final_module(self) -> None:
-        if not self.forwards:
-            super()._optimize_final_module()
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
-
-    def environments(self) -> tuple:
-        """What its functions, and those apart that they reach, refer to in numba."""
-        modules = [library._final_module for library in (self, *self._apart.values())]
-        names = {value.name for module in modules for value in module.global_variables}
-        found = (lookup_environment(name) for name in sorted(names) if name.startswith("_ZN08NumbaEnv"))
-        return tuple(environment for environment in found if environment is not None and environment.can_cache())
-
-    def serialize_using_object_code(self) -> tuple:
-        """Name, symbol if apart, and bitcode; the same of the functions apart that it reaches."""
-        self._ensure_finalized()
-        return tuple(
-            (library.name, library.apart, library._get_module_for_linking().as_bitcode())
-            for library in (self, *self._apart.values())
-        )
-
-    @classmethod
-    def restored(cls, codegen: Any, serialised: tuple) -> "InnerLibrary":
-        """The library of what `serialize_using_object_code` gave."""
-        made = []
-        for name, apart, bitcode in serialised:
-            library = cls(codegen, name)
-            library.apart = apart
-            library._final_module = library._shared_module = binding.parse_bitcode(bitcode)
-            made.append(library)
-        made[0]._apart = {library.apart: library for library in made[1:]}
-        for library in made:
-            library._finalize_final_module()
-        return made[0]
 
 
 def reduced(result: CompileResult) -> tuple:

@@ -15,7 +15,7 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from dynamics.terrain import LEVEL, Level, Relief, surface
 from dynamics.vector import Mat3, Vec3
 from dynamics.vector import apply as compiled_apply
-from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState
+from dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
 
 ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
 CONVERGED = 1e-12  # change of the slope between two iterations

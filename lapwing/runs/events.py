@@ -6,10 +6,9 @@ from pathlib import Path
 from cosim.log.append import append
 from messages import Log, stamp
 from messages.topics import EVENTS
+from services.common.events import KINDS
 from studies.events import Event
 from studies.flight import Flight
-
-SERIOUS = ("failsafe", "fault", "restart", "slack", "warning")  # kinds that viewers are to show as warnings
 
 
 def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
@@ -17,7 +16,7 @@ def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
     found = []
     for event in events:
         time_ns = max(0, round(event.time * 1e9))
-        level = Log.WARN if event.kind in SERIOUS else Log.INFO
+        level = Log.WARN if KINDS[event.kind].serious else Log.INFO
         found.append((time_ns, Log(stamp(time_ns), level, event.kind, event.text).encode()))
     return found
 

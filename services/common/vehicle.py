@@ -9,6 +9,8 @@ from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics import effects
 from dynamics.atmosphere import density
+from dynamics.effects._types import WakeSlopes
+from dynamics.effects.coaxial_wash import CoaxialWash
 from dynamics.effects.rotor_quadratic import RotorQuadratic
 from dynamics.effects.rotor_table import RotorTable
 from dynamics.effects.rotor_thrust import RotorThrust
@@ -18,7 +20,7 @@ from dynamics.lie.quaternion import Quaternion, rotate
 from dynamics.terrain import Level, Relief, surface
 from dynamics.vector import Vec3
 from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.multirotor import STANDARD_DENSITY
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from dynamics.vehicles.standing import Pose, standing_pose
 from services.common import mesh
 from services.common.environment import environment
@@ -165,6 +167,11 @@ def thrust_coefficient(scene: Scene) -> float:
     if "air_density" not in scene[Effects].tables:
         return STANDARD_DENSITY * rotor.thrust
     return float(uncompiled(density)(around.atmosphere, around.home.height)) * rotor.thrust
+
+
+def wake_slopes(scene: Scene) -> WakeSlopes:
+    """How the rotors' loads hang together under `coaxial_wash`, where the scene names it."""
+    return next((e.slopes() for e in active(scene) if isinstance(e, CoaxialWash)), WakeSlopes())
 
 
 def gravity(scene: Scene) -> float:

@@ -1,9 +1,11 @@
-"""What is sent to every endpoint at once, rather than when it is due: another mode, the next item, texts."""
+"""What is sent to every endpoint at once, rather than when it is due: another mode, the next item, events, texts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from services.common.spoken import TOLD_BY_STATUS
 from services.mavlink.dialect import id_of, mavlink
+from services.mavlink.events import Definition, watches
 from services.mavlink.telemetry import streams
 from services.mavlink.text import statustext
 from services.mavlink.view import VehicleView
@@ -22,6 +24,7 @@ class Announcements:
         self._item = (0, 0)
         self._reached = NO_ITEM
         self._texts = 0
+        self._watches = watches() if vehicle.flavour.EVENTS else []
 
     def step(self) -> None:
         """There is a new status."""
@@ -39,6 +42,14 @@ class Announcements:
         if (item := (s.mission_current, s.mission_state)) != self._item:
             self._item = item
             self._send("MISSION_CURRENT")
+        for watch in self._watches:
+            for definition, values in watch.step(self._vehicle):
+                self._announce_event(definition, values)
+
+    def _announce_event(self, definition: Definition, values: Sequence[float]) -> None:
+        log, time_ms = self._vehicle.events, self._vehicle.boot_ms
+        for message in log.add(definition.id, definition.level, definition.encode(values), time_ms):
+            self._broadcast(message)
 
     def _announce_reached(self, reached: int, count: int) -> None:
         """Each item by itself, also where several were reached since the last status."""
@@ -49,7 +60,12 @@ class Announcements:
                 self._broadcast(mavlink.MAVLink_mission_item_reached_message(number))
 
     def say(self, text: str) -> None:
-        """A text for the operators, in pieces where it is long."""
+        """A text for the operators, in pieces where it is long.
+
+        One that an event tells, too, ends with a tab, as PX4's do: ground stations that read events do not show it.
+        """
+        if self._watches and text in TOLD_BY_STATUS:
+            text += "\t"
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
         self._texts = self._texts % 0xFFFF + 1

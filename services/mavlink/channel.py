@@ -76,10 +76,14 @@ class Channel:
         self._datagrams, self._counts = datagrams, counts
 
     def encode(self, message: Any) -> bytes:
-        """The next frame."""
+        """The next frame; none, and counted, where a number of it is beyond a float of 32 bits."""
         codec = self._codec
-        found = None if self._signs else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
-        found = found or message.pack(codec)
+        try:
+            found = None if self._signs else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
+            found = found or message.pack(codec)
+        except OverflowError:
+            self._counts["beyond what a message holds"] += 1
+            return b""
         codec.seq = (codec.seq + 1) % 256
         return found
 

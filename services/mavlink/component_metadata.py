@@ -8,6 +8,7 @@ from typing import Any
 from services.common.parameters import Parameter
 from services.mavlink import flavours
 from services.mavlink.actuator_metadata import actuators
+from services.mavlink.event_metadata import events
 from services.mavlink.file_server import crc32
 from services.mavlink.px4_facts import Fact, output_function
 from services.mavlink.vehicle import VehicleDescription
@@ -15,10 +16,6 @@ from services.mavlink.vehicle import VehicleDescription
 GENERAL, PARAMETERS = "etc/extras/component_general.json", "etc/extras/parameters.json"
 EVENTS, ACTUATORS = "etc/extras/all_events.json", "etc/extras/actuators.json"
 PARAMETER_TYPE, EVENTS_TYPE, ACTUATORS_TYPE = 1, 4, 5  # COMP_METADATA_TYPE
-_NO_EVENTS = {
-    "version": 2,
-    "components": {"1": {"namespace": "lapwing", "event_groups": {}}},
-}  # texts tell what happens
 
 
 def uri(path: str) -> str:
@@ -31,10 +28,13 @@ def files(description: VehicleDescription) -> Mapping[str, bytes]:
     """The files of a vehicle by their paths."""
     table = {p.name: _parameter(p) for p in description.parameters}
     values = {p.name: p.default for p in description.parameters}
-    for fact in flavours.get(description.flavour).facts(description):
+    flavour = flavours.get(description.flavour)
+    for fact in flavour.facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})
-    described = {PARAMETERS: (PARAMETER_TYPE, parameters), EVENTS: (EVENTS_TYPE, _json(_NO_EVENTS))}
+    described = {PARAMETERS: (PARAMETER_TYPE, parameters)}
+    if flavour.EVENTS:
+        described[EVENTS] = EVENTS_TYPE, _json(events())
     if output_function(1) in table:  # with ArduPilot's parameters there is no such page
         described[ACTUATORS] = ACTUATORS_TYPE, _json(actuators(description.rotors))
     types = [{"type": kind, "uri": uri(path), "fileCrc": crc32(content)} for path, (kind, content) in described.items()]

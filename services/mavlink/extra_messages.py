@@ -99,3 +99,16 @@ _define(
     "uint8_t spec_version_hash[8]", "uint8_t library_version_hash[8]",
 )  # fmt: skip
 _define(397, "COMPONENT_METADATA", "uint32_t time_boot_ms", "uint32_t file_crc", "char uri[100]")
+_define(
+    410, "EVENT", "uint8_t destination_component", "uint8_t destination_system", "uint32_t id",
+    "uint32_t event_time_boot_ms", "uint16_t sequence", "uint8_t log_levels", "uint8_t arguments[40]",
+)  # fmt: skip
+_define(411, "CURRENT_EVENT_SEQUENCE", "uint16_t sequence", "uint8_t flags")
+_define(
+    412, "REQUEST_EVENT", "uint8_t target_system", "uint8_t target_component", "uint16_t first_sequence",
+    "uint16_t last_sequence",
+)  # fmt: skip
+_define(
+    413, "RESPONSE_EVENT_ERROR", "uint8_t target_system", "uint8_t target_component", "uint16_t sequence",
+    "uint16_t sequence_oldest_available", "uint8_t reason",
+)  # fmt: skip

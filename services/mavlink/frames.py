@@ -80,4 +80,5 @@ def saturated(value: float, bits: int, unsigned: bool = False, unknown: int | No
     minimum, maximum = (0, (1 << bits) - 1) if unsigned else (-(1 << bits - 1), (1 << bits - 1) - 1)
     if not math.isfinite(value):
         return maximum if unknown is None else unknown
-    return max(minimum, min(maximum, round(value)))
+    whole = round(value)
+    return whole if minimum <= whole <= maximum else minimum if whole < minimum else maximum

@@ -3,7 +3,6 @@
 import struct
 from collections.abc import Callable
 from functools import cache
-from itertools import chain
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -17,10 +16,10 @@ class _Kind(NamedTuple):
     """What is the same in all messages of a class."""
 
     fields: Callable[[Any], tuple]  # of a message, in the order of the wire
-    arrays: bool  # whether some of them are arrays
+    arrays: tuple[int, ...]  # places of those that are arrays, the last first
     layout: struct.Struct
     number: int  # a message's own `id` may be one of its fields
-    seed: int  # CRC_EXTRA
+    seed: bytes  # CRC_EXTRA
 
 
 @cache
@@ -29,7 +28,8 @@ def _kind(found: Any) -> _Kind | None:
     names = found.ordered_fieldnames
     if len(names) < 2 or {"c", "s"} & set(found.native_format.decode()):
         return None
-    return _Kind(attrgetter(*names), any(found.array_lengths), found.unpacker, found.id, found.crc_extra)
+    arrays = tuple(k for k, length in reversed(list(enumerate(found.array_lengths))) if length)
+    return _Kind(attrgetter(*names), arrays, found.unpacker, found.id, bytes((found.crc_extra,)))
 
 
 def frame(message: Any, sequence: int, system: int, component: int) -> bytes | None:
@@ -40,9 +40,12 @@ def frame(message: Any, sequence: int, system: int, component: int) -> bytes | N
         return None
     values = kind.fields(message)
     if kind.arrays:
-        values = tuple(chain.from_iterable(v if isinstance(v, list | tuple) else (v,) for v in values))
+        flat = list(values)
+        for k in kind.arrays:
+            flat[k : k + 1] = flat[k]
+        values = tuple(flat)
     payload = kind.layout.pack(*values).rstrip(b"\0") or b"\0"
     low, high = kind.number & 0xFFFF, kind.number >> 16
     header = _HEADER.pack(mavlink.PROTOCOL_MARKER_V2, len(payload), 0, 0, sequence, system, component, low, high)
     content = header + payload
-    return content + _CHECKSUM.pack(mavlink.x25crc(content[1:] + bytes((kind.seed,))).crc)
+    return content + _CHECKSUM.pack(mavlink.x25crc(content[1:] + kind.seed).crc)

@@ -1,9 +1,10 @@
 """An adapter with its sockets: waits for endpoints and for the vehicle at once, and lets neither starve the other."""
 
+import os
 import selectors
-import socket
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from messages import OperatorInput, header
@@ -53,9 +54,7 @@ class Hub:
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
         self.selector: selectors.BaseSelector = beside.selector if beside else selectors.DefaultSelector()
         self._owns = beside is None
-        self._woken, self._wake = socket.socketpair()
-        self._woken.setblocking(False)
-        self._wake.setblocking(False)
+        self._woken = os.eventfd(0, os.EFD_NONBLOCK)
         if self._owns:
             self.selector.register(self._woken, selectors.EVENT_READ, self._drain)
         self._links: list[Link] = []
@@ -68,13 +67,11 @@ class Hub:
 
     def wake(self) -> None:
         """End the present wait; may be called from any thread."""
-        try:
-            self._wake.send(b"\0")
-        except OSError:  # as many wake-ups as fit are on their way, or this is the end
-            return
+        with suppress(OSError):  # this is the end
+            os.eventfd_write(self._woken, 1)
 
     def _drain(self) -> None:
-        self._woken.recv(4096)
+        os.eventfd_read(self._woken)
 
     def wait(self, seconds: float = WAIT) -> None:
         """Serve the endpoints once, as soon as there is something; or until woken, or for so long."""
@@ -112,8 +109,7 @@ class Hub:
             link.close()
         if self._owns:
             self.selector.close()
-        self._woken.close()
-        self._wake.close()
+        os.close(self._woken)
 
     def __enter__(self) -> "Hub":
         return self

@@ -26,7 +26,11 @@ class Fact(NamedTuple):
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
 GENERIC_FRAMES = {4: 4001, 6: 6001, 8: 8001}  # SYS_AUTOSTART of 4, 6 and 8 rotors in X
 JOYSTICK_ONLY = 1  # COM_RC_IN_MODE: there is no receiver
+LOGGED_FROM_BOOT_TO_SHUTDOWN = 2  # SDLOG_MODE
+INTERNAL_COMPASS, NO_COLLISION_PREVENTION = -1, -1  # CAL_MAG0_ROT, CP_DIST
 NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
+NO_THRESHOLDS = ("ARMSWITCH", "GEAR", "KILLSWITCH", "LOITER", "OFFB", "RETURN")
+THRESHOLD = 0.75  # that PX4 begins with
 NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # what a failsafe of the autopilot does
 _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
 _GEOFENCE = {NOTHING: 1, HOLD: 2, RETURN: 3, LAND: 5, DESCEND: 5}  # GF_ACTION
@@ -63,27 +67,35 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "CAL_MAG0_ID": SIM_MAG * fitted("magnetometer"),
         "CAL_MAG1_ID": 0,
         "CAL_MAG2_ID": 0,
+        **{f"CAL_MAG{k}_ROT": INTERNAL_COMPASS for k in range(3)},
         "SENS_BOARD_ROT": 0,
         "COM_RC_IN_MODE": JOYSTICK_ONLY,
         "RC_CHAN_CNT": 0,
         "GF_MAX_HOR_DIST": 0,
         "GF_MAX_VER_DIST": 0,
+        "COM_OBS_AVOID": 0,
+        "SDLOG_MODE": LOGGED_FROM_BOOT_TO_SHUTDOWN,
         "PD_GRIPPER_EN": int(d.gripper),
         "CA_AIRFRAME": MULTIROTOR,
         "CA_ROTOR_COUNT": len(d.rotors),
         "BAT1_SOURCE": _POWER_MODULE if d.battery else _NO_SOURCE,
         "BAT1_N_CELLS": d.battery.cells if d.battery else 0,
     }
-    whole |= {f"RC_MAP_{axis}": 0 for axis in ("ROLL", "PITCH", "YAW", "THROTTLE", "AUX1", "AUX2", *NO_SWITCHES)}
+    whole |= {
+        f"RC_MAP_{axis}": 0 for axis in ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2", *NO_SWITCHES)
+    }
     whole |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
     whole |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
     return [
         *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
+        *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],
         Fact("COM_LOW_BAT_ACT", _low_battery),
         Fact("GF_ACTION", lambda v: _GEOFENCE[int(v.get("FS_FENCE_ACT", NOTHING))]),
         Fact("NAV_RCL_ACT", lambda v: _LINK_LOSS[int(v.get("NAV_DLL_ACT", NOTHING))]),  # sticks come over the data link
+        Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
+        Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),
         Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s"),
     ]
 
@@ -93,6 +105,7 @@ def _battery(b: Battery) -> Sequence[Fact]:
         Fact("BAT1_V_CHARGED", lambda _: b.charged_voltage, False, "V"),
         Fact("BAT1_V_EMPTY", lambda _: b.empty_voltage, False, "V"),
         Fact("BAT1_CAPACITY", lambda _: b.capacity / 3.6, False, "mAh"),
+        Fact("BAT1_V_LOAD_DROP", lambda _: 0.0, False, "V"),  # PX4 leaves it aside where it knows the resistance
         Fact("BAT1_R_INTERNAL", lambda _: b.resistance, False, "Ohm"),
     ]
 

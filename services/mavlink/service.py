@@ -1,7 +1,7 @@
 """The MAVLink link of a run: telemetry to ground stations, their commands to the autopilot.
 
-It takes no part in the lock step: nobody waits for it, and when it dies the flight goes on. In real time it subscribes
-to what it shows or passes on at once, and an estimate wakes it up; all else it reads then, from the services' batches.
+It takes no part in the lock step: nobody waits for it, and when it dies the flight goes on. Where the run keeps a speed
+it subscribes to the estimate, which wakes it up; all else it reads then, from the services' batches of ten a second.
 """
 
 import time
@@ -21,8 +21,7 @@ from services.mavlink.hub import Hub
 from services.mavlink.links import numbered
 from services.mavlink.options import Options
 
-AT_ONCE = (ESTIMATE, COMMAND_ACKS)
-ALL = (OPERATOR, STATUS, *AT_ONCE)  # of which no message is left out
+ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # of which no message is left out
 
 
 def run(process: Process, given: Any) -> None:
@@ -38,7 +37,7 @@ def run(process: Process, given: Any) -> None:
     key = read_key(given.mavlink_key) if given.mavlink_key else None
     log = Path(given.log) if given.log else None
     # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
-    at_once = AT_ONCE if process.speed else ()
+    at_once = process.speed is not None
     put = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with ExitStack() as stack:
         hubs: dict[str, Hub] = {}
@@ -50,7 +49,7 @@ def run(process: Process, given: Any) -> None:
             hubs[member.vehicle] = stack.enter_context(hub)
             for command in member.services["autopilot"].parameters.plan:  # the autopilot begins with it
                 hub.adapter.missions.hold(command)
-        topics = {topic.zenoh_key(name, process.key_prefix): (hubs[name], topic) for name in hubs for topic in at_once}
+        woken = {ESTIMATE.zenoh_key(name, process.key_prefix): hub for name, hub in hubs.items() if at_once}
         leading, *others = hubs.values()
 
         def wait() -> None:
@@ -59,9 +58,7 @@ def run(process: Process, given: Any) -> None:
                 other.adapter.tick(time.monotonic())
 
         senders = process.participants.senders(BATCH_KEY, setup.services)
-        author = process.participants.author("autopilot")
-        senders |= {key: author for key, (_, topic) in topics.items() if topic is not ESTIMATE}
-        estimates = {key: author for key, (_, topic) in topics.items() if topic is ESTIMATE}
+        estimates = dict.fromkeys(woken, process.participants.author("autopilot"))
         estimated = process.bus.receive(estimates, notify=leading.wake)
         arrived = process.bus.receive(senders, notify=None if estimates else leading.wake)
         process.join(wait)  # endpoints may connect while the others still load or compile
@@ -71,9 +68,8 @@ def run(process: Process, given: Any) -> None:
             while flying and (news := estimated.get_with_key(0.0) or arrived.get_with_key(0.0)) is not None:
                 name, time_ns, payload = news
                 flying = bool(payload)
-                if flying and name in topics:
-                    hub, topic = topics[name]
-                    hub.take(topic, time_ns, payload)
+                if flying and name in woken:
+                    woken[name].take(ESTIMATE, time_ns, payload)
                 elif flying:
                     _take_batch(hubs, payload, at_once, setup.interval_ns)
         for name, hub in hubs.items():
@@ -81,12 +77,12 @@ def run(process: Process, given: Any) -> None:
                 print(f"{name}: {line}" if others else line, flush=True)
 
 
-def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: tuple, interval_ns: int) -> None:
-    """Every command and status, what comes at once only where it does not, of all else the newest."""
+def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: bool, interval_ns: int) -> None:
+    """Every command, acknowledgement and status, estimates where they do not come at once, of all else the newest."""
     _, pages = unpack_batch(payload)
     for page in pages:
         topic = of_all(page.topic)
-        if topic in at_once:
+        if topic is ESTIMATE and at_once:
             continue
         chosen = range(0 if topic in ALL else len(page.ticks) - 1, len(page.ticks))
         for hub in [hubs[page.topic.vehicle]] if page.topic.vehicle else hubs.values():

@@ -9,6 +9,7 @@ from messages import Status, nanoseconds
 from messages.topics import ESTIMATE, STATUS, TRUTH, Topic
 from services.mavlink import flavours
 from services.mavlink.coordinates import Datum, enu_to_geodetic, to_local
+from services.mavlink.event_log import EventLog
 from services.mavlink.flight_times import FlightTimes
 from services.mavlink.frames import Quaternion, euler, saturated, swap_attitude, swap_body, swap_world
 from services.mavlink.vehicle import VehicleDescription
@@ -54,6 +55,8 @@ class VehicleView:
         self.flavour = flavours.get(description.flavour)
         self.time_ns = 0
         self.flight = FlightTimes()
+        self.events = EventLog()
+        self.stations = 0  # that have been met
         latitude, longitude, height = description.home
         # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height

@@ -1,9 +1,12 @@
 """Vehicles stepped side by side: the bits of one alone, resets, parameters of each, and commands of body rates."""
 
+import re
+
 import numpy as np
 import pytest
 
 import lapwing
+from dynamics import batch as kernels
 from dynamics.kernel import kernel
 from dynamics.rows import to_row
 from dynamics.vehicles import multirotor
@@ -37,6 +40,13 @@ def alone(k, volts, ticks, start=None):
     if start is not None:
         state = state._replace(motion=state.motion._replace(position_world=start))
     return to_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
+
+
+def test_members_are_stepped_side_by_side_in_vector_registers(batch):
+    batch.reset()
+    batch.step(motor_voltages=np.full((N, 4), 31.0))
+    for compiled in kernels.advance.overloads.values():
+        assert re.search(r"fmul <\d+ x double>", str(compiled.library._get_module_for_linking()))
 
 
 def rows(state):

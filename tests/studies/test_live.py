@@ -8,9 +8,10 @@ import pytest
 import lapwing
 from cosim.graph import Graph
 from cosim.single import PAGE
+from services.common.events import KINDS
 from services.processes import create_all
 from services.table import load, resolve
-from studies.live import AFTERWARDS, LiveFlight, new_events
+from studies.live import LiveFlight, new_events
 
 STEP = 50_000_000  # [ns]
 
@@ -53,5 +54,5 @@ def test_events_are_told_once_and_as_they_are_afterwards(steps, whole):
     for step in steps:
         told += new_events(step, after)
         after = float(step.truth.times[-1])
-    assert told == [event for event in whole.events if event.kind not in AFTERWARDS]
+    assert told == [event for event in whole.events if not KINDS[event.kind].afterwards]
     assert {event.kind for event in told} >= {"arming", "mode", "phase", "contact"}

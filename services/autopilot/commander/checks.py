@@ -6,10 +6,11 @@ from services.autopilot.commander.state import State
 from services.autopilot.commander.view import View
 from services.autopilot.estimate import NOT_STARTED
 from services.autopilot.estimator import SOURCES
+from services.common import spoken
 
 MAXIMUM_TILT = 0.35  # [rad] from the vertical
 MAXIMUM_OUTAGE = 0.5  # [s] of a source: single readings are refused now and then
-_UNCERTAIN = {64: "the position is uncertain", 128: "the attitude is uncertain"}
+_UNCERTAIN = {64: spoken.POSITION_UNCERTAIN, 128: spoken.ATTITUDE_UNCERTAIN}
 
 
 def count_outages(view: View, state: State) -> None:
@@ -22,15 +23,15 @@ def reasons(view: View, state: State) -> list[str]:
     """Why the vehicle cannot be armed; empty: it can."""
     estimate, guidance = view.estimate, state.guidance
     if estimate.health == NOT_STARTED:
-        return ["the estimator has not started"]
+        return [spoken.NOT_STARTED]
     bad = (name for name, time in zip(SOURCES, state.source_outage, strict=True) if time > MAXIMUM_OUTAGE)
-    found = [f"no good readings of the {name}" for name in bad]
+    found = [spoken.NO_READINGS.format(name) for name in bad]
     found += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
     q = estimate.attitude
     if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(MAXIMUM_TILT):
-        found.append("the vehicle does not stand level")
+        found.append(spoken.NOT_LEVEL)
     if view.battery_charge < guidance.parameters["BAT_CRIT_THR"]:
-        found.append(f"the battery is low: {view.battery_charge:.0%}")
+        found.append(f"{spoken.BATTERY_LOW}: {view.battery_charge:.0%}")
     if not guidance.fence.allows(*estimate.position_world[:2]):
-        found.append("the vehicle stands outside of the fence")
+        found.append(spoken.OUTSIDE_FENCE)
     return found

@@ -10,6 +10,7 @@ from services.autopilot.commander.flight_mode import value
 from services.autopilot.commander.mode_table import MODES
 from services.autopilot.commander.state import PendingArm
 from services.autopilot.commander.transitions import Context
+from services.common import spoken
 
 Handler = Callable[[Context, Any], None]
 HANDLERS: dict[str, Handler] = {}
@@ -82,7 +83,7 @@ def disarm(context: Context, command: Any) -> None:
         raise ValueError("disarming refused: the vehicle flies")
     if state.on_trajectory:
         transitions.enter(context.constants, state, "hold")
-    transitions.disarm(context, "as commanded")
+    transitions.disarm(context, spoken.AS_COMMANDED)
 
 
 @handles(*MODES)

@@ -22,6 +22,7 @@ from services.autopilot.commander.transitions import Context, arm, disarm, enter
 from services.autopilot.commander.view import Constants, View
 from services.autopilot.estimate import EXACT
 from services.autopilot.interface import Setpoint
+from services.common import spoken
 
 BLOCKED_TIME = 1.0  # [s] of sinking in vain after which the vehicle is on the ground
 LOW_THRUST = 0.5  # of the hovering thrust, below which the vehicle does not carry itself
@@ -119,7 +120,7 @@ def _detect_landing(context: Context) -> None:
     state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
     if view.motors_cut or state.blocked_time > BLOCKED_TIME:
         guidance.flying, state.on_ground_time, state.blocked_time = False, 0.0, 0.0
-        context.outbox.say("landed")
+        context.outbox.say(spoken.LANDED)
 
 
 def _disarm_when_idle(context: Context) -> None:
@@ -130,7 +131,7 @@ def _disarm_when_idle(context: Context) -> None:
     state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
-        disarm(context, "landed" if guidance.has_flown else "nobody took off")
+        disarm(context, spoken.AFTER_LANDING if guidance.has_flown else spoken.NO_TAKEOFF)
 
 
 def _retry_arming(context: Context) -> None:

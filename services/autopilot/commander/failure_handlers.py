@@ -1,6 +1,7 @@
 """The operator's command to inject a failure."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from services.autopilot.commander.command_handlers import Denied, handles
@@ -15,8 +16,8 @@ BELOW = 0.01  # by which a wrong battery reports less than the threshold, as PX4
 
 @handles("inject_failure")
 def inject_failure(context: Context, command: Any) -> None:
-    """Values: number of the unit in UNITS, what is wrong with it, number of a motor from 1, 0 for all."""
-    given = [value(command.values, k) for k in range(3)]
+    """Values: number of the unit in UNITS, what is wrong with it, which of its instances (`_instances`)."""
+    given = [value(command.values, k) for k in range(4)]
     if not (given[0] in range(len(UNITS)) and given[1] in range(len(KINDS))):
         raise Denied("inject failure: expected a unit and what is wrong with it")
     unit, kind = UNITS[int(given[0])], int(given[1])
@@ -27,23 +28,33 @@ def inject_failure(context: Context, command: Any) -> None:
         raise Denied(f"inject failure: there is no {unit}")
     if kind not in possible(unit):
         raise Denied(f"inject failure: {refusal(unit)}")
-    instance = ""
+    numbers = _instances(unit, constants.rotors if unit == "motor" else 1, *given[2:])
+    named = f" {', '.join(map(str, numbers))}" if len(numbers) < constants.rotors and unit == "motor" else ""
     if unit == "motor":
-        number = given[2] if given[2] == given[2] else 0.0  # NaN: left out
-        if number not in range(constants.rotors + 1):
-            raise Denied(f"inject failure: there is no motor {number:g}; expected 1 to {constants.rotors}, 0 for all")
-        state.faults = _with_motors(state.faults, kind, int(number))
-        instance = f" {number:.0f}" if number else ""
+        state.faults = _with_motors(state.faults, kind, numbers)
     else:
         found: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
         state.faults = state.faults._replace(**found)
     outbox.faults = state.faults
-    outbox.say(f"injected: {unit}{instance} {KINDS[kind]}")
+    outbox.say(f"injected: {unit}{named} {KINDS[kind]}")
 
 
-def _with_motors(faults: Faults, kind: int, number: int) -> Faults:
-    """The same where something is wrong with one motor, or with all (0)."""
-    motors = (kind if number in (0, k) else before for k, before in enumerate(faults.motors, start=1))
+def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:
+    """Which of a unit's `count` instances, from 1: one by its number, all for 0; without a number those of the bits."""
+    if math.isnan(number) and bits > 0.0:  # as MAVLink has it; a NaN is not above 0
+        last = math.frexp(bits)[1] if math.isfinite(bits) else math.inf
+        asked = [last] if last > count else [k + 1 for k in range(count) if int(bits) >> k & 1]
+    else:
+        asked = [] if math.isnan(number) or number == 0.0 else [number]
+    for k in asked:
+        if k not in range(1, count + 1):
+            raise Denied(f"inject failure: there is no {unit} {k:g}; expected 1 to {count}, 0 for all")
+    return [int(k) for k in asked] or list(range(1, count + 1))
+
+
+def _with_motors(faults: Faults, kind: int, numbers: Sequence[int]) -> Faults:
+    """The same where something is wrong with some motors."""
+    motors = (kind if k in numbers else before for k, before in enumerate(faults.motors, start=1))
     return faults._replace(motors=tuple(motors))
 
 

@@ -7,6 +7,7 @@ from services.autopilot.commander.mode_table import MODES
 from services.autopilot.commander.request import Outbox
 from services.autopilot.commander.state import State
 from services.autopilot.commander.view import Constants, View
+from services.common import spoken
 
 
 class Context(NamedTuple):
@@ -39,7 +40,7 @@ def arm(context: Context) -> None:
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
     x, y, z = context.view.estimate.position_world
     guidance.home = (x, y, z - context.constants.resting_height)
-    context.outbox.say("armed")
+    context.outbox.say(spoken.ARMED)
 
 
 def disarm(context: Context, reason: str) -> None:
@@ -50,4 +51,4 @@ def disarm(context: Context, reason: str) -> None:
     state.failsafe_timers.clear()
     if state.mode_name != "hold":
         enter(context.constants, state, "hold")
-    context.outbox.say(f"disarmed: {reason}")
+    context.outbox.say(spoken.DISARMED.format(reason))

@@ -15,6 +15,7 @@ class Flavour(Protocol):
     AUTOPILOT: int  # MAV_AUTOPILOT
     HOME_FIRST: bool  # whether item 0 of a mission is home
     GUIDED: bool  # whether setpoints are followed without a mode of their own
+    EVENTS: bool  # whether its ground stations read events; texts alone tell them what happens where not
     TAKEOFF_ABOVE_SEA: bool  # whether a take-off's altitude counts from the sea level; else from home
     PARAMETER_ENCODING: int  # MAV_PROTOCOL_CAPABILITY that says how whole parameters travel
     MODES: Sequence[FlightMode]  # that an operator may choose

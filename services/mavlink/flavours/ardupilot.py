@@ -9,7 +9,7 @@ from services.mavlink.vehicle import VehicleDescription
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 HOME_FIRST = GUIDED = True
-TAKEOFF_ABOVE_SEA = False
+TAKEOFF_ABOVE_SEA = EVENTS = False
 PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
 RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 

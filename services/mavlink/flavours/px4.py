@@ -8,7 +8,7 @@ from services.mavlink.px4_facts import px4_facts
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_PX4
 HOME_FIRST = GUIDED = False
-TAKEOFF_ABOVE_SEA = True
+TAKEOFF_ABOVE_SEA = EVENTS = True
 PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 RATES: dict[str, float] = {}
 facts = px4_facts

@@ -29,4 +29,4 @@ def inject_failure(session: Session, c: Command) -> Outcome:
     if kind not in possible(unit):
         session.say(f"INJECT_FAILURE: type {kind} unsupported; {refusal(unit)}")
         return UNSUPPORTED
-    return Request("inject_failure", (UNITS.index(unit), kind, c.params[2]))
+    return Request("inject_failure", (UNITS.index(unit), kind, *c.params[2:]))

@@ -1,6 +1,7 @@
 """What the vehicle is doing, and whether it is well."""
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from messages.topics import ESTIMATE
@@ -71,20 +72,26 @@ def _refused(v: VehicleView, source: str) -> bool:
     return e is not None and source in e.rejected
 
 
+def sensor_health(v: VehicleView) -> Iterator[tuple[str, int, bool]]:
+    """Each sensor that is there or that the true state stands for: its name, its bits of SYS_STATUS, if it is sound."""
+    for bits, (good, source) in _SENSORS.items():
+        yield source, bits, good(v) and not _refused(v, source) if v.description.sensors else healthy(v)
+    for sensors, (bit, good, source) in _OPTIONAL.items():
+        if set(sensors) & set(v.description.sensors):
+            yield source, bit, good(v) and not _refused(v, source)
+
+
 @stream("SYS_STATUS", 1.0, 5.0)
 def sys_status(v: VehicleView) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | sum(_SENSORS)
+    present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
     sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
     sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
-    for bits, (good, source) in _SENSORS.items():
-        sound |= bits if (good(v) and not _refused(v, source) if v.description.sensors else healthy(v)) else 0
-    for sensors, (bit, good, source) in _OPTIONAL.items():
-        if set(sensors) & set(v.description.sensors):
-            present |= bit
-            sound |= bit if good(v) and not _refused(v, source) else 0
+    for _, bits, good in sensor_health(v):
+        present |= bits
+        sound |= bits if good else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
     sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)

@@ -66,15 +66,18 @@ def test_it_is_guarded_by_the_parameter_at_any_time_and_knows_what_there_is():
     script[0.2] = [inject("motor", OFF, id=3), inject("gps", OFF, id=4), inject("battery", SLOW, id=5)]
     script[0.24] = [inject("motor", DELAYED, id=9), inject("motor", OFF, 5, id=10)]
     script[0.3] = [inject("motor", SOUND, id=6), enable(0.0, id=7)]
+    motor = UNITS.index("motor")
+    script[0.24] += [command("inject_failure", motor, OFF, math.nan, bits, id=k) for k, bits in ((11, 5.0), (12, 16.0))]
     script[0.4] = [inject("motor", OFF, id=8)]
     flown = fly(0.6, script)
-    refused = dict.fromkeys((1, 4, 5, 8, 9, 10), DENIED)
-    expected = dict.fromkeys((2, 3, 6, 7), ACCEPTED) | refused
+    refused = dict.fromkeys((1, 4, 5, 8, 9, 10, 12), DENIED)
+    expected = dict.fromkeys((2, 3, 6, 7, 11), ACCEPTED) | refused
     assert {k: v for k, v in results(flown).items() if k} == expected
-    assert said(flown)[:6] == [
+    assert said(flown)[:8] == [
         "inject failure: SYS_FAILURE_EN is 0; set it to 1 first", "injected: motor off",
         "inject failure: there is no gps", "inject failure: battery can be sound, off, stuck, wrong",
         "inject failure: motor can be sound, off, stuck, wrong, slow",
+        "inject failure: there is no motor 5; expected 1 to 4, 0 for all", "injected: motor 1, 3 off",
         "inject failure: there is no motor 5; expected 1 to 4, 0 for all",
     ]  # fmt: skip
 

@@ -132,4 +132,4 @@ def test_the_geometry_is_forward_right_down(served):
 def test_ardupilots_stations_are_told_of_none():
     served = files(describe(load("groundstation", ["mavlink.flavour=ardupilot"])))
     assert ACTUATORS not in served
-    assert len(json.loads(served[GENERAL])["metadataTypes"]) == 2
+    assert len(json.loads(served[GENERAL])["metadataTypes"]) == 1  # the parameters

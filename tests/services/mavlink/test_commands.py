@@ -280,15 +280,15 @@ def test_failures_bear_the_numbers_of_mavlink_and_impossible_ones_are_unsupporte
         if number.name != "FAILURE_TYPE_ENUM_END":
             kind = KINDS[name]
             assert number.name == f"FAILURE_TYPE_{'OK' if kind == 'sound' else kind.upper()}"
-            assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, name, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-            assert asked(bench, "inject_failure") == (UNITS.index("barometer"), name, 0.0)
+            assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, name, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+            assert asked(bench, "inject_failure") == (UNITS.index("barometer"), name, 0.0, 0.0)
     for unit, name in (
         (mavlink.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR, "distance_sensor"),
         (mavlink.FAILURE_UNIT_SENSOR_OPTICAL_FLOW, "optical_flow"),
         (mavlink.FAILURE_UNIT_SENSOR_AIRSPEED, "airspeed"),
     ):
         assert station.command(420, unit, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-        assert asked(bench, "inject_failure") == (UNITS.index(name), 1.0, 0.0)
+        assert asked(bench, "inject_failure") == (UNITS.index(name), 1.0, 0.0, 0.0)
     assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_VIO, 1.0, 0.0) == mavlink.MAV_RESULT_UNSUPPORTED
     for unit, kinds, words in (
         (mavlink.FAILURE_UNIT_SYSTEM_MOTOR, (0, 1, 2, 4, 5), "motor can be sound, off, stuck, wrong, slow"),

@@ -62,6 +62,18 @@ def test_a_channel_numbers_its_frames_and_a_codec_reads_them(signature):
         assert (got.get_seq(), got.time_boot_ms, got.get_signed()) == (k % 256, k, signature is not None)
 
 
+@pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
+def test_a_number_beyond_a_float_of_32_bits_is_not_sent_and_counted(signature):
+    counts = Counter()
+    channel = Channel(SYSTEM, signature, True, counts)
+    assert channel.encode(mavlink.MAVLink_attitude_message(0, 1e39, 0.0, 0.0, 0.0, 0.0, 0.0)) == b""
+    assert counts.total() == 1
+    (got,) = mavlink.MAVLink(None, 255, 190).parse_buffer(
+        channel.encode(mavlink.MAVLink_attitude_message(0, 3e38, 0.0, 0.0, 0.0, 0.0, 0.0))
+    )
+    assert got.get_seq() == 0
+
+
 def test_what_is_due_at_once_leaves_in_as_few_datagrams_as_any_network_carries():
     bench, pieces = Bench(), []
     bench.adapter.connect(True, True, pieces.append)

@@ -1,0 +1,22 @@
+"""What ground stations are told has happened: a file for each sort, which declares the events and looks for them."""
+
+from collections.abc import Mapping
+from functools import cache
+
+from dynamics import discovery
+from services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, Watch
+
+__all__ = ["Definition", "Watch", "definitions", "watches"]
+
+
+@cache
+def definitions() -> Mapping[str, Definition]:
+    """Every event by its name."""
+    discovery.modules(__name__)
+    return DEFINITIONS
+
+
+def watches() -> list[Watch]:
+    """What looks for them, anew for one vehicle."""
+    definitions()
+    return [kind() for kind in WATCHES]

@@ -1,0 +1,136 @@
+"""Which sensors are sound, and what hinders arming: libevents' protocol "health_and_arming_check".
+
+A report is a summary of the arming checks, an event for each that fails, and a summary of the sensors' health.
+"""
+
+from collections.abc import Iterator
+
+from services.common import spoken
+from services.mavlink import flavours
+from services.mavlink.dialect import mavlink
+from services.mavlink.events.definition import (
+    PROTOCOL,
+    Argument,
+    Definition,
+    Entry,
+    Enumeration,
+    Happened,
+    event,
+    watch,
+)
+from services.mavlink.telemetry.state import healthy, sensor_health
+from services.mavlink.view import VehicleView
+
+INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
+WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
+MODES = tuple(dict.fromkeys(mode.kind for mode in flavours.get("px4").MODES))
+SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer", "optical_flow", "airspeed")
+_OF_SOURCE = {  # what PX4 calls them
+    "imu": ("gyro", "Gyroscope and accelerometer"),
+    "gps": ("gps", "GPS"),
+    "barometer": ("absolute_pressure", "Absolute pressure"),
+    "sonar": ("distance_sensor", "Distance sensor"),
+    "magnetometer": ("magnetometer", "Magnetometer"),
+    "optical_flow": ("optical_flow", "Optical flow"),
+    "airspeed": ("differential_pressure", "Differential pressure"),
+}
+_OF_SOURCE["gps_velocity"] = _OF_SOURCE["gps"]
+_COMPONENTS = tuple(
+    dict.fromkeys(
+        (
+            ("none", "None"),
+            *_OF_SOURCE.values(),
+            ("battery", "Battery"),
+            ("attitude_estimate", "Attitude estimate"),
+            ("local_position_estimate", "Local position estimate"),
+        )
+    )
+)
+_INDEX = {name: k for k, (name, _) in enumerate(_COMPONENTS)}
+GROUPS = Enumeration(
+    "navigation_mode_group_t", "uint32_t",
+    tuple(Entry(1 << k, mode, mode.replace("_", " ")) for k, mode in enumerate(MODES)), bits=True,
+)  # fmt: skip
+_HEALTH = Enumeration(
+    "health_component_t", "uint32_t",
+    tuple(Entry(1 << k, name, text) for k, (name, text) in enumerate(_COMPONENTS)), bits=True,
+)  # fmt: skip
+_SOURCE = Enumeration(
+    "source_t", "uint8_t", tuple(Entry(k, source, source.replace("_", " ")) for k, source in enumerate(SOURCES))
+)  # fmt: skip
+_ALL = (1 << len(MODES)) - 1
+_chunk = Argument("chunk_idx", "uint8_t")
+
+CHECKS = event(
+    "arming_check_summary", "arming", "Summary of the arming checks", _chunk, Argument("error", _HEALTH),
+    Argument("warning", _HEALTH), Argument("can_arm", GROUPS), Argument("can_run", GROUPS),
+    level=PROTOCOL, group="arming_check", type_="summary",
+)  # fmt: skip
+HEALTH = event(
+    "health_summary", "arming", "Summary of the health", _chunk, Argument("is_present", _HEALTH),
+    Argument("error", _HEALTH), Argument("warning", _HEALTH), level=PROTOCOL, group="health", type_="summary",
+)  # fmt: skip
+
+
+def _check(name: str, message: str, *more: Argument) -> Definition:
+    arguments = Argument("modes", GROUPS), Argument("health_component_index", "uint8_t"), *more
+    return event(name, "arming", message, *arguments, level=mavlink.MAV_SEVERITY_ERROR, group="arming_check")
+
+
+READINGS = _check("check_readings", "No good readings of the {3}", Argument("source", _SOURCE))
+FAILED = {  # by how its reason begins: the event, the component
+    spoken.NOT_STARTED: (_check("check_started", "The estimator has not started"), "attitude_estimate"),
+    spoken.POSITION_UNCERTAIN: (_check("check_position", "The position is uncertain"), "local_position_estimate"),
+    spoken.ATTITUDE_UNCERTAIN: (_check("check_attitude", "The attitude is uncertain"), "attitude_estimate"),
+    spoken.NOT_LEVEL: (_check("check_level", "The vehicle does not stand level"), "none"),
+    spoken.BATTERY_LOW: (_check("check_battery", "The battery is low"), "battery"),
+    spoken.OUTSIDE_FENCE: (_check("check_fence", "The vehicle stands outside of the fence"), "none"),
+}
+OTHER = _check("check_other", "The vehicle cannot be armed"), "none"
+_READINGS = {spoken.NO_READINGS.format(source): source for source in SOURCES}
+
+
+@watch
+class ArmingWatch:
+    """Reports when something has changed, and to whoever is new."""
+
+    def __init__(self) -> None:
+        self._told: tuple = ()  # what a change of is reported at once
+        self._reported: tuple = ()
+        self._next = 0  # [ns]
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """The next report, where one is due."""
+        told = v.stations, tuple(v.status.prearm)
+        if told == self._told and v.time_ns < self._next:
+            return
+        self._next = v.time_ns + INTERVAL
+        health = tuple((source, sound) for source, _, sound in sensor_health(v))
+        report = *told, healthy(v), health
+        if report != self._reported:
+            self._told, self._reported = told, report
+            yield from _report(told[1], healthy(v), health)
+
+
+def _report(reasons: tuple[str, ...], located: bool, health: tuple[tuple[str, bool], ...]) -> Iterator[Happened]:
+    failed = [_failed(reason) for reason in reasons]
+    wrong = sum({1 << values[1] for _, values in failed})
+    can_arm = 0 if failed else _ALL
+    can_run = _ALL if located else sum(1 << MODES.index(mode) for mode in WITHOUT_POSITION)
+    yield CHECKS, (0, wrong, 0, can_arm, can_run)
+    yield from failed
+    present = sum({1 << _component(source) for source, _ in health})
+    unsound = sum({1 << _component(source) for source, sound in health if not sound})
+    yield HEALTH, (0, present, unsound, 0)
+
+
+def _failed(reason: str) -> tuple:
+    """The event of a failed check, with the values of its arguments."""
+    if source := _READINGS.get(reason):
+        return READINGS, (_ALL, _component(source), SOURCES.index(source))
+    definition, component = next((found for text, found in FAILED.items() if reason.startswith(text)), OTHER)
+    return definition, (_ALL, _INDEX[component])
+
+
+def _component(source: str) -> int:
+    return _INDEX[_OF_SOURCE[source][0]]

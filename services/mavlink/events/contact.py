@@ -1,0 +1,73 @@
+"""What the simulation sees and a real autopilot does not: the feet touch the ground, motors are at their limit."""
+
+from collections.abc import Iterator
+
+from messages.topics import TRUTH
+from services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Happened, event, watch
+from services.mavlink.telemetry.power import motor_fractions
+from services.mavlink.view import VehicleView
+
+MOTORS = 8  # that an event can name
+LASTS = 1_000_000_000  # [ns] that a motor is at a limit before that is told, or off it before that is over
+_NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
+_motors = Argument(
+    "motors",
+    Enumeration(
+        "motors_t", "uint8_t", tuple(Entry(1 << k, f"motor_{k + 1}", str(k + 1)) for k in range(MOTORS)), bits=True
+    ),
+)
+
+TOUCHED = event(
+    "ground_contact", "contact", "Touches the ground at {1:.1m/s}", Argument("speed", "float"),
+    description="The speed downwards of the last reading before, a tenth of a second ago at most.",
+)  # fmt: skip
+LEFT = event("ground_left", "contact", "Leaves the ground")
+SATURATED = event(
+    "motors_saturated", "motors", "Motor {1} at the limit", _motors, level=WARNING,
+    description="No voltage or the full one for more than a second: the vehicle cannot follow what it is asked for.",
+)  # fmt: skip
+
+
+@watch
+class ContactWatch:
+    """Compares each reading of the truth with the one before."""
+
+    def __init__(self) -> None:
+        self._contact, self._speed = True, 0.0
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """Whether the vehicle has come down, or up."""
+        truth = v.get(TRUTH)
+        if truth is None:
+            return
+        if truth.ground_contact != self._contact:
+            self._contact = truth.ground_contact
+            if truth.ground_contact:
+                yield TOUCHED, (self._speed,)
+            else:
+                yield LEFT, ()
+        self._speed = max(0.0, -truth.velocity.z)
+
+
+@watch
+class SaturationWatch:
+    """Times how long motors are at a limit in the air."""
+
+    def __init__(self) -> None:
+        self._since: int | None = None  # [ns] that some have been there
+        self._last = -LASTS  # [ns] when some were
+        self._told = 0
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """Which motors have been there for long; each time once."""
+        flying = v.status.armed and not v.status.landed
+        fractions = motor_fractions(v)[:MOTORS] if flying else []
+        there = sum(1 << k for k, f in enumerate(fractions) if not _NEAR < f < 1.0 - _NEAR)
+        if there:
+            self._since = v.time_ns if self._since is None else self._since
+            self._last = v.time_ns
+            if v.time_ns - self._since > LASTS and there & ~self._told:
+                self._told |= there
+                yield SATURATED, (there,)
+        elif v.time_ns - self._last > LASTS:
+            self._since, self._told = None, 0

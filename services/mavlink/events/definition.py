@@ -1,0 +1,134 @@
+"""How an event is declared: its name, its words, its arguments, and how serious it is.
+
+The words and the arguments are those of libevents, which MAVLink's Events Interface comes with: "{1}" stands for the
+first argument. A ground station reads them in the vehicle's metadata, and is sent the numbers alone.
+"""
+
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, Protocol, TypeVar
+
+from services.common.events import KINDS
+from services.mavlink.dialect import mavlink
+from services.mavlink.view import VehicleView
+
+FORMATS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
+SIZE = 40  # [bytes] of all arguments of an event
+EMERGENCY, CRITICAL, WARNING = (
+    mavlink.MAV_SEVERITY_EMERGENCY,
+    mavlink.MAV_SEVERITY_CRITICAL,
+    mavlink.MAV_SEVERITY_WARNING,
+)
+INFO = mavlink.MAV_SEVERITY_INFO
+PROTOCOL = 8  # not for people
+_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+
+
+class Entry(NamedTuple):
+    """A value of an enumeration."""
+
+    value: int
+    name: str
+    text: str  # for people
+
+
+class Enumeration(NamedTuple):
+    """Values that stand for something; of a bit field each is a bit."""
+
+    name: str  # ends with _t
+    type: str
+    entries: Sequence[Entry]
+    bits: bool = False
+
+
+class Argument(NamedTuple):
+    """A number that comes with an event."""
+
+    name: str
+    type: str | Enumeration
+
+    @property
+    def base(self) -> str:
+        """The type that travels."""
+        return self.type.type if isinstance(self.type, Enumeration) else self.type
+
+
+class Definition(NamedTuple):
+    """An event that may happen."""
+
+    name: str
+    kind: str  # of services.common.events
+    message: str
+    arguments: tuple[Argument, ...]
+    level: int
+    group: str
+    type: str  # what it is for within its group, "" for nothing special
+    description: str
+
+    @property
+    def sub_id(self) -> int:
+        """The 24 bits by which it is known: they follow from its name, and stay when others come and go."""
+        return zlib.crc32(self.name.encode()) & 0xFFFFFF
+
+    @property
+    def id(self) -> int:
+        """With the component in front."""
+        return _COMPONENT << 24 | self.sub_id
+
+    def encode(self, values: Sequence[float]) -> bytes:
+        """The arguments as they travel, one after the other."""
+        return struct.pack("<" + "".join(FORMATS[a.base] for a in self.arguments), *values)
+
+
+Happened = tuple[Definition, Sequence[float]]  # and the values of its arguments
+
+
+class Watch(Protocol):
+    """Looks for events of some sort."""
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """What has happened since the step before."""
+
+
+Kind = TypeVar("Kind", bound=Callable[[], Watch])
+
+DEFINITIONS: dict[str, Definition] = {}
+"""Every event that has been declared, by its name."""
+WATCHES: list[Callable[[], Watch]] = []
+"""What looks for them."""
+
+
+def event(
+    name: str,
+    kind: str,
+    message: str,
+    *arguments: Argument,
+    level: int | None = None,
+    group: str = "default",
+    type_: str = "",
+    description: str = "",
+) -> Definition:
+    """Declare an event.
+
+    Args:
+        name: unique.
+        kind: of services.common.events; says how serious it is where `level` does not.
+        message: one line, with the arguments' places.
+        arguments: in their order.
+        level: of MAV_SEVERITY, or PROTOCOL.
+        group: of libevents.
+        type_: of libevents.
+        description: more than one line has room for.
+    """
+    if level is None:
+        level = WARNING if KINDS[kind].serious else INFO
+    found = Definition(name, kind, message, arguments, level, group, type_, description)
+    DEFINITIONS[name] = found
+    return found
+
+
+def watch(found: Kind) -> Kind:
+    """Declare a class that looks for events."""
+    WATCHES.append(found)
+    return found

@@ -1,0 +1,60 @@
+"""What goes wrong: failsafes that take over, motors that fail, a battery that runs empty."""
+
+from collections.abc import Iterator
+
+from services.common import spoken
+from services.mavlink.events.definition import (
+    CRITICAL,
+    EMERGENCY,
+    WARNING,
+    Argument,
+    Entry,
+    Enumeration,
+    Happened,
+    event,
+    watch,
+)
+from services.mavlink.events.flight import mode_number, mode_type
+from services.mavlink.view import VehicleView
+
+_CAUSES = tuple(Entry(k, reason.replace(" ", "_"), reason) for k, reason in enumerate(spoken.FAILSAFES))
+_cause = Argument("cause", Enumeration("failsafe_cause_t", "uint8_t", _CAUSES))
+
+FAILSAFE = event(
+    "failsafe", "failsafe", "Failsafe: {1}, now {2}", _cause, Argument("mode", mode_type), level=CRITICAL
+)  # fmt: skip
+FAILSAFE_OVER = event("failsafe_over", "failsafe", "Failsafe is over")
+MOTOR_FAILED = event(
+    "motor_failed", "fault", "Motor {1} has failed", Argument("motor", "uint8_t"), level=CRITICAL,
+    description="It gives less thrust than it is asked for.",
+)  # fmt: skip
+BATTERY = (
+    event("battery_low", "battery", "Low battery", level=WARNING),
+    event("battery_critical", "battery", "Critical battery", level=CRITICAL),
+    event("battery_emergency", "battery", "Battery nearly empty", level=EMERGENCY),
+)
+
+
+@watch
+class FailureWatch:
+    """Compares each status with the one before."""
+
+    def __init__(self) -> None:
+        self._failsafe, self._motor, self._battery = "", 0, 0
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """What has come up, and which failsafe has gone."""
+        s = v.status
+        if s.battery_warning != self._battery:
+            yield from ((definition, ()) for definition in BATTERY[self._battery : s.battery_warning])
+            self._battery = s.battery_warning
+        if s.failed_motor != self._motor:
+            self._motor = s.failed_motor
+            if s.failed_motor:
+                yield MOTOR_FAILED, (s.failed_motor,)
+        if (reason := s.text if s.failsafe else "") != self._failsafe:
+            self._failsafe = reason
+            if reason in spoken.FAILSAFES:
+                yield FAILSAFE, (spoken.FAILSAFES.index(reason), mode_number(s.mode))
+            elif not reason:
+                yield FAILSAFE_OVER, ()

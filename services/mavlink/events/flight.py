@@ -1,0 +1,58 @@
+"""Arming, take-off, landing, flight modes: what the autopilot does as it is told."""
+
+from collections.abc import Iterator
+
+from services.mavlink import flavours
+from services.mavlink.events.definition import Argument, Entry, Enumeration, Happened, event, watch
+from services.mavlink.view import VehicleView
+
+ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
+_PLACES = (
+    Entry(ON_GROUND, "on_ground", "on the ground"),
+    Entry(NO_TAKEOFF, "no_takeoff", "nobody took off"),
+    Entry(IN_AIR, "in_air", "in the air"),
+)
+MODES = tuple(dict.fromkeys([*(mode.kind for mode in flavours.get("px4").MODES), "orbit", "goto", "descend", "phases"]))
+UNKNOWN = len(MODES)
+_MODES = (
+    *[Entry(number, kind, kind.replace("_", " ")) for number, kind in enumerate(MODES)],
+    Entry(UNKNOWN, "unknown", "another mode"),
+)
+mode_type = Enumeration("flight_mode_t", "uint8_t", _MODES)
+
+ARMED = event("armed", "arming", "Armed")
+DISARMED = event("disarmed", "arming", "Disarmed: {1}", Argument("place", Enumeration("place_t", "uint8_t", _PLACES)))
+TAKEOFF = event("takeoff_detected", "contact", "Takeoff detected")
+LANDING = event("landing_detected", "contact", "Landing detected")
+MODE = event("flight_mode", "mode", "Flight mode: {1}", Argument("mode", mode_type))
+
+
+def mode_number(mode: str) -> int:
+    """The number by which an event names a mode."""
+    return MODES.index(mode) if mode in MODES else UNKNOWN
+
+
+@watch
+class FlightWatch:
+    """Compares each status with the one before."""
+
+    def __init__(self) -> None:
+        self._armed, self._landed, self._mode = False, True, ""
+
+    def step(self, v: VehicleView) -> Iterator[Happened]:
+        """What is another."""
+        s = v.status
+        if s.mode != self._mode:
+            if self._mode:
+                yield MODE, (mode_number(s.mode),)
+            self._mode = s.mode
+        if s.landed != self._landed:
+            self._landed = s.landed
+            yield (LANDING if s.landed else TAKEOFF), ()
+        if s.armed != self._armed:
+            self._armed = s.armed
+            if s.armed:
+                yield ARMED, ()
+            else:
+                place = IN_AIR if not s.landed else ON_GROUND if v.flight.takeoff_ns else NO_TAKEOFF
+                yield DISARMED, (place,)

@@ -1,0 +1,319 @@
+"""MAVLink's Events Interface: what happens is told by numbers, in order and without gaps, and the metadata says what
+they mean. The reader is libevents' README and receiver put anew."""
+
+import json
+import re
+import struct
+
+import pytest
+from bench import Bench
+
+from messages import Actuators, Vector3, VehicleState
+from messages.topics import ACTUATORS, TRUTH
+from services.autopilot.commander.failsafes import FAILSAFES
+from services.autopilot.commander.mode_table import MODES
+from services.autopilot.estimator import NAMES
+from services.common import spoken
+from services.common.events import KINDS
+from services.mavlink.component_metadata import EVENTS, GENERAL, files
+from services.mavlink.dialect import mavlink, message_class
+from services.mavlink.event_log import KEPT, EventLog
+from services.mavlink.event_metadata import events
+from services.mavlink.events import arming_checks, definitions, flight
+from services.mavlink.resolve import describe
+from services.table import load
+
+NUMBERS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
+
+
+class Reader:
+    """A ground station's: takes events in order, asks for what it lacks, and puts the arguments into the words."""
+
+    def __init__(self, station, described):
+        self.station, self.told, self.lost, self.last = station, [], 0, None
+        self.component = described["components"]["1"]
+        self.known = {
+            int(sub_id): (group, event)
+            for group, content in self.component["event_groups"].items()
+            for sub_id, event in content["events"].items()
+        }
+        self.newest = None
+        station.watch, station.step = self.take, self.step
+
+    def step(self):
+        """It asks again, as a timer of 0.1 s does."""
+        if self.newest is not None and 0 < (self.newest - self.last) % 65536 < 32768:
+            self.ask()
+
+    def take(self, m):
+        kind = m.get_type()
+        if kind == "CURRENT_EVENT_SEQUENCE":
+            if m.flags & 1 or self.last is None:
+                self.last = m.sequence
+            self.newest = m.sequence
+        elif kind == "RESPONSE_EVENT_ERROR" and m.sequence == (self.last + 1) % 65536:
+            self.lost += (m.sequence_oldest_available - self.last - 1) % 65536
+            self.last = (m.sequence_oldest_available - 1) % 65536
+            self.ask()
+        elif kind == "EVENT":
+            if self.last is None:
+                self.last = (m.sequence - 1) % 65536
+            gap = (m.sequence - self.last - 1) % 65536
+            if gap == 0:
+                self.last = m.sequence
+                self.told.append(self.read(m))
+            elif gap < 32768:
+                self.ask()
+
+    def ask(self):
+        wanted = (self.last + 1) % 65536
+        self.station.send_own("REQUEST_EVENT", 1, 1, wanted, wanted)
+
+    def values(self, m):
+        group, event = self.known[m.id & 0xFFFFFF]
+        found, offset = [], 0
+        for argument in event.get("arguments", ()):
+            kind = self.component["enums"].get(argument["type"], {"type": argument["type"]})
+            layout = "<" + NUMBERS[kind["type"]]
+            (value,) = struct.unpack_from(layout, bytes(m.arguments), offset)
+            offset += struct.calcsize(layout)
+            found.append((value, kind))
+        return group, event, found
+
+    def read(self, m):
+        assert m.id >> 24 == 1
+        group, event, values = self.values(m)
+
+        def put(match):
+            value, kind = values[int(match[1]) - 1]
+            if "entries" not in kind:
+                return f"{value:.{match[2]}f}" if match[2] else f"{value:g}"
+            if not kind["is_bitfield"]:
+                return kind["entries"][str(value)]["description"]
+            return "|".join(kind["entries"][str(1 << k)]["description"] for k in range(32) if value >> k & 1)
+
+        return group, event["name"], re.sub(r"\{(\d)(?::\.(\d))?[^}]*\}", put, event["message"])
+
+    def said(self, group="default"):
+        return [text for of, _, text in self.told if of == group]
+
+
+def reader(bench, **more):
+    found = Reader(station := bench.station(**more), events())
+    station.send_own = lambda name, *fields: station.raw(message_class(name)(*fields).pack(station.codec))
+    return found
+
+
+def test_the_messages_are_those_of_common_xml():
+    published = {410: (160, 53), 411: (106, 3), 412: (33, 6), 413: (77, 7)}  # mavlink/common.h: CRC_EXTRA, length
+    for number, (seed, length) in published.items():
+        found = mavlink.mavlink_map[number]
+        assert (found.crc_extra, found.unpacker.size) == (seed, length)
+
+
+def test_a_flight_is_told():
+    bench = Bench()
+    one = reader(bench)
+    bench.step(5)
+    bench.vehicle.position = [0.0, 0.0, 5.0]
+    bench.vehicle.armed = True
+    bench.step()
+    bench.vehicle.mode, bench.vehicle.landed = "takeoff", False
+    bench.step()
+    bench.vehicle.mode = "orbit"
+    bench.step()
+    bench.vehicle.status = {"failsafe": True, "text": spoken.SETPOINTS_LOST, "mode": "hold"}
+    bench.step()
+    bench.vehicle.status = {"battery_warning": 2, "failed_motor": 3}
+    bench.vehicle.mode = "land"
+    bench.step()
+    bench.vehicle.status, bench.vehicle.armed, bench.vehicle.landed = {}, False, True
+    bench.step()
+    assert one.said() == [
+        "Armed",
+        "Flight mode: takeoff",
+        "Takeoff detected",
+        "Flight mode: orbit",
+        "Flight mode: hold",
+        f"Failsafe: {spoken.SETPOINTS_LOST}, now hold",
+        "Flight mode: land",
+        "Low battery",
+        "Critical battery",
+        "Motor 3 has failed",
+        "Failsafe is over",
+        "Landing detected",
+        "Disarmed: on the ground",
+    ]
+    assert not one.lost
+
+
+@pytest.mark.parametrize("reason", spoken.FAILSAFES)
+def test_every_failsafe_has_a_number(reason):
+    bench = Bench()
+    one = reader(bench)
+    bench.step(2)
+    bench.vehicle.status = {"failsafe": True, "text": reason}
+    bench.step()
+    assert one.said()[-1] == f"Failsafe: {reason}, now hold"
+
+
+def test_contact_and_motors_at_their_limit_are_told():
+    bench = Bench()
+    one = reader(bench)
+    highest = bench.adapter.vehicle.description.max_voltage
+    bench.vehicle.armed, bench.vehicle.landed = True, False
+    bench.vehicle.more = [(TRUTH, VehicleState(velocity=Vector3(0.0, 0.0, -2.5))), (ACTUATORS, Actuators())]
+    bench.step(3)
+    bench.vehicle.more = [(ACTUATORS, Actuators(motor_voltage=(0.5 * highest, highest, 0.3, 0.0)))]
+    bench.step(40)
+    assert "Motor 2|4 at the limit" not in one.said()
+    bench.step(100)
+    bench.vehicle.more = [(TRUTH, VehicleState(ground_contact=True))]
+    bench.step(3)
+    assert one.said().count("Motor 2|4 at the limit") == 1
+    assert one.said()[-1] == "Touches the ground at 2.5"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_events_that_get_lost_are_asked_for_and_sent_again(seed):
+    bench = Bench()
+    one, sound = reader(bench, loss=0.3, seed=seed), reader(bench)
+    for k in range(60):
+        bench.vehicle.armed = bool(k % 2)
+        bench.step(3)
+    bench.step(600)  # the number of the last one comes every 3 s
+    whole = sound.said()
+    assert len(whole) == 59
+    assert one.said() == whole[len(whole) - len(one.said()) :]
+    assert len(one.said()) >= 55  # none before the first that it got is asked for
+    assert not one.lost
+
+
+def test_what_is_kept_no_longer_is_named_with_the_next_that_is():
+    log = EventLog()
+    for k in range(KEPT + 5):
+        log.add(1, 6, bytes([k]), k)
+    (error,) = log.replies(3, 3, (255, 190))
+    assert (error.target_system, error.sequence, error.sequence_oldest_available) == (255, 3, 6)
+    found = list(log.replies(6, 8, (255, 190)))
+    assert [(m.get_type(), m.sequence) for m in found] == [("EVENT", 6), ("EVENT", 7), ("EVENT", 8)]
+    everything = list(log.replies(106, 105, (255, 190)))  # the whole round: an error for the part that cannot be there
+    assert len(everything) == KEPT + 1
+    assert everything[0].get_type() == "RESPONSE_EVENT_ERROR"
+
+
+def test_sequence_numbers_begin_again():
+    log = EventLog()
+    log.sequence = 65534
+    assert log.current().flags == 1
+    for k in range(3):
+        log.add(1, 6, b"", k)
+    assert log.current().flags == 0
+    assert [m.sequence for m in log.replies(65535, 1, (255, 190))] == [65535, 0, 1]
+
+
+def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
+    bench = Bench()
+    bench.vehicle.prearm = (
+        spoken.NO_READINGS.format("gps"),
+        f"{spoken.BATTERY_LOW}: 6%",
+        spoken.NOT_LEVEL,
+        "a reason of tomorrow",
+    )
+    one = reader(bench)
+    bench.step(2)
+    found = [(group, name) for group, name, _ in one.told]
+    assert found[0] == ("arming_check", "arming_check_summary")
+    assert found[-1] == ("health", "health_summary")
+    assert one.said("arming_check")[1:] == [
+        "No good readings of the gps",
+        "The battery is low",
+        "The vehicle does not stand level",
+        "The vehicle cannot be armed",
+    ]
+    messages = one.station.all("EVENT")
+    _, _, summary = one.values(messages[0])
+    assert summary[3][0] == 0  # can_arm
+    bench.vehicle.prearm = ()
+    bench.step(60)
+    _, event, summary = one.values(one.station.all("EVENT")[-2])
+    assert event["type"] == "summary"
+    assert summary[1][0] == 0
+    assert summary[3][0] == (1 << len(arming_checks.MODES)) - 1
+
+
+def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
+    bench = Bench()
+    one = reader(bench)
+    bench.step(100)
+    one.told.clear()
+    bench.step(300)
+    assert not one.told
+    two = bench.station(system=254)
+    two.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    bench.step(2)
+    assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
+    two.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    bench.step(100)
+    assert len(one.told) == 2
+
+
+def test_texts_that_events_tell_too_end_with_a_tab():
+    bench = Bench()
+    station = bench.station()
+    bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: descend"]
+    bench.step()
+    told = [m.text for m in station.all("STATUSTEXT")]
+    assert told == ["armed\t", "the position is lost: descend in 9 s", "the position is lost: descend\t"]
+
+
+def test_ground_stations_of_ardupilot_are_told_by_texts_alone():
+    bench = Bench("mavlink.flavour=ardupilot")
+    station = bench.station()
+    bench.vehicle.text = ["armed"]
+    bench.vehicle.armed = True
+    bench.step(200)
+    assert not station.all("EVENT")
+    assert not station.all("CURRENT_EVENT_SEQUENCE")
+    assert station.last("STATUSTEXT").text == "armed"
+    found = files(describe(load("scenes/hover.toml", ["mavlink.flavour=ardupilot"])))
+    assert EVENTS not in found
+    assert GENERAL in found
+
+
+def test_all_that_the_autopilot_knows_has_its_number():
+    assert {failsafe.reason for failsafe in FAILSAFES} == set(spoken.FAILSAFES)
+    assert set(MODES) <= set(flight.MODES)
+    assert set(NAMES) <= set(arming_checks.SOURCES)
+    entered = [mode for mode in arming_checks.MODES if not MODES[mode].needs_position]
+    assert set(entered) == set(arming_checks.WITHOUT_POSITION)
+
+
+def test_every_kind_that_can_be_told_of_a_flight_has_an_event():
+    not_of_the_link = {"restart", "warning", "phase", "slack"}  # of the run, the models, a scene's trajectory, a load
+    assert {d.kind for d in definitions().values()} == set(KINDS) - not_of_the_link
+
+
+def test_the_metadata_keeps_the_rules_of_libevents():
+    described = json.loads(files(describe(load("scenes/groundstation.toml")))[EVENTS])
+    assert described["version"] == 2
+    component = described["components"]["1"]
+    assert re.fullmatch("[a-z][a-z0-9_]*", component["namespace"])
+    names = [event["name"] for group in component["event_groups"].values() for event in group["events"].values()]
+    assert len(set(names)) == len(names) == len(definitions())
+    for name, enumeration in component["enums"].items():
+        assert re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*_t", name)
+        for entry in enumeration["entries"].values():
+            assert re.fullmatch("[a-z][a-z0-9_]*", entry["name"])
+            assert "\n" not in entry["description"]
+    for group, content in component["event_groups"].items():
+        assert group in ("default", "health", "arming_check")
+        for event in content["events"].values():
+            assert re.fullmatch(r"[^\n]{1,120}", event["message"])
+            types = [component["enums"].get(a["type"], {"type": a["type"]})["type"] for a in event.get("arguments", ())]
+            assert struct.calcsize("<" + "".join(NUMBERS[t] for t in types)) <= 40  # room in EVENT
+            if group != "default" and event.get("type") != "summary":
+                assert [a["name"] for a in event["arguments"]][1] == "health_component_index"
+                assert types[1] == "uint8_t"
+    groups = component["navigation_mode_groups"]["groups"]
+    assert {str(k) for k in range(len(arming_checks.MODES))} == set(groups)
