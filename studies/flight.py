@@ -239,16 +239,27 @@ class Flight:
         The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
         The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
         """
-        if not (self.has("setpoint") and self.has("actuators")):
+        if not self._tracked:
             return np.empty((0, len(AXES)))
-        setpoint, actuators = self.setpoint, self.actuators
-        n = min(len(self.truth), len(setpoint), len(actuators))
-        return np.column_stack([setpoint.position[:n], actuators.attitude_reference[:n, :2], setpoint.yaw[:n]])
+        position, roll_pitch, yaw = self._reference
+        return np.column_stack([position, roll_pitch, yaw])
+
+    @cached_property
+    def _tracked(self) -> int:
+        """The count of times of `reference`."""
+        if not (self.has("setpoint") and self.has("actuators")):
+            return 0
+        return min(len(self.truth), len(self.setpoint), len(self.actuators))
+
+    @property
+    def _reference(self) -> tracking.Reference:
+        n, setpoint = self._tracked, self.setpoint
+        return tracking.Reference(setpoint.position[:n], self.actuators.attitude_reference[:n, :2], setpoint.yaw[:n])
 
     @cached_property
     def armed(self) -> np.ndarray:
         """Whether the motors are armed, at the times of `reference`, shape (n,) of bool."""
-        n = len(self.reference)
+        n = self._tracked
         return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
 
     @cached_property
@@ -260,15 +271,20 @@ class Flight:
         found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
         return dict(zip(AXES, found.T, strict=True))
 
+    def tracking(self, of: TopicView) -> tracking.Tracking:
+        """What the errors of the pose that a topic tells come to; of a flight with a reference."""
+        n = self._tracked
+        return tracking.tracking(self._reference, of.position[:n], of.attitude[:n], self.armed)
+
     @cached_property
     def rmse(self) -> dict[str, float]:
         """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
-        return tracking.rmse(np.column_stack(list(self.errors.values()))) if self.errors else {}
+        return self.tracking(self.truth).rmse if self._tracked else {}
 
     @property
     def energy(self) -> float:
         """Electrical energy that the motors have taken [J]."""
-        return float(self.truth.motor_power.sum() * self.setup.interval)
+        return tracking.total(self.truth.motor_power) * self.setup.interval
 
     @cached_property
     def finished(self) -> bool:
