@@ -56,7 +56,7 @@ class VehicleView:
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()
-        self.stations = 0  # that have been met
+        self.reports_asked = 0  # of what hinders arming, by stations; one that is new asks, too
         latitude, longitude, height = description.home
         # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height

@@ -258,6 +258,16 @@ def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
     assert len(one.told) == 2
 
 
+def test_a_report_comes_to_whoever_asks_for_one():
+    bench = Bench()
+    one = reader(bench)
+    bench.step(100)
+    one.told.clear()
+    assert one.station.command(mavlink.MAV_CMD_RUN_PREARM_CHECKS) == mavlink.MAV_RESULT_ACCEPTED
+    bench.step(10)
+    assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
+
+
 def test_texts_that_events_tell_too_end_with_a_tab():
     bench = Bench()
     station = bench.station()
