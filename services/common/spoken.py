@@ -28,12 +28,7 @@ AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "nobody took
 """Why it was disarmed."""
 TAKEN_OVER = "{}: {}"  # why, and in which mode
 
-TOLD_BY_STATUS = frozenset(
-    (
-        ARMED,
-        LANDED,
-        *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)],
-        *[TAKEN_OVER.format(reason, mode) for reason in FAILSAFES for mode in ACTIONS],
-    )
-)
+ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
+"""Texts of what happens in every flight."""
+TOLD_BY_STATUS = ROUTINE | {TAKEN_OVER.format(reason, mode) for reason in FAILSAFES for mode in ACTIONS}
 """Texts that say no more than a change of the status does."""

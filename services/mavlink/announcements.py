@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from services.common.spoken import TOLD_BY_STATUS
+from services.common.spoken import ROUTINE, TOLD_BY_STATUS
 from services.mavlink.dialect import id_of, mavlink
 from services.mavlink.events import Definition, watches
 from services.mavlink.telemetry import streams
@@ -64,10 +64,12 @@ class Announcements:
 
         One that an event tells, too, ends with a tab, as PX4's do: ground stations that read events do not show it.
         """
-        if self._watches and text in TOLD_BY_STATUS:
-            text += "\t"
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
+        if text in ROUTINE:
+            severity = mavlink.MAV_SEVERITY_INFO
+        if self._watches and text in TOLD_BY_STATUS:
+            text += "\t"
         self._texts = self._texts % 0xFFFF + 1
         for message in statustext(severity, text, self._texts):
             self._broadcast(message)

@@ -274,6 +274,8 @@ def test_texts_that_events_tell_too_end_with_a_tab():
     bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: descend"]
     bench.step()
     told = [m.text for m in station.all("STATUSTEXT")]
+    severities = [m.severity for m in station.all("STATUSTEXT")]
+    assert severities == [mavlink.MAV_SEVERITY_INFO, mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_WARNING]
     assert told == ["armed\t", "the position is lost: descend in 9 s", "the position is lost: descend\t"]
 
 
