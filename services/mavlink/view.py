@@ -1,5 +1,6 @@
 """The newest state of the vehicle: every message that it publishes, decoded when somebody asks."""
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -61,6 +62,7 @@ class VehicleView:
         # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height
         self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
+        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # the items that it holds, as endpoints wrote them
         self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}
