@@ -271,12 +271,17 @@ def test_a_report_comes_to_whoever_asks_for_one():
 def test_texts_that_events_tell_too_end_with_a_tab():
     bench = Bench()
     station = bench.station()
-    bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: descend"]
+    bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: hold"]
+    bench.step()
+    bench.vehicle.status = {"failsafe": True, "text": "the position is lost"}
+    bench.vehicle.text = ["the position is lost: hold", "the position is lost: hold"]
     bench.step()
     told = [m.text for m in station.all("STATUSTEXT")]
     severities = [m.severity for m in station.all("STATUSTEXT")]
-    assert severities == [mavlink.MAV_SEVERITY_INFO, mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_WARNING]
-    assert told == ["armed\t", "the position is lost: descend in 9 s", "the position is lost: descend\t"]
+    information, warning, critical = (getattr(mavlink, f"MAV_SEVERITY_{s}") for s in ("INFO", "WARNING", "CRITICAL"))
+    assert severities == [information, warning, warning, critical, critical]
+    last = "the position is lost: hold"
+    assert told == ["armed\t", "the position is lost: descend in 9 s", last, f"{last}\t", last]  # once for one event
 
 
 def test_ground_stations_of_ardupilot_are_told_by_texts_alone():
