@@ -72,7 +72,7 @@ def launch(
                     give(name, endpoints, stream)
 
         listen, connect = mesh(WATCHER, endpoints)
-        with ZenohBus(listen, connect, mark=participants.mark(WATCHER)) as bus:
+        with ZenohBus(listen, connect, mark=participants.mark(WATCHER), awaits=False) as bus:
             try:
                 watch = Watch(bus, participants, [*names, *beside, *external])
                 bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it

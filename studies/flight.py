@@ -64,12 +64,13 @@ class Flight:
         self.others: tuple[Flight, ...] = ()
 
     @classmethod
-    def read(cls, path: str | Path, vehicle: str | None = None) -> Self:
+    def read(cls, path: str | Path, vehicle: str | None = None, only: Collection[Topic] | None = None) -> Self:
         """A recorded flight.
 
         Args:
             path: of the MCAP log.
             vehicle: its name; by default that of the first topic /NAME/truth.
+            only: the topics wanted, None for all.
 
         Raises:
             ValueError: no such file, no MCAP log, no flight in it, or a damaged message.
@@ -82,7 +83,7 @@ class Flight:
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
             others = {topic.key(name) for name in fleet for topic in IN_SPACE}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
-            return cls._of_log(log, str(path), log.histories(own), named, fleet)
+            return cls._of_log(log, str(path), log.histories(_wanted(own, only, fleet)), named, fleet)
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
@@ -100,8 +101,7 @@ class Flight:
             fleet = _vehicles(known, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
-            wanted = None if only is None else {topic.key(name) for topic in only for name in fleet}
-            histories = log.histories(name for name in known if wanted is None or name in wanted)
+            histories = log.histories(_wanted(known, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod
@@ -330,6 +330,14 @@ class Flight:
             raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
+    """Of the names in a log those of the topics that are wanted."""
+    if only is None:
+        return names
+    wanted = {topic.key(name) for topic in only for name in fleet}
+    return [name for name in names if name in wanted]
 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
