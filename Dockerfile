@@ -1,4 +1,4 @@
-# Lapwing's images: `runtime` (every service, the launcher, replay) and `tests`.
+# Lapwing's images: `runtime` (every service, the launcher, replay), `cluster` (campaigns on Dask) and `tests`.
 #
 #   make docker-build            also where no image can be pulled and no package index is reached from a container
 #   docker compose build         where both can
@@ -20,11 +20,14 @@ ARG PIP_INDEX_URL
 ARG PIP_EXTRA_INDEX_URL
 ARG PIP_TRUSTED_HOST
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
-COPY deploy/requirements.lock deploy/requirements-tests.lock deploy/slim.py deploy/install.sh build/wheel[s] /build/
+COPY deploy/requirements.lock deploy/requirements-cluster.lock deploy/requirements-tests.lock /build/
+COPY deploy/slim.py deploy/install.sh build/wheel[s] /build/
 RUN /build/install.sh
 
 
-FROM ${BASE} AS installed
+# What does not change with the sources comes first: each step after the first that has changed costs an older engine
+# seconds, whatever it does.
+FROM ${BASE} AS packages
 # Machine code for a fixed kind of processor, so that the kernels warmed here are found on every machine. Scalar code
 # is as fast as the host's own kind; the numbers are the same bits. On ARM: --build-arg NUMBA_CPU_NAME=generic.
 ARG NUMBA_CPU_NAME=x86-64-v3
@@ -38,44 +41,51 @@ ENV PATH=/opt/lapwing/bin:$PATH \
 RUN useradd --uid 1000 --home-dir /app --no-create-home --shell /usr/sbin/nologin lapwing
 COPY --from=dependencies /opt/lapwing /opt/lapwing
 WORKDIR /app
-COPY pyproject.toml README.md ./
-COPY cosim cosim
-COPY dynamics dynamics
-COPY lapwing lapwing
-COPY messages messages
-COPY services services
-COPY studies studies
-COPY scenes scenes
-COPY deploy/entrypoint.sh /opt/lapwing/bin/
-RUN pip --python /opt/lapwing/bin/python install --no-deps --no-build-isolation --no-index --no-cache-dir --editable . \
-    && rm -rf build && mkdir -p recordings && chmod 777 recordings
-
-
-FROM installed AS warmed
-# The first file is in every image: one that has no kernels is no error.
-COPY --from=previous /etc/debian_version /var/cache/lapwin[g] /var/cache/lapwing/
-COPY deploy/warm.py /build/
-RUN python /build/warm.py
-
-
-FROM installed AS runtime
-COPY --from=warmed /var/cache/lapwing /var/cache/lapwing
-USER lapwing
 ENTRYPOINT ["entrypoint.sh"]
 CMD ["lapwing", "--help"]
 
 
-FROM runtime AS tests
-USER root
+FROM packages AS built
+COPY deploy/entrypoint.sh deploy/built.sh deploy/warm.py /build/
+COPY pyproject.toml README.md ./
+COPY scenes scenes
+COPY messages messages
+COPY dynamics dynamics
+COPY cosim cosim
+COPY services services
+COPY studies studies
+COPY lapwing lapwing
+# The first file is in every image: one that has no kernels is no error.
+COPY --from=previous /etc/debian_version /var/cache/lapwin[g] /var/cache/lapwing/
+RUN /build/built.sh
+
+
+FROM packages AS runtime
+USER lapwing
+COPY --from=built /image/ /
+
+
+FROM packages AS cluster
+USER lapwing
+COPY --from=dependencies /opt/lapwing-cluster /opt/lapwing-cluster
+ENV PYTHONPATH=/opt/lapwing-cluster
+COPY --from=built /image/ /
+
+
+FROM packages AS test-packages
 COPY --from=dependencies /opt/lapwing-tests /opt/lapwing-tests
 ENV PYTHONPATH=/opt/lapwing-tests PYTHONDONTWRITEBYTECODE=1
+CMD ["python", "-m", "pytest", "-p", "no:cacheprovider"]
+USER lapwing
 COPY benchmarks benchmarks
 COPY deploy deploy
 COPY docs docs
-COPY tests tests
 COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose.yml ./
-USER lapwing
-CMD ["python", "-m", "pytest", "-p", "no:cacheprovider"]
+COPY tests tests
+
+
+FROM test-packages AS tests
+COPY --from=built /image/ /
 
 
 # What `docker build .` gives.

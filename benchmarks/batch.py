@@ -36,26 +36,29 @@ def best(run):
     return min(times)
 
 
+def rates(scene: str) -> tuple[float, float, float]:
+    """10^6 steps/s of a scene's plant: of a batch on all cores and on one, and of one vehicle after the other."""
+    batch = lapwing.Batch(scene, N)
+    batch.reset(position_world=(0.0, 0.0, 2000.0), rotor_speed=np.full(4, 330.0))
+    core, volts = batch._core, np.full((N, 4), 31.6)
+    given = (core.method, batch._like, batch._blocks.reshape(-1), batch._blocks.shape[1], batch._keys, batch._ticks)
+    together = best(lambda: batch._advance(volts, TICKS))
+    single = best(lambda: kernels.advance(*given, volts, core.step, core.steps, 0, N // kernels.WIDTH, TICKS))
+    state = resolve(load(scene)).services["plant"].parameters.start.vehicle
+    high = state.motion._replace(position_world=(0.0, 0.0, 2000.0), rotor_speed=(330.0,) * 4)
+    start = state._replace(motion=high)
+    alone = best(
+        lambda: one(core.method, core.vehicle, core.key, start, (31.6,) * 4, core.step, core.steps, 40 * TICKS)
+    )
+    steps = 1e-6 * core.steps * TICKS
+    return N * steps / together, N * steps / single, 40 * steps / alone
+
+
 def main() -> None:
     print(f"{'scene':20} {'batch, all cores':>18} {'batch, one core':>18} {'one by one':>14}   [10^6 steps/s]")
     for scene in sys.argv[1:] or ["hover", "delivery_mission"]:
-        batch = lapwing.Batch(scene, N)
-        batch.reset(position_world=(0.0, 0.0, 2000.0), rotor_speed=np.full(4, 330.0))
-        core, volts = batch._core, np.full((N, 4), 31.6)
-        given = (core.method, batch._like, batch._blocks.reshape(-1), batch._blocks.shape[1], batch._keys, batch._ticks)
-        together = best(lambda batch=batch, volts=volts: batch._advance(volts, TICKS))
-        single = best(
-            lambda given=given, volts=volts, core=core: kernels.advance(
-                *given, volts, core.step, core.steps, 0, N // kernels.WIDTH, TICKS
-            )
-        )
-        state = resolve(load(scene)).services["plant"].parameters.start.vehicle
-        high = state.motion._replace(position_world=(0.0, 0.0, 2000.0), rotor_speed=(330.0,) * 4)
-        start = state._replace(motion=high)
-        arguments = (core.method, core.vehicle, core.key, start, (31.6,) * 4, core.step, core.steps, 40 * TICKS)
-        alone = best(lambda arguments=arguments: one(*arguments))
-        steps = 1e-6 * core.steps * TICKS
-        print(f"{scene:20} {N * steps / together:18.1f} {N * steps / single:18.1f} {40 * steps / alone:14.1f}")
+        together, single, alone = rates(scene)
+        print(f"{scene:20} {together:18.1f} {single:18.1f} {alone:14.1f}")
 
 
 if __name__ == "__main__":

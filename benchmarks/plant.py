@@ -23,6 +23,7 @@ from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from dynamics.vehicles.newton_euler import angular_acceleration
 
 HERE = Path(__file__).parent
@@ -87,7 +88,7 @@ def bare_rate(drive, t, m):
     p, v = drive
     layout, speed = p.layout, m.rotor_speed
     gravity, rotor = p.effects
-    b, d = rotor.thrust_constant * multirotor.STANDARD_DENSITY, rotor.torque_constant * multirotor.STANDARD_DENSITY
+    b, d = rotor.thrust_constant * STANDARD_DENSITY, rotor.torque_constant * STANDARD_DENSITY
     s = (speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3])
     f = (b * s[0], b * s[1], b * s[2], b * s[3])
     q = (d * s[0], d * s[1], d * s[2], d * s[3])
@@ -132,7 +133,7 @@ def cpp_reference():
     if not shutil.which("g++"):
         return None
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
-    density, rotor = multirotor.STANDARD_DENSITY, p.effects[1]
+    density, rotor = STANDARD_DENSITY, p.effects[1]
     numbers = [
         p.body.mass, *p.body.inertia, *p.layout.x_body, *p.layout.y_body, *p.layout.reaction_sign,
         rotor.thrust_constant * density, rotor.torque_constant * density, p.effects[0].acceleration, p.layout.lag_rate,

@@ -2,7 +2,8 @@
 
 import signal
 import sys
-from typing import Any
+from contextlib import suppress
+from signal import SIGINT, SIGTERM
 
 AGAIN = 0.5  # [s] until an interruption that was lost in compiled code is raised once more
 
@@ -22,7 +23,7 @@ class Stop:
         self.number: int | None = None
 
     def __enter__(self) -> "Stop":
-        self._before = {n: signal.signal(n, self._note) for n in (signal.SIGINT, signal.SIGTERM)}
+        self._before = {n: signal.signal(n, self._note) for n in (SIGINT, SIGTERM)}
         return self
 
     def _note(self, number: int, _: object) -> None:
@@ -47,10 +48,22 @@ def end_at_once() -> None:
         signal.setitimer(signal.ITIMER_REAL, AGAIN)
         raise Interrupted(number)
 
-    def lost(fault: Any) -> None:
+    def lost(fault: "sys.UnraisableHookArgs") -> None:
         if not isinstance(fault.exc_value, Interrupted):
             sys.__unraisablehook__(fault)
 
     sys.unraisablehook = lost
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (SIGINT, SIGTERM):
         signal.signal(number, raise_)
+
+
+def say_end(interrupted: Interrupted) -> int:
+    """Tell of it in one line, and give the exit code. More signals do not disturb that; later ones end what hangs."""
+    for number in (SIGINT, SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    with suppress(OSError):  # the exit code tells it, too
+        print(f"lapwing: {interrupted}", file=sys.stderr, flush=True)
+    for number in (SIGINT, SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+    return 128 + interrupted.signal

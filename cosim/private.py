@@ -1,5 +1,6 @@
-"""Where the participants of a run on one machine meet: sockets in a folder that only their user can enter."""
+"""What is of the user alone: sockets where the participants of a run on one machine meet, files that are run."""
 
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -34,3 +35,13 @@ def remove(endpoint: str) -> None:
     """Remove the folder of a private endpoint, whose maker is gone; leaves any other endpoint alone."""
     if endpoint.startswith(SCHEME):
         shutil.rmtree(Path(endpoint.removeprefix(SCHEME)).parent, ignore_errors=True)
+
+
+def only_ours(path: Path) -> bool:
+    """Whether only this user, or root, can change a file, or what is in a folder.
+
+    Raises:
+        OSError: it is not there.
+    """
+    status = path.stat()
+    return status.st_uid in (0, os.geteuid()) and not status.st_mode & 0o022

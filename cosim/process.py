@@ -11,6 +11,7 @@ from cosim.bus import LEASE_MS, ZenohBus
 from cosim.errors import LockStepError
 from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
 from cosim.participants import Participants
+from cosim.private import remove
 from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
 from cosim.setup import Setup
@@ -26,6 +27,7 @@ ANSWER_TIMEOUT = 5.0  # [s] a participant gets to tell its set-up
 ASK_TIMEOUT = 1.0  # [s] one gets to tell what another has missed
 FAREWELL = 10.0  # [s] whoever watches gets to hear of the end
 BRIEF = 0.02  # [s]
+ORPHANED = 10.0  # [s] a process gets to its end whose launcher is gone
 FOUND_OUT = 3.0  # [s] for everybody to find a difference
 
 T = TypeVar("T")
@@ -99,13 +101,20 @@ class Process:
             self._refused = self.bus.refused
             self.say(REFUSED_KEY, str(self._refused))
 
-    def end_with_parent(self) -> None:
-        """Stop when the launcher, which holds the other end of standard input, is gone."""
+    def end_with_parent(self, endpoint: str) -> None:
+        """Stop when the launcher, which holds the other end of standard input, is gone.
+
+        A process that goes on, as one that compiles does, is ended after a while; the folder of its private `endpoint`
+        goes with it.
+        """
 
         def watch() -> None:
             while os.read(0, 1):
                 pass
             self.orphaned = self.stopping = True
+            time.sleep(ORPHANED)
+            remove(endpoint)
+            os._exit(1)
 
         threading.Thread(target=watch, daemon=True).start()
 

@@ -7,20 +7,24 @@ imported as usual: it has to be installed wherever the run is flown.
 """
 
 import ast
+import atexit
 import hashlib
 import importlib
 import importlib.util
 import os
+import shutil
 import sys
 import tempfile
 import traceback
 import uuid
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
+from cosim.private import only_ours
 from dynamics.errors import KeyedError
 from dynamics.kernel import cache_folder, forget_sources
 
@@ -140,18 +144,45 @@ def source(module: ModuleType) -> str | None:
 
 
 def _lay_down(texts: Mapping[str, str]) -> str:
-    """The folder with these modules as files; what is there already is left alone."""
+    """The folder with these modules as files: in the cache, or of this process where others could write to that."""
     digest = hashlib.blake2b("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode(), digest_size=16).hexdigest()
-    base = cache_folder() or Path(tempfile.gettempdir()) / f"lapwing-{os.getuid()}"
-    folder = base / "modules" / digest
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    for name, text in texts.items():
-        file = folder / f"{name}.py"
-        if not file.exists() or file.read_text(encoding="utf-8") != text:
-            temporary = folder / f"{name}.{uuid.uuid4().hex}"
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(file)
+    kept = cache_folder()
+    if kept is not None:
+        folder = kept / "modules" / digest
+        with suppress(OSError):
+            for path in (kept, folder.parent, folder):
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
+            if all(map(only_ours, (kept, folder.parent, folder))):
+                _write(folder, texts)
+                return str(folder)
+    folder = _folder_of_this_process() / digest
+    folder.mkdir(exist_ok=True)
+    _write(folder, texts)
     return str(folder)
+
+
+def _write(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write what is not there as it should be."""
+    for name, text in texts.items():
+        file, content = folder / f"{name}.py", text.encode()
+        if not file.exists() or not only_ours(file) or file.read_bytes() != content:
+            temporary = folder / f"{name}.{uuid.uuid4().hex}"
+            with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
+                out.write(content)
+            temporary.replace(file)
+
+
+@cache
+def _folder_of_this_process() -> Path:
+    """A new one, which goes with this process; its forks may use it, too."""
+    folder, maker = tempfile.mkdtemp(prefix="lapwing-"), os.getpid()
+
+    @atexit.register
+    def remove() -> None:
+        if os.getpid() == maker:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    return Path(folder)
 
 
 def blame(error: BaseException, module: ModuleType) -> str:

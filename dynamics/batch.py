@@ -22,8 +22,8 @@ from dynamics.effects._types import AnyMassProperties, PerRotor
 from dynamics.generate import define, each_index, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.rows import construction, leaves, to_row, width
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters, MultirotorState
+from dynamics.vehicles import multirotor_steps
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
 
 WIDTH = 16  # members in a block
 
@@ -95,7 +95,7 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
 
 @leaf
 def _parts(like, memory, at, h):
-    return multirotor.parts(take(like, memory, at).parameters.layout, h)
+    return multirotor_steps.parts(take(like, memory, at).parameters.layout, h)
 
 
 @leaf
@@ -107,7 +107,7 @@ def _command(commands, member, i):
 def _begin(like, memory, at, key, tick, commands, member, interval):
     m = take(like, memory, at)
     asked = each_index(_command, m.voltage, commands, member)
-    drive = multirotor.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), asked, interval)
+    drive = multirotor_steps.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), asked, interval)
     give((m.motion, drive.memory, drive.body, drive.voltage, tick * interval), memory, at)
 
 
@@ -117,7 +117,7 @@ def _all_asleep(like, memory, base, h):
     awake = 0
     for lane in range(WIDTH):
         m = take(like, memory, base + lane)
-        if not hooks.all_asleep(m.parameters.effects, m.memory, multirotor.seen(m.parameters.layout, m.motion), h):
+        if not hooks.all_asleep(m.parameters.effects, m.memory, seen(m.parameters.layout, m.motion), h):
             awake += 1
     return awake == 0
 
@@ -126,7 +126,7 @@ def _all_asleep(like, memory, base, h):
 def _airborne_step(method, like, memory, at, i, h):
     m = take(like, memory, at)
     drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-    give((multirotor.airborne_step(method, drive, m.start + i * h, m.motion, h),), memory, at)
+    give((multirotor_steps.airborne_step(method, drive, m.start + i * h, m.motion, h),), memory, at)
 
 
 @kernel
@@ -134,7 +134,7 @@ def _finish(method, like, memory, at, interval, h, first, n):
     """The rest of an exchange interval of one member, by itself."""
     m = take(like, memory, at)
     drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-    give(multirotor.steps(method, drive, m.motion, m.start, m.start + interval, h, first, n), memory, at)
+    give(multirotor_steps.steps(method, drive, m.motion, m.start, m.start + interval, h, first, n), memory, at)
 
 
 @intrinsic

@@ -8,6 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from dynamics.declared import comments, split
 from dynamics.errors import KeyedError
 
 BOUNDS = {Gt: ("gt", "above"), Ge: ("ge", "at least"), Lt: ("lt", "below"), Le: ("le", "at most")}
@@ -37,11 +38,25 @@ def fault(error: ValidationError, model: type) -> KeyedError:
         return KeyedError.unknown(key, "key", location[-1], keys(follow(model, location[:-1])))
     hint = follow(model, location)
     if kind in ("missing", "missing_argument"):
-        return KeyedError(key, "missing", describe(hint))
+        return KeyedError(key, "missing", describe(hint) + _unit(model, location))
     if kind == "value_error":
         cause = context["error"]
         return cause.under(key) if isinstance(cause, KeyedError) else KeyedError(key, str(cause))
-    return KeyedError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint))
+    unit = _unit(model, location) if kind in OF_NUMBERS else ""
+    return KeyedError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
+
+
+def _unit(model: type, location: Sequence[str | int]) -> str:
+    """ " [m/s]" where the class that declares the key at a location states its unit; "" where it does not."""
+    path = list(location)
+    while path and isinstance(path[-1], int):  # of a list the unit is that of all its numbers
+        path.pop()
+    if not path:
+        return ""
+    for table in _members(follow(model, path[:-1])):
+        if keys(table) and (unit := split(comments(table).get(str(path[-1]), ""))[0]):
+            return f" [{unit}]"
+    return ""
 
 
 def _expected(kind: str, message: str, context: dict[str, Any], hint: Any) -> str:
@@ -55,6 +70,8 @@ def _expected(kind: str, message: str, context: dict[str, Any], hint: Any) -> st
         return f"a text of the form {context['pattern']}"
     if kind in ("string_type", "bool_type"):
         return NAMES[str if kind == "string_type" else bool]
+    if keys(hint):
+        return f"a table of {', '.join(keys(hint))}"
     return message.removeprefix("Input should be ").removeprefix("a valid ")
 
 

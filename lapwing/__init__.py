@@ -11,9 +11,7 @@ flight.rmse, flight.truth.position, flight.report("flight.html")
 What is named here is the public interface; everything is imported when it is first asked for.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # what type checkers take for true: nothing is imported before `lapwing` answers Ctrl-C
 if TYPE_CHECKING:
     from cosim.errors import LockStepError
     from cosim.scene import Scene, SceneError
@@ -73,8 +71,10 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """The public names, imported when they are first asked for: `lapwing --help` needs none of them."""
+    import importlib
+
     if name not in _WHERE:
         raise AttributeError(f"module 'lapwing' has no attribute {name!r}")
     return getattr(importlib.import_module(_WHERE[name]), name)

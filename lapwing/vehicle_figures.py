@@ -21,9 +21,12 @@ class Figure(NamedTuple):
     least: float = 0.0
     most: float = math.inf
     zero: bool = False  # whether the least itself will do
+    far: float = 8.0  # factor from the guess beyond which the unit may be another one: rpm are 9.5 times as many
 
     def check(self, value: float) -> None:
         """KeyedError for a value that cannot be."""
+        if self.unit == "count" and not float(value).is_integer():
+            raise KeyedError(self.name, f"got {value:g}", "a whole number")
         if self.name == "rotors" and value not in ROTORS:
             raise KeyedError(self.name, f"got {value:g}", "4, 6 or 8; write others into the file by hand")
         if not (self.least < value or (self.zero and value == self.least)) or not value < self.most:
@@ -31,9 +34,15 @@ class Figure(NamedTuple):
             high = f" and below {self.most:g}" if self.most < math.inf else ""
             raise KeyedError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
 
+    def doubt(self, value: float, guess: float) -> str:
+        """What to ask of a value that is far from its guess; "" of one that is not."""
+        if not (value > 0.0 and guess > 0.0) or 1.0 / self.far <= value / guess <= self.far:
+            return ""
+        return f"{self.name} = {value:g} {self.unit}, where about {guess:.2g} is usual: is that the unit?"
+
 
 FIGURES = (
-    Figure("mass", "kg", lambda v: 2.0, "All of it, with battery and payload, on scales.", most=1e4),
+    Figure("mass", "kg", lambda v: 2.0, "All of it, with battery and payload, on scales.", most=1e4, far=100.0),
     Figure("payload", "kg", lambda v: 0.0, "The part of the mass that is let go in flight.", zero=True),
     Figure("rotors", "count", lambda v: 4.0, "4, 6 or 8, on a circle, with two of them side by side in front."),
     Figure("arm", "m", lambda v: 0.16 * v["mass"] ** 0.5, "From the centre of mass to a hub, with a ruler.", most=1e2),

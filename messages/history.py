@@ -10,6 +10,8 @@ from messages.records import number_fields, record_dtype, unknown_field
 
 Column = np.ndarray | list[Any]
 
+PAGE = 4096  # messages
+
 
 class _Group(NamedTuple):
     """The messages of one shape."""
@@ -105,6 +107,37 @@ def history(message: Any, payloads: Sequence[bytes]) -> History:
         ValueError: a payload is not a message of the class.
     """
     return History(message, list(_groups(message, payloads)))
+
+
+class Gathered:
+    """Messages of one type as they come, put together page by page: so that no more than a page is there twice."""
+
+    def __init__(self, message: Any) -> None:
+        self._message, self._groups = message, list[_Group]()
+        self._times: list[np.ndarray] = []
+        self._waiting: list[tuple[int, bytes]] = []
+        self._count = 0
+
+    def add(self, time_ns: int, payload: bytes) -> None:
+        """One more, as CDR; ValueError if a message of its page is none of the class."""
+        self._waiting.append((time_ns, payload))
+        if len(self._waiting) == PAGE:
+            self._put_together()
+
+    def history(self) -> tuple[np.ndarray, History]:
+        """Times [ns], int64, shape (n,), and columns of all that have come, as of `history`."""
+        if self._waiting or not self._groups:
+            self._put_together()
+        return np.concatenate(self._times), History(self._message, self._groups)
+
+    def _put_together(self) -> None:
+        times, payloads = zip(*self._waiting, strict=True) if self._waiting else ((), ())
+        self._times.append(np.array(times, np.int64))
+        self._groups += [
+            group._replace(places=group.places + self._count) for group in _groups(self._message, payloads)
+        ]
+        self._count += len(times)
+        self._waiting.clear()
 
 
 def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> History:

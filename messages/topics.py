@@ -10,6 +10,7 @@ from messages.types import (
     BodyStates,
     Clock,
     CommandAcks,
+    ContactForces,
     Estimate,
     FluidPressure,
     Imu,
@@ -58,6 +59,7 @@ WALL_TIME = Topic("wall_time", WallTime, rate="rates.status", deterministic=Fals
 
 TRUTH = Topic("{vehicle}/truth", VehicleState)
 BODIES = Topic("{vehicle}/bodies", BodyStates, rate="rates.bodies")
+CONTACT = Topic("{vehicle}/contact", ContactForces, rate="rates.contact")
 POSE = Topic("{vehicle}/pose", PoseStamped, rate="rates.pose")
 ODOM = Topic("{vehicle}/odom", Odometry, rate="rates.pose")
 IMU = Topic("{vehicle}/imu", Imu, rate="sensors.imu.rate")

@@ -113,7 +113,7 @@ def take_part(given: Participation) -> None:
         journal = Journal(given.name, given.journal) if given.journal >= 0 else None
         process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
         if given.with_parent:
-            process.end_with_parent()
+            process.end_with_parent(given.peers[given.name])
         elif watched:
             process.end_with(WATCHER)
         try:

@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -64,11 +64,11 @@ def _append(
     marked = {DETERMINISTIC: "false"}
     channel = Channel(id=channel_id, topic=topic, message_encoding="cdr", metadata=marked, schema_id=schema_id)
     written = WrittenTopic(topic, channel_id, False)
-    container = Container.resume(file, summary, start)
+    chunk = arrange(rows_of([(written, time_ns, payload) for time_ns, payload in messages]))
     try:
-        chunk = arrange(rows_of([(written, time_ns, payload) for time_ns, payload in messages]))
-        container.add_chunk([schema, channel] if new else [channel], chunk)
-        container.finish()
+        with closing(Container.resume(file, summary, start)) as container:
+            container.add_chunk([schema, channel] if new else [channel], chunk)
+            container.finish()
     except OSError:
         with suppress(OSError):
             file.seek(start)

@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Sequence
 from contextlib import suppress
 from io import FileIO
+from pathlib import Path
 from typing import NamedTuple, Self
 
 import zstandard
@@ -30,6 +31,7 @@ from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
 from cosim.log.chunk import Messages
+from cosim.log.chunk_indexes import ChunkIndexes, Extent
 
 METADATA = "lapwing"  # name of the metadata record at the start
 METADATA_END = "lapwing_end"  # and of that at the end, with what was not known before: no key is in both
@@ -45,12 +47,12 @@ class _State(NamedTuple):
     offset: int  # [bytes]
     schemas: int
     channels: int
-    chunks: int
+    chunks: Extent
     counts: dict[int, int]
 
 
 class Container:
-    """Writes a file's records in order and remembers where they are. All methods may raise OSError."""
+    """Writes a file's records in order and remembers where they are, until `close`. All methods may raise OSError."""
 
     def __init__(self, file: FileIO) -> None:
         """Begin a file that is open for writing, without a buffer, and empty."""
@@ -65,8 +67,9 @@ class Container:
         self._begin(file)
         self._offset = offset
         self._schemas, self._channels = list(summary.schemas.values()), list(summary.channels.values())
-        self._chunks, self._attachments = summary.chunk_indexes, summary.attachment_indexes
-        self._metadata = summary.metadata_indexes
+        for index in summary.chunk_indexes:
+            self._chunks.add(encoded(index), index.message_start_time, index.message_end_time)
+        self._attachments, self._metadata = summary.attachment_indexes, summary.metadata_indexes
         self._counts = dict(summary.statistics.channel_message_counts) if summary.statistics else {}
         file.seek(offset)
         return self
@@ -77,7 +80,7 @@ class Container:
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks = ChunkIndexes(Path(file.name).parent)
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
@@ -111,7 +114,7 @@ class Container:
     def add_tail(self, declarations: list[Schema | Channel], messages: Messages) -> None:
         """Write a chunk that the next record takes the place of: what a reader finds if that never comes."""
         self._drop_tail()
-        before = _State(self._offset, len(self._schemas), len(self._channels), len(self._chunks), self._counts.copy())
+        before = _State(self._offset, len(self._schemas), len(self._channels), self._chunks.extent, self._counts.copy())
         self.add_chunk(declarations, messages)
         self._before_tail = before
 
@@ -135,30 +138,37 @@ class Container:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        record = encoded(chunk)
-        offset, length = self._offset, len(record)
+        records = [encoded(chunk)]
+        offset = end = self._offset
+        length = len(records[0])
         places: dict[int, int] = {}
-        for index in messages.indexes:
-            places[index.channel_id] = offset + len(record)
-            record += index.record(len(head))
-        self._write(record)
+        for each in messages.indexes:
+            end += len(records[-1])
+            places[each.channel_id] = end
+            records.append(each.record(len(head)))
+        record = b"".join(records)
+        index = ChunkIndex(
+            chunk_start_offset=offset,
+            chunk_length=length,
+            compression=chunk.compression,
+            compressed_size=len(stored),
+            uncompressed_size=len(data),
+            message_start_time=messages.start_ns,
+            message_end_time=messages.end_ns,
+            message_index_offsets=places,
+            message_index_length=len(record) - length,
+        )
+        before = self._chunks.extent
+        self._chunks.add(encoded(index), messages.start_ns, messages.end_ns)
+        try:
+            self._write(record)
+        except OSError:
+            self._chunks.extent = before
+            raise
         self._schemas += [each for each in declarations if isinstance(each, Schema)]
         self._channels += [each for each in declarations if isinstance(each, Channel)]
-        for index in messages.indexes:
-            self._counts[index.channel_id] = self._counts.get(index.channel_id, 0) + len(index.times_ns)
-        self._chunks.append(
-            ChunkIndex(
-                chunk_start_offset=offset,
-                chunk_length=length,
-                compression=chunk.compression,
-                compressed_size=len(stored),
-                uncompressed_size=len(data),
-                message_start_time=messages.start_ns,
-                message_end_time=messages.end_ns,
-                message_index_offsets=places,
-                message_index_length=self._offset - offset - length,
-            )
-        )
+        for each in messages.indexes:
+            self._counts[each.channel_id] = self._counts.get(each.channel_id, 0) + len(each.times_ns)
         self._cut()
 
     def finish(self) -> None:
@@ -166,18 +176,17 @@ class Container:
         self._drop_tail()
         self._write(encoded(DataEnd(data_section_crc=0)))
         start = self._offset
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
+        groups = [
+            (Opcode.SCHEMA, _joined(self._schemas)),
+            (Opcode.CHANNEL, _joined(self._channels)),
+            (Opcode.STATISTICS, encoded(self._statistics())),
+            (Opcode.CHUNK_INDEX, self._chunks.records()),
+            (Opcode.ATTACHMENT_INDEX, _joined(self._attachments)),
+            (Opcode.METADATA_INDEX, _joined(self._metadata)),
         ]
         summary = b""
         offsets = b""
-        for opcode, group in groups:
-            data = b"".join(map(encoded, group))
+        for opcode, data in groups:
             offsets += encoded(
                 SummaryOffset(group_length=len(data), group_opcode=opcode, group_start=start + len(summary))
             )
@@ -188,15 +197,20 @@ class Container:
         self._write(summary + encoded(footer) + MCAP0_MAGIC)
         self._cut()
 
+    def close(self) -> None:
+        """Forget where the records are."""
+        self._chunks.close()
+
     def _statistics(self) -> Statistics:
+        extent = self._chunks.extent
         return Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
+            chunk_count=extent.chunks,
             message_count=sum(self._counts.values()),
-            message_start_time=min((chunk.message_start_time for chunk in self._chunks), default=0),
-            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
+            message_start_time=extent.start_ns or 0,
+            message_end_time=extent.end_ns,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
@@ -209,7 +223,8 @@ class Container:
         self._length = max(self._length, self._offset)
         self._file.seek(state.offset)
         self._offset, self._counts = state.offset, state.counts
-        del self._schemas[state.schemas :], self._channels[state.channels :], self._chunks[state.chunks :]
+        self._chunks.extent = state.chunks
+        del self._schemas[state.schemas :], self._channels[state.channels :]
 
     def _cut(self) -> None:
         """Take away what is left of a tail behind the newest record."""
@@ -229,6 +244,10 @@ class Container:
                 self._file.truncate()
             raise
         self._offset += len(data)
+
+
+def _joined(records: Sequence[McapRecord]) -> bytes:
+    return b"".join(map(encoded, records))
 
 
 def encoded(record: McapRecord) -> bytes:

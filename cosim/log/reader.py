@@ -14,7 +14,7 @@ from cosim.provenance import package_version
 from messages import message_class
 from messages.definitions import otherwise
 from messages.digest import Digest
-from messages.history import History, history
+from messages.history import Gathered, History
 
 _FOREVER = 1 << 64
 _time, _place = itemgetter(0), itemgetter(0, 1)
@@ -141,14 +141,10 @@ class LogReader:
         labels = self._labels(topics)
         self.check_versions(topics)
         classes = {topic: message_class(type_name) for topic, type_name in labels.values()}
-        times: dict[str, list[int]] = {topic: [] for topic in classes}
-        payloads: dict[str, list[bytes]] = {topic: [] for topic in classes}
+        gathered = {topic: Gathered(message) for topic, message in classes.items()}
         for topic, _, time_ns, payload in self.messages(list(classes)):
-            times[topic].append(time_ns)
-            payloads[topic].append(payload)
-        return {
-            topic: (np.array(times[topic], np.int64), history(classes[topic], payloads[topic])) for topic in classes
-        }
+            gathered[topic].add(time_ns, payload)
+        return {topic: messages.history() for topic, messages in gathered.items()}
 
     def deterministic_topics(self) -> set[str]:
         """The topics that enter the digest."""

@@ -143,6 +143,7 @@ class LogWriter:
                     raise self._error(fault) from None
             finally:
                 self._worker.shutdown()
+                self._container.close()
                 self._file.close()
 
     def __enter__(self) -> Self:

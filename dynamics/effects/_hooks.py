@@ -30,11 +30,12 @@ and between evaluations:
     settle    (e, memory, motion, h) -> memory         after every step, when awake
     event     (e, before, after) -> bool               of two memories: did forces jump in the step between them?
     contact   (e, memory, s) -> bool                   does the vehicle touch the ground?
+    contact_forces   (e, memory, motion) -> ((place [m], force [N]) of every point that may touch it), world
     wind      (e, memory, wind) -> wind                [m/s] world: for the log, of an effect that blows without moving
                                                        the air that others feel
 
 While all effects that can sleep are asleep, steps are taken without them, at no cost but the question. While one that
-is stiff is awake, steps are taken under error control, their memory included (`dynamics.vehicles.multirotor`).
+is stiff is awake, steps are taken under error control, their memory included (`dynamics.vehicles.multirotor_steps`).
 
 The memory of an effect is a tuple of floats that its parameter class gives with `initial_memory()`; () without it.
 """
@@ -81,6 +82,7 @@ sample = _hook("sample")
 settle = _hook("settle")
 substeps = _hook("substeps")
 contact = _hook("contact")
+contact_forces = _hook("contact_forces")
 event = _hook("event")
 asleep = _hook("asleep")
 wind = _hook("wind")
@@ -223,6 +225,15 @@ all_contacts = _written_out(
     "touching",
     default="False",
     more="touching = touching or f{i}(effects[{i}], memory[{i}], s)",
+)
+all_contact_forces = _written_out(
+    "all_contact_forces",
+    "contact_forces",
+    "motion",
+    "forces = f{i}(effects[{i}], memory[{i}], motion)",
+    "forces",
+    default="()",
+    more="forces = forces + f{i}(effects[{i}], memory[{i}], motion)",
 )
 all_asleep = _written_out(
     "all_asleep",

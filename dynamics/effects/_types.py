@@ -119,6 +119,16 @@ class Loads(NamedTuple):
     torque: PerRotor  # [N m] against its rotation
 
 
+class WakeSlopes(NamedTuple):
+    """How the loads of rotors hang together of which some stand in the wake of others; empty where none does.
+
+    Row by row over the thrust that each rotor would have by itself, about one speed of all (theory.md, eq. (2.45)).
+    """
+
+    thrust: tuple[PerRotor, ...] = ()  # of each rotor
+    torque: tuple[PerRotor, ...] = ()  # [m] what each rotor's torque gains
+
+
 class Rotors(NamedTuple):
     """All that is known of the rotors once the motors have been evaluated."""
 
@@ -137,6 +147,6 @@ class Situation(NamedTuple):
     motion: Motion
     R_world_body: Mat3
     body: Any  # AnyMassProperties
-    layout: Any  # RotorLayout, see dynamics/vehicles/multirotor.py
+    layout: Any  # RotorLayout, see dynamics/vehicles/multirotor_equations.py
     air: Air
     air_rate_body: Vec3  # [rad/s] at which the air turns, body coordinates

@@ -9,9 +9,9 @@ import numpy as np
 from dynamics.effects._axes import hub_speeds
 from dynamics.effects._hooks import loads
 from dynamics.effects._scene import cannot, checked
-from dynamics.effects._types import Loads, PerRotor
+from dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from dynamics.generate import each
-from dynamics.kernel import leaf
+from dynamics.kernel import leaf, uncompiled
 from dynamics.vector import pair
 from dynamics.vehicles import inflow
 from dynamics.vehicles.propeller import thrust_coefficient
@@ -38,7 +38,7 @@ class CoaxialWash(NamedTuple):
     Valid near hover; the wake of a vehicle that moves is carried away. The upper rotor is taken for one alone.
     """
 
-    static: float  # [m^4/rad^2] thrust constant
+    thrust_constant: float  # [m^4/rad^2]
     pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
     radius: float  # [m]
@@ -51,16 +51,47 @@ class CoaxialWash(NamedTuple):
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        uppers = _uppers(airframe, radius)
+        if all(number < 0 for number, _ in uppers):
+            most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
+            cannot(f"no rotor stands under another one (by at most {most})")
         static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         if flow >= pitch:
             cannot(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
-        uppers = [_upper(airframe, k, radius) for k in range(len(airframe.rotors.position))]
-        if all(number < 0 for number, _ in uppers):
-            most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
-            cannot(f"no rotor stands under another one (by at most {most})")
         above = tuple(tuple(float(number == j) for j in range(len(uppers))) for number, _ in uppers)
         return cls(static, pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers))
+
+    def changes(self, speed: float, axial: float = 0.0, across: float = 0.0) -> list[tuple[float, float]]:
+        """(thrust [N], torque [N m]) that each rotor gains at a density of 1, all at one speed in the same air.
+
+        Args:
+            speed: of the rotors [rad/s].
+            axial: speed of the hubs through the air along their axes [m/s].
+            across: the same across them.
+        """
+        change, wash = uncompiled(_change), self.flow * speed
+        washes = [wash * any(above) for above in self.above]
+        return [
+            change(self, (speed, w), ((axial, across), distance))
+            for w, distance in zip(washes, self.distance, strict=True)
+        ]
+
+    def slopes(self) -> WakeSlopes:
+        """Of thrusts and torques, all rotors at one speed at rest in the air (theory.md, eq. (2.45))."""
+        q, count = self.pitch, len(self.above)
+        t = uncompiled(inflow.thrust_in_wake)(q, 1.0)
+        through = q - (q - 1.0) * t
+        steep = through * (through - 2.0 * (q - 1.0) * t) - (q - 1.0) - 2.0 * (t + 1.0)
+        slope = (4.0 * (t + 1.0) - 3.0 * through) / steep  # of t over the speed of the wake
+        power, more = t * through - 1.0, slope * (through - (q - 1.0) * t)
+        thrust, torque = np.eye(count), np.zeros((count, count))
+        for lower, above in enumerate(self.above):
+            if any(above):
+                upper = above.index(1.0)
+                thrust[lower, lower], thrust[lower, upper] = t - 0.5 * slope, 0.5 * slope
+                torque[lower, lower], torque[lower, upper] = self.flow * (power - 0.5 * more), 0.5 * self.flow * more
+        return WakeSlopes(tuple(map(tuple, thrust.tolist())), tuple(map(tuple, torque.tolist())))
 
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
@@ -70,6 +101,16 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     for name in NOT_BESIDE:
         if name in tables:
             cannot(f"is not made to stand beside effects.{name}: keep one of them")
+
+
+def stacked(airframe: "Airframe") -> bool:
+    """Whether a rotor stands in the wake of another one."""
+    propeller = airframe.propeller
+    return propeller is not None and any(number >= 0 for number, _ in _uppers(airframe, 0.5 * propeller.diameter))
+
+
+def _uppers(airframe: "Airframe", radius: float) -> list[tuple[int, float]]:
+    return [_upper(airframe, k, radius) for k in range(len(airframe.rotors.position))]
 
 
 def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
@@ -113,7 +154,7 @@ def _change(e, both, place):
     share = min(max((1.0 + CONTRACTED - drift) / (2.0 * CONTRACTED), 0.0), 1.0)
     thrust = inflow.thrust_in_wake(e.pitch, share * wash / (e.flow * speed))
     through = e.pitch - thrust * (e.pitch - 1.0)
-    static = e.static * speed * speed
+    static = e.thrust_constant * speed * speed
     return static * (thrust - 1.0), static * e.flow * (thrust * through - 1.0)
 
 

@@ -14,7 +14,7 @@ from dynamics.effects._contact_parameters import (
     GroundContactSmooth,
 )
 from dynamics.effects._feet import above, foot_on, stance_of
-from dynamics.effects._hooks import asleep, contact, event, settle, substeps, wrench
+from dynamics.effects._hooks import asleep, contact, contact_forces, event, settle, substeps, wrench
 from dynamics.generate import any_of, each, implements
 from dynamics.kernel import kernel, leaf
 from dynamics.lie.quaternion import rotation_matrix
@@ -112,6 +112,25 @@ def ground_contact(e, memory, s, rotors):
 def ground_contact_smooth(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
     return _feet_wrench(e, memory, s.motion, s.R_world_body)
+
+
+@leaf
+def _on_point(c, foot_body, memory):
+    e, stance = c
+    place = add(stance.position_world, apply(stance.R_world_body, foot_body))
+    return place, _push(e, stance, foot_body, memory)[0]
+
+
+@contact_forces(GroundContact)
+def forces(e, memory, motion):
+    """((place [m], force [N]) of every foot and point of the hull), world."""
+    return each(_on_point, (e, stance_of(e, motion, rotation_matrix(motion.attitude))), e.feet, memory)
+
+
+@contact_forces(GroundContactSmooth)
+def forces_smooth(e, memory, motion):
+    """((place [m], force [N]) of every foot and point of the hull), world."""
+    return each(_on_point, (e, stance_of(e, motion, rotation_matrix(motion.attitude))), e.feet, memory)
 
 
 @asleep(GroundContact)

@@ -17,8 +17,9 @@ from dynamics.multibody.five_bodies import BodyState, FiveBodies
 from dynamics.multibody.mechanisms import drone_system
 from dynamics.multibody.system import Arrays
 from dynamics.vector import ZERO, Vec3, apply
-from dynamics.vehicles import multirotor_multibody as on_se3
-from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState
+from dynamics.vehicles import multirotor_multibody
+from dynamics.vehicles import multirotor_multibody_equations as on_se3
+from dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState
 
 NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
 
@@ -178,7 +179,7 @@ def rate(drive, t, x):
 
 @apart
 def struck(drive, x):
-    """As `multirotor_multibody.struck`."""
+    """As `multirotor_multibody_equations.struck`."""
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
     a = _system(drive.parameters.layout.bodies.arrays, p)
     q, v = _arrays(x)
@@ -221,12 +222,12 @@ def singular(x: FiveEulerBodies) -> int:
 
 def parameters(*given, **named) -> MultirotorParameters:
     """As `multirotor_multibody.parameters`."""
-    return _assembled(on_se3.parameters(*given, **named))
+    return _assembled(multirotor_multibody.parameters(*given, **named))
 
 
 def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
     """As `multirotor_multibody.after`."""
-    return _assembled(on_se3.after(p, k, becomes))
+    return _assembled(multirotor_multibody.after(p, k, becomes))
 
 
 def _assembled(p: MultirotorParameters) -> MultirotorParameters:
@@ -240,5 +241,5 @@ def _assembled(p: MultirotorParameters) -> MultirotorParameters:
 
 def initial_state(*given, **named) -> MultirotorState:
     """As `multirotor_multibody.initial_state`."""
-    state = on_se3.initial_state(*given, **named)
+    state = multirotor_multibody.initial_state(*given, **named)
     return state._replace(motion=of_five(state.motion))

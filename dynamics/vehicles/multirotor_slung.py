@@ -15,7 +15,7 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate, rotation_ma
 from dynamics.terrain import surface
 from dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
+from dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
 from dynamics.vehicles.newton_euler import newton_euler
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic

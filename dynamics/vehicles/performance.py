@@ -2,7 +2,8 @@
 
 Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)) and the thrust of
 equal rotors in the air that comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque
-(theory.md, section 1.4). Of rotors that are tilted the sum of their thrusts counts, and the mean air along their axes.
+(theory.md, section 1.4). Of rotors that are tilted the sum of their thrusts counts, and the mean air along their axes;
+of rotors over one another what the lower ones lose (eq. (2.44)), all of them at one speed.
 """
 
 import math
@@ -12,8 +13,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 from dynamics import atmosphere
 from dynamics.atmosphere import Atmosphere
+from dynamics.effects.coaxial_wash import CoaxialWash, stacked
 from dynamics.environment import STANDARD
 from dynamics.vehicles.airframe import Airframe
+from dynamics.vehicles.airframe_tables import Motor
 from dynamics.vehicles.propeller import drag_coefficients, h_force_coefficient, thrust_coefficient, torque_coefficient
 
 GRAVITY = 9.80665  # [m/s^2]
@@ -26,11 +29,18 @@ class Trim(NamedTuple):
     """Steady level flight."""
 
     tilt: float  # [rad] from the vertical
-    thrust: float  # [N] of one rotor
+    thrust: float  # [N] of a rotor that stands in nobody's wake
     rotor_speed: float  # [rad/s]
-    voltage: float  # [V] of one motor
-    current: float  # [A] of one motor
+    voltage: float  # [V] of the motor that turns hardest
+    current: float  # [A] of the same
     power: float  # [W] of all motors
+
+
+class Gain(NamedTuple):
+    """By which the loads of a rotor differ from those of one by itself at the same speed."""
+
+    thrust: float  # [N]
+    torque: float  # [N m]
 
 
 class Rotor(NamedTuple):
@@ -42,18 +52,24 @@ class Rotor(NamedTuple):
     pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
     parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
     drag: float = 0.0  # [m^3/rad] across the axis, over density, rotor speed and velocity
+    wash: CoaxialWash | None = None  # what those lose that stand in the wake of others
 
     def constants(self, density: float) -> tuple[float, float]:
         """Thrust and torque over the square of the speed at a density [kg/m^3]."""
         factor = density if self.with_density else 1.0
         return factor * self.thrust, factor * self.torque
 
+    def gains(self, count: int, density: float, speed: float, axial: float = 0.0, across: float = 0.0) -> list[Gain]:
+        """What each of `count` rotors gains in the wake of another one; arguments as of `CoaxialWash.changes`."""
+        changes = self.wash.changes(speed, axial, across) if self.wash else [(0.0, 0.0)] * count
+        return [Gain(density * thrust, density * torque) for thrust, torque in changes]
+
 
 def rotor_of(airframe: Airframe) -> Rotor:
     """The rotor that the airframe's propeller makes.
 
     Raises:
-        ValueError: it has none.
+        ValueError: it has none, or one that cannot stand in the wake of another as the vehicle's do.
     """
     propeller, square = airframe.propeller, (2.0 * math.pi) ** 2
     if propeller is None:
@@ -64,6 +80,7 @@ def rotor_of(airframe: Airframe) -> Rotor:
         pitch=propeller.pitch,
         parts=drag_coefficients(propeller),
         drag=h_force_coefficient(propeller),
+        wash=CoaxialWash.from_scene({}, airframe) if stacked(airframe) else None,
     )
 
 
@@ -104,29 +121,38 @@ def trim(
             return across * c * c + pressure * below * s * s, weight + (pressure * below - across) * s * c
 
         tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
-        thrust = math.hypot(*forces(tilt)) / lift
-        w = 2.0 * math.pi * speed * math.sin(tilt) * (lift / count) / rotor.pitch
+        axial = speed * math.sin(tilt) * (lift / count)
+        gains = rotor.gains(count, density, omega, axial, speed * math.cos(tilt))
+        thrust = math.hypot(*forces(tilt)) / lift - sum(gain.thrust for gain in gains) / count
+        w = 2.0 * math.pi * axial / rotor.pitch
         omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
         if abs(omega - before) < 1e-12 * omega:
             break
     profile, induced = rotor.parts
     torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
     motor = airframe.motor
+    electrics = [_electrics(motor, omega, torque + gain.torque) for gain in gains]
+    power = sum(voltage * current for voltage, current in electrics) / motor.esc_efficiency
+    return Trim(tilt, thrust, omega, *max(electrics), power)
+
+
+def _electrics(motor: Motor, speed: float, torque: float) -> tuple[float, float]:
+    """(voltage [V], current [A]) of a motor that turns its rotor at a speed [rad/s] against a torque [N m]."""
     current = torque / (motor.belt_efficiency * motor.rotor_constant) + motor.no_load_current
-    voltage = motor.rotor_constant * omega + (motor.resistance + motor.esc_resistance) * current
-    return Trim(tilt, thrust, omega, voltage, current, count * voltage * current / motor.esc_efficiency)
+    return motor.rotor_constant * speed + (motor.resistance + motor.esc_resistance) * current, current
 
 
 def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Of all rotors at rest in the air [N], at the highest voltage, current or power, whichever comes first."""
-    k_thrust, k_torque = (rotor or rotor_of(airframe)).constants(density)
-    motor = airframe.motor
-    constant, resistance = motor.rotor_constant, motor.resistance + motor.esc_resistance
+    """Of all rotors at rest in the air [N], at the highest voltage, current or power of any, whichever comes first."""
+    rotor, motor, count = rotor or rotor_of(airframe), airframe.motor, len(airframe.rotors.position)
+    gains = rotor.gains(count, density, 1.0)  # in proportion to the square of the speed
+    k_thrust, k_torque = rotor.constants(density)
+    k_thrust += sum(gain.thrust for gain in gains) / count
+    k_torque += max(gain.torque for gain in gains)
 
     def excess(omega: float) -> float:
         """The largest of what voltage, current and power are above their limits, in parts of these."""
-        current = k_torque * omega**2 / (motor.belt_efficiency * constant) + motor.no_load_current
-        voltage = constant * omega + resistance * current
+        voltage, current = _electrics(motor, omega, k_torque * omega**2)
         used = (
             voltage / motor.max_voltage,
             current / airframe.motor_current_limit,
@@ -134,7 +160,7 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
         )
         return max(used) - 1.0
 
-    highest = brentq(excess, 0.0, motor.max_voltage / constant)
+    highest = brentq(excess, 0.0, motor.max_voltage / motor.rotor_constant)
     return _lift(airframe) * k_thrust * highest**2
 
 

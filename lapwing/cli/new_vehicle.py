@@ -3,12 +3,17 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cosim.interrupt import Interrupted
+from dynamics.errors import KeyedError
 from lapwing.cli.errors import user_errors
 from lapwing.cli.new import new
+
+if TYPE_CHECKING:
+    from lapwing.vehicle_figures import Figure
 
 WEAK = 1.4  # thrust over weight below which too little is left for control
 
@@ -28,7 +33,13 @@ def vehicle(
     """
     with user_errors():
         given = _given(measured or [])
-        path, remarks = write_vehicle(name, given, Path(), _ask if sys.stdin.isatty() else None)
+        interview = Interview(name, given) if sys.stdin.isatty() else None
+        try:
+            path, remarks = write_vehicle(name, given, Path(), interview.ask if interview else None)
+        except (ValueError, Interrupted):
+            if interview:
+                interview.tell()
+            raise
         typer.echo(path)
         for remark in remarks:
             typer.echo(f"lapwing: warning: {remark}", err=True)
@@ -40,7 +51,7 @@ def vehicle(
 
 
 def write_vehicle(
-    name: str, given: dict[str, float], folder: Path, ask: Callable[[str, float, str], float] | None = None
+    name: str, given: dict[str, float], folder: Path, ask: Callable[["Figure", float], float | None] | None = None
 ) -> tuple[Path, list[str]]:
     """Write an airframe; (its path, what is to be said of it).
 
@@ -48,7 +59,7 @@ def write_vehicle(
         name: of the vehicle.
         given: figures of `lapwing.vehicle_figures.FIGURES` by name.
         folder: in whose folder `vehicles` it is written.
-        ask: (name and unit, guess, how to measure it) -> the figure; None: guesses are taken.
+        ask: (figure, guess) -> what was measured, None where the guess will do; None: guesses are taken.
 
     Raises:
         ValueError: not a name, one that is taken, a figure that cannot be, or a vehicle that cannot hover.
@@ -64,33 +75,75 @@ def write_vehicle(
     if path.exists() or (SHIPPED / "vehicles" / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
     values: dict[str, float] = {}
+    known = set(given)
+    remarks: list[str] = []
     for figure in FIGURES:
         guess = figure.guess(values)
         if figure.name in given:
-            values[figure.name] = given[figure.name]
-        else:
-            values[figure.name] = ask(f"{figure.name} [{figure.unit}]", guess, figure.how) if ask else guess
+            value: float | None = given[figure.name]
+            remarks += filter(None, [figure.doubt(given[figure.name], guess)])
+        elif (value := ask(figure, guess) if ask else None) is not None:
+            known.add(figure.name)
+        values[figure.name] = guess if value is None else value
         figure.check(values[figure.name])
-    frame = airframe_of(values)
-    reserve = thrust_over_weight(frame)
+    reserve = thrust_over_weight(airframe_of(values))
     if reserve <= 1.0:
         raise ValueError(f"{name} cannot hover: its thrust is {reserve:.2f} times its weight; expected more than 1")
     path.parent.mkdir(exist_ok=True)
-    known = set(given) if ask is None else set(values)
     path.write_text(written(name, values, known), encoding="utf-8")
     weak = f"its thrust is {reserve:.2f} times its weight; below {WEAK:g} too little is left for control"
-    return path, [weak] if reserve < WEAK else []
+    return path, [*remarks, weak] if reserve < WEAK else remarks
 
 
-def _ask(question: str, guess: float, how: str) -> float:
-    typer.echo(f"\n{how}")
-    answer: float = typer.prompt(question, default=float(f"{guess:.3g}"), type=float)
-    return answer
+class Interview:
+    """Asks in a terminal for one figure after the other; what was answered is not lost when it ends early."""
+
+    def __init__(self, name: str, given: dict[str, float]):
+        self._name, self._answers, self._begun = name, dict(given), False
+
+    def ask(self, figure: "Figure", guess: float) -> float | None:
+        """What was measured of a figure; None where the guess will do.
+
+        Raises:
+            ValueError: nobody answers.
+        """
+        if not self._begun:
+            typer.echo("Enter takes the value in brackets, a guess from the figures before it; Ctrl-C ends.")
+            self._begun = True
+        typer.echo(f"\n{figure.how}")
+        while text := _answer(f"{figure.name}, {figure.unit} [{guess:.4g}]: "):
+            try:
+                value = float(text)
+            except ValueError:
+                typer.echo(f"{figure.name}: expected a number in {figure.unit} alone, as {guess:.4g}, got {text!r}")
+                continue
+            try:
+                figure.check(value)
+            except ValueError as error:
+                typer.echo(error)
+                continue
+            doubt = figure.doubt(value, guess)
+            if not doubt or _answer(f"{doubt} [y/N] ").lower() in ("y", "yes"):
+                self._answers[figure.name] = value
+                return value
+        return None
+
+    def tell(self) -> None:
+        """With what the next interview can begin where this one has ended."""
+        if self._begun and self._answers:
+            given = " ".join(f"--set {name}={value:.9g}" for name, value in self._answers.items())
+            typer.echo(f"\nnothing is written; with these answers: lapwing new vehicle {self._name} {given}")
+
+
+def _answer(question: str) -> str:
+    try:
+        return input(question).strip()
+    except EOFError:
+        raise ValueError("nobody answers any more") from None
 
 
 def _given(measured: list[str]) -> dict[str, float]:
     """Figures by name, of texts FIGURE=VALUE."""
-    from dynamics.errors import KeyedError
     from lapwing.vehicle_figures import FIGURES
 
     names, found = [figure.name for figure in FIGURES], {}

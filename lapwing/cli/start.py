@@ -1,19 +1,19 @@
 """The command `lapwing` from its first moment on: it answers Ctrl-C before it has imported the rest."""
 
-import signal
-import sys
-
-from cosim.interrupt import Interrupted, end_at_once
-
 
 def main() -> None:
     """Entry point of `lapwing`."""
-    end_at_once()
     try:
-        from lapwing.cli.main import main as carry_out
+        from cosim.interrupt import Interrupted, end_at_once, say_end
 
-        carry_out()
-    except Interrupted as interrupted:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        print(f"lapwing: {interrupted}", file=sys.stderr)
-        raise SystemExit(128 + interrupted.signal) from None
+        try:
+            end_at_once()
+            from lapwing.cli.main import main as carry_out
+
+            carry_out()
+        except Interrupted as interrupted:
+            raise SystemExit(say_end(interrupted)) from None
+    except KeyboardInterrupt:  # what Python makes of SIGINT up to `end_at_once`
+        from cosim.interrupt import SIGINT, Interrupted, say_end
+
+        raise SystemExit(say_end(Interrupted(SIGINT))) from None

@@ -13,6 +13,7 @@ from cosim.scene import Scene
 from lapwing.flight import Flight
 from services.common.sections import Published
 from studies import terminal
+from studies.flight import SHOWN
 from studies.separation import Separation, nearest
 from studies.tracking import shown
 
@@ -25,9 +26,9 @@ COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all o
 
 
 def fleet(log: Path) -> list[Flight]:
-    """The flights of all vehicles of a log; empty where nothing was flown."""
+    """The flights of all vehicles of a log, as far as a run's end shows them; empty where nothing was flown."""
     try:
-        return [flight for flight in Flight.read_all(log) if len(flight.truth)]
+        return [flight for flight in Flight.read_all(log, SHOWN) if len(flight.truth)]
     except ValueError:
         return []
 

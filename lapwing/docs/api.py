@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import lapwing
-from lapwing.docs.keys import comments, split
+from dynamics.declared import comments, split
 from lapwing.docs.markdown import table
 from messages.topics import TOPICS
 from services.common import controllers, estimators, ports

@@ -1,23 +1,15 @@
-"""The keys of a table: what the class that declares it says of each, its comment included.
+"""The keys of a table: what the class that declares it says of each, its comment included."""
 
-The unit and the meaning of a key stand in the comment behind its field (`# [m] of one foot`), and nowhere else.
-"""
-
-import ast
 import inspect
-import io
 import re
-import sys
-import tokenize
-from functools import cache
-from types import ModuleType
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from dynamics.declared import comments, split
+
 REQUIRED = object()
-_UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
 
 
 class Key(NamedTuple):
@@ -73,34 +65,3 @@ def default(field: Any) -> Any:
     if field.default_factory is not None:
         return field.default_factory()
     return REQUIRED if field.default is PydanticUndefined else field.default
-
-
-def comments(cls: type) -> dict[str, str]:
-    """The comment behind each field of a class, those of its bases included, without the #."""
-    found: dict[str, str] = {}
-    for base in reversed(cls.__mro__):
-        if base.__module__ not in ("builtins", BaseModel.__module__):
-            found |= _in_module(sys.modules[base.__module__]).get(base.__name__, {})
-    return found
-
-
-@cache
-def _in_module(module: ModuleType) -> dict[str, dict[str, str]]:
-    """The comments of every class of a module by its name, by field."""
-    source = inspect.getsource(module)
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-    lines = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
-    found: dict[str, dict[str, str]] = {}
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.ClassDef):
-            fields = [f for f in node.body if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)]
-            found[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore
-    return found
-
-
-def split(comment: str) -> tuple[str, str]:
-    """The unit and the meaning that a comment states; the unit comes first in it."""
-    first = _UNITS.match(comment)
-    if not first:
-        return "", comment
-    return ", ".join(re.findall(r"\[([^\]]+)\]", first[0])), comment[first.end() :].strip(" ,:;")

@@ -1,17 +1,20 @@
 """Control allocation: each rotor's share of every demand, for rotors at any place (theory.md, eq. (4.27)).
 
 The least thrusts, in the sum of their squares, that give the wanted lift and torques: the pseudo-inverse of the
-effectiveness matrix, scaled so that four rotors in a cross get shares of +1 and -1.
+effectiveness matrix, scaled so that four rotors in a cross get shares of +1 and -1. The thrust of a rotor is the one
+that it gives by itself: where some stand in the wake of others, the effectiveness has what they lose.
 """
 
 import numpy as np
 
+from dynamics.effects._types import WakeSlopes
 from dynamics.vector import Vec3
 from services.autopilot.interface import PerRotor
 from services.autopilot.mixer import Share, Shares
 
 LEAST_LIFT = 0.05  # share of the lift that every rotor must have in hover, to be turned down for control
 WORST_CONDITION = 1e3  # of the scaled effectiveness, above which a torque counts as one that the rotors cannot give
+ARM_DIGITS = 9  # behind the point of an arm [m], to which those of two rotors over one another are the same
 YAW = 3  # row of the effectiveness
 
 
@@ -39,6 +42,19 @@ def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], ro
     return np.vstack([axis[:, 2], torques.T])
 
 
+def in_wakes(still: np.ndarray, turning: np.ndarray, torque_per_thrust: float, wakes: WakeSlopes) -> np.ndarray:
+    """The same for rotors of which some stand in the wake of others (theory.md, eq. (4.27b)).
+
+    Args:
+        still: `effectiveness` of the rotors without their reaction torques, shape (4, rotors).
+        turning: torques about body x, y, z of 1 N m of each rotor's reaction, below a row of 0; shape (4, rotors).
+        torque_per_thrust: [m] of a rotor by itself.
+        wakes: with a row and a column for each rotor.
+    """
+    thrust, torque = np.array(wakes.thrust), np.array(wakes.torque)
+    return still @ thrust + turning @ (torque_per_thrust * np.eye(len(thrust)) + torque)
+
+
 def demand_effects(B: np.ndarray) -> np.ndarray:
     """Lift [N] and torques [N m] of demands of 1 N: rotors times mean arm, shape (4,).
 
@@ -48,7 +64,7 @@ def demand_effects(B: np.ndarray) -> np.ndarray:
     return np.array([sum(abs(float(v)) for v in row) for row in B])
 
 
-def shares_of(B: np.ndarray, failed: int = 0) -> Shares | None:
+def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None) -> Shares | None:
     """(collective, roll, pitch, yaw) share of every rotor in the demands; None where they cannot hover in balance.
 
     Where the rotors that are left after a failure cannot give yaw torque beside the others, it is given up: its shares
@@ -57,11 +73,13 @@ def shares_of(B: np.ndarray, failed: int = 0) -> Shares | None:
     Args:
         B: `effectiveness` of the rotors, shape (4, rotors).
         failed: number of the rotor that gives nothing, from 1; 0: none.
+        weights: of the squares of the thrusts, shape (rotors,); 1 if left out.
     """
     effects = demand_effects(B)
     if effects.min() <= 0.0:
         return None
-    scaled = B / effects[:, None]
+    root = np.sqrt(np.ones(B.shape[1]) if weights is None else weights)
+    scaled = B / effects[:, None] / root
     left = [k for k in range(scaled.shape[1]) if k != failed - 1]
     for rows in ([0, 1, 2, YAW], [0, 1, 2]) if failed else ([0, 1, 2, YAW],):
         some = scaled[np.ix_(rows, left)]
@@ -69,14 +87,16 @@ def shares_of(B: np.ndarray, failed: int = 0) -> Shares | None:
         if np.linalg.cond(gram) > WORST_CONDITION**2:
             continue
         shares = np.zeros((scaled.shape[1], 4))
-        shares[np.ix_(left, rows)] = some.T @ np.linalg.inv(gram)
+        shares[np.ix_(left, rows)] = some.T @ np.linalg.inv(gram) / root[left, None]
         if shares[left, 0].min() >= LEAST_LIFT:
             return tuple(_share(row) for row in shares)
     return None
 
 
-def tables(B: np.ndarray) -> tuple[Shares, ...]:
+def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ...]:
     """Shares with all rotors, then with each one failed; with all rotors alone where one that fails ends control.
+
+    Arguments as of `shares_of`.
 
     It does so where four rotors fly, and where two stand over one another, since what the gyroscopes say does not tell
     which of both has failed.
@@ -84,13 +104,14 @@ def tables(B: np.ndarray) -> tuple[Shares, ...]:
     Raises:
         ValueError: the rotors cannot hover in balance, or give no torque about an axis.
     """
-    whole, count = shares_of(B), B.shape[1]
+    whole, count = shares_of(B, 0, weights), B.shape[1]
     if whole is None:
         expected = "lift from each in hover, and torques about all three axes that do not come with one another"
         raise ValueError(f"the {count} rotors cannot be balanced; expected {expected}")
-    if len(np.unique(B[:YAW], axis=1).T) < count:
+    arms = np.round(B[1:YAW] / B[0], ARM_DIGITS)
+    if len(np.unique(arms, axis=1).T) < count:
         return (whole,)
-    found = [shares for k in range(1, count + 1) if (shares := shares_of(B, k)) is not None]
+    found = [shares for k in range(1, count + 1) if (shares := shares_of(B, k, weights)) is not None]
     return (whole, *found) if len(found) == count else (whole,)
 
 

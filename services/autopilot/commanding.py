@@ -79,7 +79,7 @@ class Commanding:
             service,
             operator,
         )
-        self._weight = a.mass * a.gravity
+        self._weight, self._lift = a.mass * a.gravity, lift(a) / len(a.rotor_x)  # [N]; of 1 N of all rotors' thrusts
         table = {p.name: p for p in given.parameters}
         thrust_max = controller(given, {p.name: p.default for p in given.parameters}).thrust_max
         self._commander = Commander(
@@ -156,7 +156,8 @@ class Commanding:
         """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""
         if not self._weight > 0.0:
             return 1.0
-        return sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) / self._weight if tick > 0 else 0.0
+        asked = sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
+        return asked * self._lift / self._weight
 
     def _commands(self, tick: int) -> tuple[Any, ...]:
         given = self._given

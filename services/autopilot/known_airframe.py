@@ -6,18 +6,19 @@ from cosim.scene import Scene
 from services.autopilot.law import Airframe, lift, moments
 from services.autopilot.motor import Motor
 from services.common import vehicle
-from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height
+from services.common.vehicle import Effects, airframe, gravity, rotor_constants, start_height, wake_slopes
 
 
 def known_airframe(scene: Scene) -> Airframe:
     """What the autopilot is told of the vehicle: nominal numbers, in the air of home."""
+    return scene.once(_known_airframe)
+
+
+def _known_airframe(scene: Scene) -> Airframe:
     frame = airframe(scene)
     rotor = rotor_constants(scene)
     torque_per_thrust = rotor.torque / rotor.thrust
     thrust_coefficient = vehicle.thrust_coefficient(scene)
-    weight = frame.mass.total * gravity(scene) / len(frame.rotors.position)
-    slope = 2.0 * math.sqrt(weight * thrust_coefficient)  # [N s/rad] of a rotor in hover
-    spins_up = "gyroscopic_torque" in scene[Effects].tables and slope > 0.0
     x, y, z = zip(*frame.rotors.position, strict=True)
     axis = frame.rotors.tilted_axis
     engine = frame.motor
@@ -35,8 +36,10 @@ def known_airframe(scene: Scene) -> Airframe:
         rotor_z=z if axis else (),
         rotor_axis=axis,
     )
-    if not spins_up:
+    alone, known = known, known._replace(wakes=wake_slopes(scene))
+    if "gyroscopic_torque" not in scene[Effects].tables or known.gravity <= 0.0:
         return known
+    slope = 2.0 * math.sqrt(known.mass * known.gravity / lift(known) * thrust_coefficient)  # [N s/rad] in hover
     # of tilted rotors the thrust turns, too, and of their spinning up only the part about z
-    torque = moments(known)[2] / lift(known) if axis else torque_per_thrust
+    torque = moments(known)[2] / lift(alone) if axis or known.wakes.thrust else torque_per_thrust
     return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

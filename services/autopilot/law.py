@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynamics.effects._types import WakeSlopes
 from dynamics.kernel import uncompiled
 from dynamics.vector import Vec3
-from services.autopilot.allocation import demand_effects, effectiveness, tables, tilted_effectiveness
+from services.autopilot.allocation import demand_effects, effectiveness, in_wakes, tables, tilted_effectiveness
 from services.autopilot.control import Parameters
 from services.autopilot.interface import PerRotor
 from services.autopilot.mixer import Shares
@@ -50,6 +51,7 @@ class Airframe(NamedTuple):
     spin_up_zero: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
     rotor_z: PerRotor = ()  # [m] of rotors that have axes
     rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () where that is body z
+    wakes: WakeSlopes = WakeSlopes()  # of rotors that stand in the wake of others; thrusts are what each has by itself
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
@@ -87,9 +89,15 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
 
 
 def hover_thrust(airframe: Airframe) -> float:
-    """Thrust [N] in hover of the rotor that carries the most."""
+    """Thrust [N] in hover of the rotor that carries the most; by itself, where some stand in the wake of others."""
     weight = airframe.mass * airframe.gravity / lift(airframe)
     return weight * max(collective for collective, *_ in shares(airframe)[0])
+
+
+def hover_torque(airframe: Airframe) -> float:
+    """Torque [N m] against the rotor that turns hardest in hover."""
+    gained = max((sum(row) for row in airframe.wakes.torque), default=0.0)
+    return hover_thrust(airframe) * (airframe.torque_per_thrust + max(gained, 0.0))
 
 
 def lift(airframe: Airframe) -> float:
@@ -115,15 +123,28 @@ def rotor_effectiveness(a: Airframe) -> np.ndarray:
 
 def _geometry(a: Airframe) -> tuple:
     """All that the rotors' effectiveness depends on: the arguments of `_effectiveness`."""
-    return a.rotor_x, a.rotor_y, a.rotor_z, a.rotor_axis, tuple(sign * a.torque_per_thrust for sign in a.reaction_sign)
+    return a.rotor_x, a.rotor_y, a.rotor_z, a.rotor_axis, a.reaction_sign, a.torque_per_thrust, a.wakes
 
 
-def _effectiveness(x: PerRotor, y: PerRotor, z: PerRotor, axes: tuple, reaction: PerRotor) -> np.ndarray:
-    if axes:
-        return tilted_effectiveness(tuple(zip(x, y, z, strict=True)), axes, reaction)
-    return effectiveness(x, y, reaction)
+def _effectiveness(
+    x: PerRotor, y: PerRotor, z: PerRotor, axes: tuple, signs: PerRotor, torque: float, wakes: WakeSlopes
+) -> np.ndarray:
+    def alone(torque: float) -> np.ndarray:
+        reaction = tuple(sign * torque for sign in signs)
+        if axes:
+            return tilted_effectiveness(tuple(zip(x, y, z, strict=True)), axes, reaction)
+        return effectiveness(x, y, reaction)
+
+    if not wakes.thrust:
+        return alone(torque)
+    return in_wakes(alone(0.0), alone(1.0) - alone(0.0), torque, wakes)
 
 
 @lru_cache(maxsize=16)  # asked for several times at a start, and by every run of a campaign
 def _tables(*geometry: Any) -> tuple[Shares, ...]:
-    return tables(_effectiveness(*geometry))
+    B = _effectiveness(*geometry)
+    x, y, z, axes, signs, torque, wakes = geometry
+    if not wakes.thrust:
+        return tables(B)
+    # so weighed, all rotors hover at one speed, about which the slopes hold
+    return tables(B, B[0] / _effectiveness(x, y, z, axes, signs, torque, WakeSlopes())[0])

@@ -4,7 +4,7 @@ import math
 
 from cosim.scene import Scene
 from dynamics.errors import KeyedError
-from services.autopilot.law import Airframe, hover_thrust
+from services.autopilot.law import Airframe, hover_thrust, hover_torque
 from services.common.vehicle import Effects, airframe
 
 
@@ -18,9 +18,8 @@ def check(scene: Scene, known: Airframe) -> None:
         return
     frame = airframe(scene)
     motor, constant = frame.motor, frame.motor.rotor_constant
-    thrust = hover_thrust(known)
-    speed = math.sqrt(thrust / known.motor.thrust_coefficient)
-    current = thrust * known.torque_per_thrust / (motor.belt_efficiency * constant) + motor.no_load_current
+    speed = math.sqrt(hover_thrust(known) / known.motor.thrust_coefficient)
+    current = hover_torque(known) / (motor.belt_efficiency * constant) + motor.no_load_current
     voltage = constant * speed + (motor.resistance + motor.esc_resistance) * current
     for needed, limit, unit in (
         (current, frame.motor_current_limit, "A"),

@@ -50,11 +50,13 @@ class Rates(Section):
     battery: int = Field(default=10, gt=0)  # [Hz] charge, voltage, current
     bodies: int = Field(default=50, gt=0)  # [Hz] the single bodies of a vehicle that has several
     operator: int = Field(default=50, gt=0)  # [Hz] what comes from outside, and the answers
+    contact: int | None = Field(default=None, gt=0)  # [Hz] forces on every foot of a multirotor; without it, not told
 
     def check(self, scene: Scene) -> None:
         """Every rate divides the exchange rate."""
         for key in type(self).model_fields:
-            ticks(scene, min(getattr(self, key), scene[Exchange].rate), f"rates.{key}")
+            if (rate := getattr(self, key)) is not None:
+                ticks(scene, min(rate, scene[Exchange].rate), f"rates.{key}")
 
 
 def ticks(scene: Scene, rate: float, key: str) -> int:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from dynamics.vector import ZERO, Vec3
 
-TRUTH, BATTERY, BODIES = "truth", "battery", "bodies"
+TRUTH, BATTERY, BODIES, CONTACT = "truth", "battery", "bodies", "contact"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
 OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
@@ -57,6 +57,13 @@ class BodyMotions(NamedTuple):
     omega_body: tuple[Vec3, ...]  # [rad/s]
     force_world: tuple[Vec3, ...]  # [N] of contacts or joints
     torque_body: tuple[Vec3, ...]  # [N m] of contacts or joints
+
+
+class ContactForces(NamedTuple):
+    """What the ground does to the points of a vehicle that may touch it; every tuple has an entry for each."""
+
+    position_world: tuple[Vec3, ...]  # [m]
+    force_world: tuple[Vec3, ...]  # [N]
 
 
 class ImuReading(NamedTuple):

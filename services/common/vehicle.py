@@ -9,6 +9,8 @@ from cosim.scene import Files, Scene, Section
 from cosim.scene.files import laid_over, named
 from dynamics import effects
 from dynamics.atmosphere import density
+from dynamics.effects._types import WakeSlopes
+from dynamics.effects.coaxial_wash import CoaxialWash
 from dynamics.effects.rotor_quadratic import RotorQuadratic
 from dynamics.effects.rotor_table import RotorTable
 from dynamics.effects.rotor_thrust import RotorThrust
@@ -18,7 +20,7 @@ from dynamics.lie.quaternion import Quaternion, rotate
 from dynamics.terrain import Level, Relief, surface
 from dynamics.vector import Vec3
 from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.multirotor import STANDARD_DENSITY
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from dynamics.vehicles.standing import Pose, standing_pose
 from services.common import mesh
 from services.common.environment import environment
@@ -167,6 +169,11 @@ def thrust_coefficient(scene: Scene) -> float:
     return float(uncompiled(density)(around.atmosphere, around.home.height)) * rotor.thrust
 
 
+def wake_slopes(scene: Scene) -> WakeSlopes:
+    """How the rotors' loads hang together under `coaxial_wash`, where the scene names it."""
+    return next((e.slopes() for e in active(scene) if isinstance(e, CoaxialWash)), WakeSlopes())
+
+
 def gravity(scene: Scene) -> float:
     """Gravity at home [m/s^2]: that of whichever effect gives one, 0 without."""
     return next((e.acceleration_at_home for e in active(scene) if hasattr(e, "acceleration_at_home")), 0.0)
@@ -174,6 +181,10 @@ def gravity(scene: Scene) -> float:
 
 def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     """(position of the centre of mass [m], attitude) in the world of the vehicle that stands on the ground at home."""
+    return scene.once(_start_pose)
+
+
+def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
     pose = standing_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
     if not isinstance(terrain, Level):

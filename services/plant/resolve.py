@@ -4,20 +4,28 @@ import importlib
 from collections.abc import Mapping
 
 from cosim.scene import Scene
+from cosim.schedule import Port
 from cosim.setup import ServiceSetup
+from dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
 from dynamics.effects.carried_load import CarriedLoad
 from dynamics.errors import KeyedError
+from dynamics.vector import ZERO
 from services.common import ports
+from services.common.exchange import Rates
+from services.common.ports import ContactForces
 from services.common.vehicle import Vehicle
 from services.plant import interactions
+from services.plant.cores.contact import ContactView
 from services.plant.cores.multirotor import MultirotorPlant
-from services.plant.models._common import bodies_port, noise_key
+from services.plant.models._common import bodies_port, noise_key, rate_ticks
 
 
 def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the scene: every scene has one."""
     model = scene[Vehicle].model
     found = importlib.import_module(f"services.plant.models.{model}").resolve(scene)
+    if scene[Rates].contact is not None:
+        found = _with_contact(scene, found)
     if any(isinstance(e, CarriedLoad) for e in interactions.effects_of(found)):
         if any(port.name == ports.BODIES for port in found.ports):
             raise KeyedError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
@@ -25,6 +33,19 @@ def resolve(scene: Scene) -> ServiceSetup:
         parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
         return ServiceSetup(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))
     return found
+
+
+def _with_contact(scene: Scene, found: ServiceSetup) -> ServiceSetup:
+    """The same plant, which also tells of the forces on its feet."""
+    effect = next(
+        (e for e in interactions.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
+    )
+    if effect is None:
+        message = "no effect of the scene tells of forces on feet"
+        raise KeyedError("rates.contact", message, "a multirotor with [effects.ground_contact], or to leave it out")
+    plant, zero = found.parameters, (ZERO,) * len(effect.feet)
+    port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact"))
+    return ServiceSetup(plant._replace(contact=ContactView(plant.core.vehicle)), found.inputs, (*found.ports, port))
 
 
 def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:

@@ -19,7 +19,8 @@ from dynamics.integrators import not_finite
 from dynamics.kernel import kernel
 from dynamics.multibody.five_bodies import FiveBodies
 from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters, MultirotorState
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
+from dynamics.vehicles.multirotor_multibody_equations import struck
 from services.common import ports
 from services.common.ports import PerRotor
 from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
@@ -39,7 +40,8 @@ def create(setup: Setup) -> Service:
     plant: PlantSetup = given.parameters
     state = Cell(plant.start)
     bodies = [port for port in given.ports if port.name == ports.BODIES]
-    told = tuple(port for port in given.ports if port not in bodies)
+    feet = tuple(port for port in given.ports if port.name == ports.CONTACT)
+    told = tuple(port for port in given.ports if port not in bodies and port not in feet)
     own = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
     part = Part(
         NAME, plant.core, state, given.inputs, given.ports if own else told, failure=_diverged(setup, plant, state)
@@ -52,6 +54,8 @@ def create(setup: Setup) -> Service:
     if bodies and plant.bodies and not own:
         inputs = given.inputs[:1]
         parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
+    if plant.contact:
+        parts.append(Part(f"{NAME}.contact", plant.contact, state, (Input(ports.TRUTH),), feet, feet[0].period))
     return Service(NAME, parts, wires(setup, plant.wiring))
 
 
@@ -149,5 +153,5 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
 
 @implements(_struck)
 def _struck_of(drive: types.Type, x: types.Type) -> Callable:
-    found = multirotor_multibody.struck if x.instance_class is FiveBodies else multirotor_euler.struck
+    found = struck if x.instance_class is FiveBodies else multirotor_euler.struck
     return lambda drive, x: found(drive, x)

@@ -35,3 +35,4 @@ class PlantSetup(NamedTuple):
     events: tuple[PlantEvent, ...] = ()
     euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
     others: Others | None = None
+    contact: Any = None  # parameters of the part that tells of forces on feet, None without it

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import messages
 from cosim.setup import Setup
 from cosim.wire import Fields, Wire
 from dynamics.atmosphere import FREEZING
@@ -15,6 +16,7 @@ from messages import (
     BodyStates,
     Clock,
     Odometry,
+    Point,
     Pose,
     PoseStamped,
     TFMessage,
@@ -26,7 +28,7 @@ from messages import (
 from messages import topics as topic
 from messages.records import stamp_columns
 from services.common import ports
-from services.common.ports import BatteryGauge, BodyMotions, TrueState
+from services.common.ports import BatteryGauge, BodyMotions, ContactForces, TrueState
 
 WORLD = "world"
 AMPERE_HOUR = 3600.0  # [A s]
@@ -61,6 +63,10 @@ def wires(setup: Setup, wiring: PlantWiring) -> list[Wire]:
     if ports.BODIES in given:
         sample_bodies = _bodies_sample(wiring.bodies)
         found.append(Wire(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies))
+    if ports.CONTACT in given:
+        n = len(given[ports.CONTACT].like.force_world)
+        sample_contact = messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
+        found.append(Wire(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact))
     return found
 
 
@@ -181,4 +187,12 @@ def _bodies(x: BodyMotions, time_ns: np.ndarray) -> Fields:
         found[f"angular_velocity.{i}"] = x.omega_body[i]
         found[f"force.{i}"] = x.force_world[i]
         found[f"torque.{i}"] = x.torque_body[i]
+    return found
+
+
+def _contact(x: ContactForces, time_ns: np.ndarray) -> Fields:
+    """Every point that may touch the ground, with the force on it."""
+    found: dict[str, Any] = dict(stamp_columns(time_ns))
+    for i, (place, force) in enumerate(zip(x.position_world, x.force_world, strict=True)):
+        found[f"position.{i}"], found[f"force.{i}"] = place, force
     return found

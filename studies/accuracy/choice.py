@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from cosim.scene import Scene, SceneError, Source
@@ -47,17 +48,24 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
 def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
     """The points of the scene's plant: from the user's cache, so that every later run flies the same."""
     path = _file(scene)
-    if path and path.exists():
-        return [Point(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+    if path and (known := _read(path)):
+        return known
     say("measuring the integrators on this plant for solver.accuracy (first time only; minutes if they are compiled)")
     points = measure(scenes.problem(scene))
-    if path is None:
-        return points
-    path.parent.mkdir(parents=True, exist_ok=True)
-    complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
-    complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
-    complete.replace(path)
+    if path is not None:
+        with suppress(OSError):  # where nothing can be kept, they are measured again
+            path.parent.mkdir(parents=True, exist_ok=True)
+            complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
+            complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
+            complete.replace(path)
     return points
+
+
+def _read(path: Path) -> list[Point]:
+    """What has been measured before; nothing where it is not there or damaged."""
+    with suppress(OSError, ValueError, TypeError):
+        return [Point(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+    return []
 
 
 def _file(scene: Scene) -> Path | None:

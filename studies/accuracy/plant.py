@@ -15,7 +15,8 @@ from dynamics.lie.quaternion import exp
 from dynamics.noise import Key, stream_key
 from dynamics.tree import flatten
 from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
+from dynamics.vehicles.multirotor import advance, observe
+from dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
 from services.common.exchange import Exchange
 from services.common.sections import Run
 from services.common.vehicle import Vehicle

@@ -11,6 +11,7 @@ from dynamics.cell import Cell
 from dynamics.kernel import kernel
 from dynamics.noise import Key, stream_key
 from dynamics.vehicles import multirotor
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from services.common.vehicle import active, airframe, rotor_constants, start_height
 from services.plant.config import Solver, method
 from studies.effects.variants import Tables, variant
@@ -44,7 +45,7 @@ def _calls(scene: Scene) -> tuple[Any, Any]:
     frame = airframe(scene)
     p = multirotor.parameters(frame, active(scene))._replace(tolerance=scene[Solver].contact_tolerance)
     rotor = rotor_constants(scene)
-    lift = (multirotor.STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
+    lift = (STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
     speed = math.sqrt(frame.mass.total * STANDARD_GRAVITY / (len(frame.rotors.position) * lift))
     voltage = speed / p.layout.speed_per_volt
     return _call(scene, p, HEIGHT, speed, voltage), _call(scene, p, start_height(scene), 0.0, 0.0)

@@ -17,6 +17,7 @@ const fly = (section, given, live) => {
     path: floats(flight.path),
     asked: floats(flight.asked),
     wind: floats(flight.wind),
+    contact: flight.contact && { ...flight.contact, p: floats(flight.contact.p), f: floats(flight.contact.f) },
     bodies: flight.bodies.map((body) => ({
       ...body,
       p: floats(body.p),
@@ -42,6 +43,7 @@ const fly = (section, given, live) => {
     };
     join("t", 1, known, more);
     ["path", "asked", "wind"].forEach((name) => join(name, 3, known, more));
+    if (known.contact) ["p", "f"].forEach((name) => join(name, 3 * known.contact.points, known.contact, more.contact));
     known.bodies.forEach((body, k) => {
       join("p", 3, body, more.bodies[k]);
       join("q", 4, body, more.bodies[k]);
@@ -135,7 +137,7 @@ const fly = (section, given, live) => {
     if (flight.links.length) add("link", "", flight, line("#9AA5AF", 3));
     if (flight.asked) add("asked", "", flight, { ...line("#333333", 2, "setpoint"), mode: "markers", marker: { size: 4, symbol: "diamond-open", color: "#333333" } });
     if (flight.wind) add("wind", "", flight, line("#56B4E9", 5, "wind"));
-    if (flight.bodies.some((body) => body.f)) add("force", "", flight, line("#CC79A7", 4, "force of contact or joint"));
+    if (flight.contact || flight.bodies.some((body) => body.f)) add("force", "", flight, line("#CC79A7", 4, "force of contact or joint"));
     whom.add(new Option(flight.name, whom.length));
   }
   whom.hidden = flights.length < 2;
@@ -184,6 +186,10 @@ const fly = (section, given, live) => {
           found[k].x.push(x), found[k].y.push(y), found[k].z.push(z);
         }
         return;
+      }
+      if (kind === "force" && flight.contact && forces.checked) {
+        const { points, p, f } = flight.contact, feet = between(p, 3 * points, at), pushes = between(f, 3 * points, at);
+        for (let i = 0; i < 3 * points; i += 3) arrow(draw, feet.slice(i, i + 3), pushes.slice(i, i + 3).map((value) => value * FORCE));
       }
       const places = flight.bodies.map((body) => [attitude(body.q, at), between(body.p, 3, at)]);
       if (kind === "link") return flight.links.forEach(([a, b, fastened, length]) => {

@@ -156,6 +156,7 @@ def _table(flight: Flight, name: str, colour: str, frames: int, later: bool = Fa
         "asked": None if asked is None else _array(asked),
         "wind": _array(truth.wind[kept]) if later or np.any(truth.wind) else None,
         "bodies": [_body(body, times, kept, later) for body in moved.bodies],
+        "contact": _contact(flight, times),
         "links": moved.links,
     }
 
@@ -175,6 +176,15 @@ def _body(body: Body, times: np.ndarray, kept: np.ndarray, later: bool) -> dict[
             for r in body.rotors
         ],
     }
+
+
+def _contact(flight: Flight, times: np.ndarray) -> dict[str, Any] | None:
+    """Points that may touch the ground, and the forces on them, point by point in each row; None where nobody tells."""
+    if not flight.has("contact"):
+        return None
+    told = flight.topic("contact")
+    rows = np.searchsorted(told.times, times - 1e-9).clip(max=len(told) - 1)
+    return {"points": told.position.shape[1], "p": _array(told.position[rows]), "f": _array(told.force[rows])}
 
 
 def _array(values: Any, kind: Any = np.float32) -> str:

@@ -1,6 +1,6 @@
 """The report as a page for a browser: what the flight came to, and the plots; one file that needs no network."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,7 +62,7 @@ def _moving() -> str:
     return (_HERE / "motion.js").read_text(encoding="utf-8")
 
 
-def render(template: str, sections: Sequence[Section], **values: Any) -> str:
+def render(template: str, sections: Iterable[Section], **values: Any) -> str:
     """The page of a template of this folder, with the script that draws its plots.
 
     Raises:

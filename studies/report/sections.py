@@ -1,6 +1,6 @@
 """The sections of a report: every plot that a log has the topics for, and a line for each of the others."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -28,13 +28,16 @@ class Section(NamedTuple):
         return to_json(self.plot) if self.plot else ""
 
 
-def sections(flights: Sequence[Flight]) -> list[Section]:
-    """Every plot of the vehicles' models, of one flight or of two laid over each other."""
+def sections(flights: Sequence[Flight]) -> Iterator[Section]:
+    """Every plot of the vehicles' models, of one flight or of two laid over each other.
+
+    They are drawn one after the other, as they are asked for: each holds all rows of what it shows.
+    """
     models = {flight.origin.scene.get("vehicle", {}).get("model", "reduced") for flight in flights}
     wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
     if all(len(flight.fleet) < 2 for flight in flights):
         wanted = [module for module in wanted if not getattr(module, "FLEET", False)]
-    return [_section(module, flights) for module in wanted]
+    return (_section(module, flights) for module in wanted)
 
 
 def labels(flights: Sequence[Flight]) -> tuple[str, ...]:

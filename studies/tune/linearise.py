@@ -26,7 +26,7 @@ class Hover(NamedTuple):
     rotor_speed: float  # [rad/s] at which the weight is carried
     voltage: float  # [V] that holds it
     lag: float  # [s] of the rotors' speed behind the voltage
-    thrust_slope: float  # [N s/rad] of one rotor over its speed
+    thrust_slope: float  # [N s/rad] of one rotor by itself over its speed
     altitude: float  # [m/s^2 / N] acceleration upwards over the force demand of every rotor
     roll: float  # [rad/s^2 / N]
     pitch: float  # [rad/s^2 / N]
@@ -44,7 +44,9 @@ def hover(scene: Scene) -> Hover:
     frame = airframe(scene)
     still = {name: table for name, table in scene[Effects].tables.items() if not name.startswith("wind")}
     p = parameters(frame, effects.from_scene(still, frame, environment(scene)))
-    lift, *turns = np.array(shares(known_airframe(scene))[0]).T  # shares of the rotors
+    known = known_airframe(scene)
+    lift, *turns = np.array(shares(known)[0]).T  # shares of the rotors
+    free = next((k for k, row in enumerate(known.wakes.thrust) if row[k] == 1.0), 0)  # a rotor in nobody's wake
     count, evenly = len(lift), np.sqrt(lift)  # speeds in hover, over the speed of a rotor that carries the mean
 
     def seen(speeds: np.ndarray, voltage: np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
@@ -70,7 +72,7 @@ def hover(scene: Scene) -> Hover:
         return (value(seen(rotors + d * direction, volts)) - value(seen(rotors - d * direction, volts))) / (2.0 * d)
 
     one = np.ones(count)
-    thrust = slope(one, lambda o: o.thrust[0])
+    thrust = slope(one, lambda o: o.thrust[free])
     ahead = [
         seen(rotors, volts, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
     ]

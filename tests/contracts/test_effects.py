@@ -18,6 +18,7 @@ from dynamics.lie.quaternion import rotation_matrix
 from dynamics.noise import stream_key
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
 ROOT = Path(__file__).parents[2]
 DRONE = load_airframe(ROOT / "scenes/vehicles/delivery_drone.toml")
@@ -160,8 +161,8 @@ def test_the_order_of_the_scenes_tables_does_not_matter():
 def bare_rate(p, t, m):
     """Gravity, thrust and lag written by hand, from the same constants."""
     layout, w = p.layout, m.rotor_speed
-    b = p.effects[1].thrust_constant * multirotor.STANDARD_DENSITY
-    d = p.effects[1].torque_constant * multirotor.STANDARD_DENSITY
+    b = p.effects[1].thrust_constant * STANDARD_DENSITY
+    d = p.effects[1].torque_constant * STANDARD_DENSITY
     f = (b * (w[0] * w[0]), b * (w[1] * w[1]), b * (w[2] * w[2]), b * (w[3] * w[3]))
     q = (d * (w[0] * w[0]), d * (w[1] * w[1]), d * (w[2] * w[2]), d * (w[3] * w[3]))
     x, y, s = layout.x_body, layout.y_body, layout.reaction_sign

@@ -158,7 +158,7 @@ WRONG = {
     "vehicle.1.mavlink.system=1": "--set vehicle.1.mavlink.system: 1 is also that of vehicle.0; expected another",
     "vehicle.2.autopilot.gains=x": "--set vehicle.2.autopilot.gains: unknown gain set 'x'",
     "vehicle.0.nam=3": "--set vehicle.0.nam: unknown key 'nam'; did you mean name?",
-    "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0, got -3",
+    "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3",
     "autopilot.gains=x": "--set autopilot.gains: unknown gain set 'x'",
 }
 

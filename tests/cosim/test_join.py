@@ -3,13 +3,18 @@
 import subprocess
 import sys
 
-from cosim.access import by_certificate
+import pytest
+
+from cosim.access import VIEWER, by_certificate
 from cosim.bus import ZenohBus
 from cosim.certificates import make, tls
-from cosim.keys import ALIVE_KEY, STEP_KEY
+from cosim.errors import BusError
+from cosim.keys import ALIVE_KEY, ENDED_KEY, STEP_KEY
 from cosim.log import LogReader
 from cosim.participants import Participants
 from lapwing.runs.single import fly_single
+from services.common.operator import OPERATOR_KEY
+from services.processes import MAVLINK
 from services.security import says
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
@@ -106,3 +111,30 @@ def test_a_participant_speaks_for_itself_alone(tmp_path):
                 (f"test-access/{STEP_KEY}/{other}", 0, b"own"),
             ]
             assert bus.refused == 0
+
+
+def test_a_viewer_of_a_run_on_several_hosts_reads_and_is_not_heard_and_who_has_no_certificate_reads_nothing(tmp_path):
+    keys, run = tmp_path / "keys", Participants("test-viewer")
+    make(keys, ["autopilot", VIEWER], 1)
+    rules = by_certificate("test-viewer", says(resolve(load("groundstation")), "test-viewer"))
+    (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["autopilot"]).values())
+    mark, topic = run.mark("autopilot"), "test-viewer/drone1/status"
+    with (
+        ZenohBus([end], mark=mark, security={**tls(keys, "autopilot"), **rules}) as autopilot,
+        ZenohBus(connect=[end], mode="client", mark=run.mark(MAVLINK), security=tls(keys, VIEWER)) as viewer,
+    ):
+        heard, read = autopilot.subscribe("test-viewer/**"), viewer.subscribe(topic)
+        publish = autopilot.publisher(topic)
+        while (message := read.get(timeout=0.1)) is None:  # until the subscription has come
+            publish(b"status", 0)
+        assert message == (0, b"status")
+        for key in (f"{OPERATOR_KEY}/{MAVLINK}", f"{STEP_KEY}/plant", f"{ENDED_KEY}/plant", f"{ALIVE_KEY}/plant"):
+            viewer.publisher(f"test-viewer/{key}")(b"command", 0)
+            viewer._session.put(f"test-viewer/{key}", b"command")
+            viewer._session.delete(f"test-viewer/{key}")
+        viewer.declare_alive(f"test-viewer/{ALIVE_KEY}/plant")
+        assert autopilot.wait_alive([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # is not there
+        while (message := heard.get_with_key(timeout=1.0)) is not None:
+            assert message == (topic, 0, b"status")  # its own
+        with pytest.raises(BusError):
+            ZenohBus(connect=[end], mode="client").close()

@@ -220,7 +220,7 @@ def test_what_lies_beside_the_scene_comes_first(write, tmp_path):
         ),
         ("duration = 20.0", "duration = true", "duration = true", ", got True"),
         ("duration = 20.0", "", "[run]", "run.duration: missing; expected a number"),
-        ("duration = 20.0", "duration = -1", "duration = -1", "above 0 and at most 1e+06, got -1"),
+        ("duration = 20.0", "duration = -1", "duration = -1", "above 0 and at most 1e+06 [s], got -1"),
         ("[effects.gravity]", "[effects.gravy]", "[effects.gravy]", "unknown effect 'gravy'; did you mean gravity?"),
         ('gains = "tuned"', 'gains = "tune"', "gains", "autopilot.gains: unknown gain set 'tune'; did you mean tuned?"),
         (
@@ -237,7 +237,7 @@ def test_what_lies_beside_the_scene_comes_first(write, tmp_path):
             "[run]",
             "[airframe.mass]\ntotal = -1\n[run]",
             "total",
-            "airframe.mass.total: expected a number above 0, got -1",
+            "airframe.mass.total: expected a number above 0 [kg], got -1",
         ),
     ],
 )
@@ -256,7 +256,7 @@ def test_a_fault_is_a_value(write):
     assert (fault.key, fault.message, fault.expected) == (
         "run.duration",
         "got -1",
-        "a number above 0 and at most 1e+06",
+        "a number above 0 and at most 1e+06 [s]",
     )
     assert fault.source == (path, line(text, "duration = -1"), None)
     fault = refused(HOVER, "run.seed=1.5")
@@ -302,11 +302,11 @@ def test_choices_are_listed():
         ("trajectory.phase.x.duration=1", "expected an index from 0 to 3, got x"),
         ("gains.altitude.3=1", "--set gains.altitude.3=1: expected an index from 0 to 2, got 3"),
         ("trajectory.phase.1.name=climb", "two phases are named 'climb'"),
-        ("airframe.mass.total=-1", "--set airframe.mass.total: expected a number above 0, got -1"),
+        ("airframe.mass.total=-1", "--set airframe.mass.total: expected a number above 0 [kg], got -1"),
         ("airframe.mass.payload=11", "--set airframe.mass.payload: expected less than total = 10.0224 kg, got 11"),
         ("airframe.mass.totl=1", "--set airframe.mass.totl: unknown key 'totl'; did you mean total?"),
         ("gains.altitude=[1, 2]", "--set gains.altitude.2: missing; expected a number"),
-        ("gains.tilt_limit=1.5", "--set gains.tilt_limit: expected a number above 0 and below 1.4, got 1.5"),
+        ("gains.tilt_limit=1.5", "--set gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5"),
         ("autopilot.parameters=none.params", "--set autopilot.parameters: scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),
         ("autopilot.estimator=sensors", '--set autopilot.estimator: "sensors" needs [sensors.imu], [sensors.magneto'),
@@ -323,7 +323,7 @@ def test_a_fault_in_a_file_that_a_scene_names_is_named_with_its_line(write, tmp_
     sound = vehicle.read_text()
     vehicle.write_text(sound.replace("total = 10.0224", "total = -1.0"))
     number = line(vehicle.read_text(), "total")
-    assert said(path) == f"{vehicle}:{number}: airframe.mass.total: expected a number above 0, got -1.0"
+    assert said(path) == f"{vehicle}:{number}: airframe.mass.total: expected a number above 0 [kg], got -1.0"
     vehicle.write_text("[mass\n")
     assert said(path).startswith(f"{vehicle}: not valid TOML: ")
     vehicle.write_bytes(b"\xff")
@@ -405,3 +405,24 @@ def test_a_text_that_is_read_again_gives_tables_of_its_own(tmp_path):
     first = parse_toml("x = { y = [1] }", path)
     first["x"]["y"].append(2)
     assert parse_toml("x = { y = [1] }", path) == {"x": {"y": [1]}}
+
+
+def test_what_was_found_in_other_tables_stays_where_one_is_replaced():
+    asked = []
+
+    def name(scene):
+        asked.append("name")
+        return scene[Vehicle].name
+
+    def title(scene):
+        asked.append("title")
+        return f"{scene.once(name)} of {scene[Run].title}"
+
+    scene = load("hover")
+    assert scene.once(title) == scene.once(title) == f"drone1 of {scene[Run].title}"
+    retitled = scene.replaced(scene[Run].model_copy(update={"title": "another"}))
+    assert retitled.once(title) == "drone1 of another"
+    assert asked == ["title", "name", "title"]
+    renamed = retitled.replaced(scene[Vehicle].model_copy(update={"name": "scout"}))
+    assert renamed.once(title) == "scout of another"
+    assert asked[3:] == ["title", "name"]

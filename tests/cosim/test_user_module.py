@@ -1,9 +1,14 @@
 """Modules of the user's own: found, carried as text, run from it."""
 
+import os
+import py_compile
+import stat
 import sys
+from pathlib import Path
 
 import pytest
 
+from cosim import user_module
 from cosim.user_module import find, load
 from dynamics.errors import KeyedError
 
@@ -52,7 +57,34 @@ def test_another_text_under_the_same_name_is_run_anew():
 
 def test_a_damaged_file_of_the_cache_is_mended():
     module = load("own_kept", {"own_kept": "value = 5\n"})
-    with open(module.__file__, "w") as file:
-        file.write("value = 6\n")
-    del sys.modules["own_kept"]
-    assert load("own_kept", {"own_kept": "value = 5\n"}).value == 5
+    for damage in (b"value = 6\n", b"\xff"):
+        Path(module.__file__).write_bytes(damage)
+        del sys.modules["own_kept"]
+        assert load("own_kept", {"own_kept": "value = 5\n"}).value == 5
+
+
+@pytest.mark.parametrize("kept", [None, Path("/dev/null/none")])
+def test_without_a_cache_there_is_a_folder_of_the_process_which_nobody_else_can_enter(kept, monkeypatch):
+    monkeypatch.setattr(user_module, "cache_folder", lambda: kept)
+    module = load("own_homeless", {"own_homeless": f"value = 7\nkept = {str(kept)!r}\n"})
+    assert module.value == 7
+    assert stat.S_IMODE(Path(module.__file__).parents[1].stat().st_mode) == 0o700
+
+
+def test_what_others_could_have_planted_is_not_run(monkeypatch, tmp_path):
+    monkeypatch.setattr(user_module, "cache_folder", lambda: tmp_path)
+    text = "value = 8\n"
+    file = Path(load("own_planted", {"own_planted": text}).__file__)
+    assert file.is_relative_to(tmp_path)
+    written = file.stat()
+    file.write_text("value = 9\n")  # machine code of other text, which Python takes for that of this one
+    os.utime(file, ns=(written.st_atime_ns, written.st_mtime_ns))
+    py_compile.compile(str(file))
+    file.write_text(text)
+    os.utime(file, ns=(written.st_atime_ns, written.st_mtime_ns))
+    file.parent.chmod(0o777)
+    del sys.modules["own_planted"]
+    sys.path.remove(str(file.parent))
+    module = load("own_planted", {"own_planted": text})
+    assert module.value == 8
+    assert not Path(module.__file__).is_relative_to(tmp_path)

@@ -52,6 +52,10 @@ def test_each_service_of_two_hosts_listens_at_its_host_with_its_own_certificate(
             assert peers_of(service["command"])[name].startswith(f"tls/{address}:")
             assert f"../../keys/{name}:/app/keys/{name}:ro" in service["volumes"]
             assert service["read_only"]
+            assert {"mem_limit", "pids_limit"} <= {*service}
+            assert (service["cap_drop"], service["security_opt"]) == (["ALL"], ["no-new-privileges:true"])
+            port = peers_of(service["command"])[name].rpartition(":")[2]
+            assert service["healthcheck"]["test"][-1] == f": < /dev/tcp/{address}/{port}"
 
 
 def test_kubernetes_takes_the_manifests():

@@ -37,6 +37,9 @@ class Outer(BaseModel):
 
 class Tuple(NamedTuple):
     charge: Annotated[float, Gt(0), Le(1)]
+    length: Annotated[float, Gt(0)] = 1.0  # [m] of something
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [N]
+    nested: Inner = Inner()
     delay: Annotated[float, Ge(0)] | None = None
     sizes: tuple[float, Annotated[float, Gt(0)]] = (1.0, 1.0)
 
@@ -72,8 +75,14 @@ def test_a_model(table, text):
         ({}, "charge: missing; expected a number above 0 and at most 1"),
         ({"charge": 2.0}, "charge: expected a number above 0 and at most 1, got 2.0"),
         ({"charge": 0.5, "delay": -1.0}, "delay: expected a number at least 0, got -1.0"),
+        ({"charge": 0.5, "length": -1.0}, "length: expected a number above 0 [m], got -1.0"),
+        ({"charge": 0.5, "force": (0.0, "x", 0.0)}, "force.1: expected a number [N], got 'x'"),
+        ({"charge": 0.5, "nested": 3}, "nested: expected a table of share, got 3"),
         ({"charge": 0.5, "sizes": (1.0, -1.0)}, "sizes.1: expected a number above 0, got -1.0"),
-        ({"chrge": 0.5}, "chrge: unknown key 'chrge'; did you mean charge? expected one of charge, delay, sizes"),
+        (
+            {"chrge": 0.5},
+            "chrge: unknown key 'chrge'; did you mean charge? expected one of charge, delay, force, length, nested,",
+        ),
     ],
 )
 def test_a_named_tuple(table, text):

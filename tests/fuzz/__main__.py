@@ -28,10 +28,11 @@ def main() -> None:
         target, chance = TARGETS[name](), random.Random(f"{name} {given.seed}")
         for seed in target.seeds:  # what is loaded once is not counted
             target.read(seed)
-        refused, slowest, begun = 0, 0.0, time.process_time()
+        refused, slowest = 0, 0.0
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        begun = started = time.process_time()
         for number in range(given.inputs):
-            data, started = mutated(chance, target.seeds), time.process_time()
+            data = mutated(chance, target.seeds)
             try:
                 target.read(data)
             except ValueError:
@@ -39,10 +40,10 @@ def main() -> None:
             except Exception as error:
                 wrong += 1
                 print(f"{name}: input {number}: {type(error).__name__}: {error!s:.100}: {data[:60]!r}", flush=True)
-            slowest = max(slowest, time.process_time() - started)
+            slowest, started = max(slowest, (now := time.process_time()) - started), now
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
         wrong += slowest > SLOW
-        rate = given.inputs / (time.process_time() - begun)
+        rate = given.inputs / (started - begun)
         shares = f"{refused} refused, {given.inputs - refused} taken"
         print(f"{name}: {given.inputs} inputs, {shares}, slowest {1e3 * slowest:.0f} ms, +{grown:.0f} MB, {rate:.0f}/s")
     raise SystemExit(wrong > 0)

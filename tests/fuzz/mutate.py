@@ -7,26 +7,29 @@ TOKENS = (
     *(b"9" * 400, b"[" * 2000, b"{" * 50, b'"', b"\n", b"null", b"[]", b"{}", b"=", b"'''", b"\xc3\x28", b"true"),
 )
 MOST = 1 << 16  # [bytes]
+PLACES = (1, 1, 2, 3, 8)
+CUTS = (1, 2, 4, 8, 64, MOST)  # [bytes]
 
 
 def mutated(chance: random.Random, seeds: tuple[bytes, ...]) -> bytes:
     """A seed with a few places damaged; now and then nothing but noise."""
-    if chance.random() < 0.02:
-        return chance.randbytes(chance.randrange(600))
-    data = bytearray(chance.choice(seeds))
-    for _ in range(chance.choice((1, 1, 2, 3, 8))):
-        place = chance.randrange(len(data) + 1)
-        match chance.randrange(5):
+    draw = chance.random  # an index of n is int(n * draw()): five times as fast as `choice` and `randrange`
+    if draw() < 0.02:
+        return chance.randbytes(int(600 * draw()))
+    data = bytearray(seeds[int(len(seeds) * draw())])
+    for _ in range(PLACES[int(len(PLACES) * draw())]):
+        place = int((len(data) + 1) * draw())
+        match int(5 * draw()):
             case 0 if data:
-                data[place % len(data)] ^= 1 << chance.randrange(8)
+                data[place % len(data)] ^= 1 << int(8 * draw())
             case 1 if data:
-                data[place % len(data)] = chance.randrange(256)
+                data[place % len(data)] = int(256 * draw())
             case 2:
-                data[place:place] = chance.choice(TOKENS)
+                data[place:place] = TOKENS[int(len(TOKENS) * draw())]
             case 3:
-                del data[place : place + chance.choice((1, 2, 4, 8, 64, len(data)))]
+                del data[place : place + CUTS[int(len(CUTS) * draw())]]
             case _:
-                other = chance.choice(seeds)
-                start = chance.randrange(len(other) + 1)
-                data[place : place + chance.randrange(16)] = other[start : start + chance.randrange(64)]
+                other = seeds[int(len(seeds) * draw())]
+                start = int((len(other) + 1) * draw())
+                data[place : place + int(16 * draw())] = other[start : start + int(64 * draw())]
     return bytes(data[:MOST])

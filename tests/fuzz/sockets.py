@@ -78,11 +78,25 @@ def page() -> Target:
     return Target(read, (b"GET /token/ HTTP/1.1\r\n" + host, b"GET /token/steps HTTP/1.0\r\n" + host))
 
 
-def websocket() -> Target:
-    """Frames of a client of `--foxglove`; one that is sent away comes again, to a server that must still be there."""
+def _server() -> Server:
+    """One with a topic, to the end of the process."""
     server = Server("127.0.0.1:0").__enter__()
     atexit.register(server.__exit__)
     server.declare("/drone1/estimate", ESTIMATE.message.type_name)
+    return server
+
+
+_TEXTS = (
+    b'{"op":"subscribe","subscriptions":[{"id":0,"channelId":1}]}',
+    b'{"op":"unsubscribe","subscriptionIds":[0]}',
+    b'{"op":"getParameters","parameterNames":["a"],"id":"1"}',
+)
+_BINARY = b"\1\0\0\0\0"
+
+
+def websocket() -> Target:
+    """Frames of a client of `--foxglove`; one that is sent away comes again, to a server that must still be there."""
+    server = _server()
     now = SimpleNamespace(client=Client(server.port))
 
     def read(data: bytes) -> None:
@@ -92,10 +106,22 @@ def websocket() -> Target:
         with suppress(ConnectionError):  # what came before may be answered while it goes
             now.client.send(data)
 
-    texts = (
-        b'{"op":"subscribe","subscriptions":[{"id":0,"channelId":1}]}',
-        b'{"op":"unsubscribe","subscriptionIds":[0]}',
-        b'{"op":"getParameters","parameterNames":["a"],"id":"1"}',
-    )
-    frames = [bytes([0x81, 0x80 | len(text), *bytes(4)]) + text for text in texts]
-    return Target(read, (*frames, bytes([0x82, 0x85, *bytes(4)]) + b"\1\0\0\0\0"))
+    frames = [bytes([0x81, 0x80 | len(text), *bytes(4)]) + text for text in _TEXTS]
+    return Target(read, (*frames, bytes([0x82, 0x80 | len(_BINARY), *bytes(4)]) + _BINARY))
+
+
+def requests() -> Target:
+    """What such frames hold, in sound ones, so that the server reads all of many: the first byte says which kind."""
+    server = _server()
+    now = SimpleNamespace(client=Client(server.port), sent=0)
+
+    def read(data: bytes) -> None:
+        kind, said = 0x82, data[1:]
+        if data[:1] < b"\x80":  # a text that is no UTF-8 ends the connection: `websocket` tries those
+            kind, said = 0x81, said.decode(errors="replace").encode()
+        now.client.send(bytes([kind, 0xFE]) + len(said).to_bytes(2, "big") + bytes(4) + said)
+        now.sent += 1
+        if now.sent % CONVERSATION == 0 and not now.client.answers():
+            raise ConnectionError("the server does not answer")
+
+    return Target(read, (*(b"\0" + text for text in _TEXTS), b"\xff" + _BINARY))

@@ -15,7 +15,7 @@ from messages.topics import POSE
 from messages.types import TYPES
 from services import table
 from services.common import parameter_file, plan
-from tests.fuzz.sockets import frames, link, page, websocket
+from tests.fuzz.sockets import frames, link, page, requests, websocket
 from tests.fuzz.target import Target
 
 SCENES = Path("scenes")
@@ -124,5 +124,8 @@ def logs() -> Target:
 
 TARGETS = {
     make.__name__: make
-    for make in (cdr, batches, attachments, set_ups, scenes, plans, parameters, logs, link, frames, page, websocket)
+    for make in (
+        *(cdr, batches, attachments, set_ups, scenes, plans, parameters, logs),
+        *(link, frames, page, requests, websocket),
+    )
 }

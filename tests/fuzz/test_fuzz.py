@@ -12,7 +12,7 @@ from tests.fuzz.targets import TARGETS
 
 @cache
 def made(name):
-    if name == "websocket":
+    if name in ("requests", "websocket"):
         pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
     return TARGETS[name]()
 

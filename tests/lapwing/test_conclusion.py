@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+import lapwing as package
 from lapwing.runs import single
-from studies.flight import Flight
+from studies.figures import figures
+from studies.flight import SHOWN, Flight
+from studies.report.page import flight_page
 
 HOVER = ["run", "hover", "--mode", "single", "--log", "a.mcap", "--json", "a.json"]
 FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
@@ -79,3 +82,14 @@ def test_a_run_that_is_refused_says_nothing_of_the_log_that_was_there(lapwing, m
     lapwing(*HOVER)
     monkeypatch.setattr(single, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
     assert lapwing(*HOVER)[1:] == ("", "lapwing: ended by SIGTERM\n")
+
+
+@pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
+def test_what_the_end_of_a_run_reads_is_all_that_it_shows(tmp_path, scene):
+    """Of a log with every sensor only the topics that page, figures and events are made of."""
+    log = package.fly(package.load(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
+    (part,), whole = Flight.read_all(log, SHOWN), Flight.read(log)
+    assert set(part.topics) < set(whole.topics)
+    assert flight_page([part]) == flight_page([whole]) == flight_page([Flight.read(log, only=SHOWN)])
+    assert part.events == whole.events
+    assert str(figures(part)) == str(figures(whole))  # as texts: some are NaN

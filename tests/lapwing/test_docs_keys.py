@@ -6,10 +6,11 @@ import pytest
 from annotated_types import Gt, Le
 from pydantic import BaseModel, Field
 
+from dynamics.declared import comments, split
 from dynamics.vehicles.airframe import Airframe
 from lapwing.docs.annotations import schema_of
 from lapwing.docs.catalogue import effect_tables, sensor_tables
-from lapwing.docs.keys import REQUIRED, comments, first_sentence, keys, split
+from lapwing.docs.keys import REQUIRED, first_sentence, keys
 from lapwing.docs.markdown import code, key_table, kind, limits
 from services.sensors.schedule import FaultTable
 from services.table import vocabulary

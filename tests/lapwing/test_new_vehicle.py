@@ -1,7 +1,11 @@
 """`lapwing new vehicle`: what it writes is sound and can hover; or it is refused in one line."""
 
 import math
+import os
+import pty
 import re
+import select
+import sys
 
 import pytest
 from typer.testing import CliRunner
@@ -34,17 +38,77 @@ def test_rotors_give_what_the_thrust_stand_has_shown(tmp_path):
     assert torque * 700.0**2 == pytest.approx(0.11, rel=1e-4)
 
 
-def test_in_a_terminal_each_figure_is_asked_for_with_a_word_on_how_to_measure_it(tmp_path):
+def test_each_figure_that_is_not_given_is_asked_for_with_a_word_on_how_to_measure_it(tmp_path):
     asked = []
 
-    def ask(question, guess, how):
-        asked.append(question)
-        assert len(how) > 15
-        return guess
+    def ask(figure, guess):
+        asked.append(figure.name)
+        assert len(figure.how) > 10
+        return guess if figure.name != "arm" else None
 
     path, _ = write_vehicle("mine", {"mass": 3.0}, tmp_path, ask)
-    assert asked == [f"{figure.name} [{figure.unit}]" for figure in FIGURES if figure.name != "mass"]
-    assert "Guessed, not measured: nothing." in path.read_text()
+    assert asked == [figure.name for figure in FIGURES if figure.name != "mass"]
+    assert "Guessed, not measured: arm." in path.read_text()
+
+
+def in_a_terminal(folder, *answers, more=()):
+    """What `lapwing new vehicle mine` says to somebody who types these answers, and its exit code."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.chdir(folder)
+        os.execv(sys.executable, [sys.executable, "-m", "lapwing", "new", "vehicle", "mine", *more])
+    said, left, typed = b"", list(answers), b""
+    while True:
+        if not select.select([terminal], [], [], 1.0)[0]:
+            if typed == b"\x03":  # which Python does not hear that is about to wait for a line: as anybody, once more
+                os.write(terminal, typed)
+            continue
+        try:
+            said += os.read(terminal, 4096)
+        except OSError:  # closed with the last process on it
+            break
+        if said.endswith((b"]: ", b"[y/N] ")):
+            typed = left.pop(0).encode() if left else b"\x04"  # who has no answer any more ends it
+            os.write(terminal, typed)
+    return said.decode().replace("\r\n", "\n"), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def test_in_a_terminal_slips_are_asked_again(tmp_path):
+    answers = ("1,5 kg\n", "1500\n", "n\n", "-1\n", "1.5\n", "\n", "5\n", "4.5\n", "6\n", *["\n"] * 40)
+    said, code = in_a_terminal(tmp_path, *answers)
+    assert code == 0, said
+    assert "mass: expected a number in kg alone, as 2, got '1,5 kg'" in said
+    assert "mass = 1500 kg, where about 2 is usual: is that the unit? [y/N]" in said
+    assert "mass: expected a number above 0 and below 10000, in kg, got -1" in said
+    assert "rotors: expected 4, 6 or 8; write others into the file by hand, got 5" in said
+    assert "rotors: expected a whole number, got 4.5" in said
+    text = (tmp_path / "vehicles/mine.toml").read_text()
+    assert "total = 1.5 " in text
+    assert "Guessed, not measured: arm, " in text  # what Enter took
+    assert "mass" not in text.splitlines()[1]
+
+
+@pytest.mark.parametrize(("end", "code", "last"), [("\x03", 130, "ended by SIGINT"), ("\x04", 2, "nobody answers")])
+def test_who_ends_it_can_go_on_with_the_answers(tmp_path, end, code, last):
+    said, found = in_a_terminal(tmp_path, "1.5\n", "\n", "6\n", end)
+    assert found == code
+    assert "with these answers: lapwing new vehicle mine --set mass=1.5 --set rotors=6" in said
+    assert last in said.splitlines()[-1]
+    assert "Traceback" not in said
+    assert not (tmp_path / "vehicles").exists()
+
+
+def test_answers_that_do_not_go_together_are_not_lost(tmp_path):
+    said, code = in_a_terminal(tmp_path, "1.5\n", "2\n", *["\n"] * 40)
+    assert code == 2
+    assert "with these answers: lapwing new vehicle mine --set mass=1.5 --set payload=2" in said
+    assert "mass.payload: expected less than total = 1.5 kg, got 2" in said.splitlines()[-1]
+
+
+def test_a_figure_far_from_its_guess_is_warned_of(tmp_path):
+    _, remarks = write_vehicle("mine", {"diameter": 10.0, "mass": 30.0}, tmp_path)
+    assert remarks[0] == "diameter = 10 m, where about 0.98 is usual: is that the unit?"
+    assert "diameter" in remarks[0]
 
 
 @pytest.mark.parametrize(
@@ -52,6 +116,7 @@ def test_in_a_terminal_each_figure_is_asked_for_with_a_word_on_how_to_measure_it
     [
         ({"mass": -1.0}, "mass: expected a number above 0 and below 10000, in kg, got -1"),
         ({"rotors": 5.0}, "rotors: expected 4, 6 or 8"),
+        ({"cells": 4.5}, "cells: expected a whole number, got 4.5"),
         ({"mass": math.nan}, "mass: expected a number"),
         ({"payload": 3.0}, "mass.payload: expected less than total"),
         ({"inertia_z": 9.0}, "triangle inequality"),

@@ -1,5 +1,6 @@
 import pickle
 import random
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from hypothesis import strategies as st
 from samples import flat, sample, value, varied
 
 from messages import TYPES, BatteryState, Estimate, Imu, LiftCommand, Status, Vector3, header, stamp_ns
-from messages.history import history, history_of_pages
+from messages import history as module
+from messages.history import Gathered, history, history_of_pages
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -101,3 +103,36 @@ def test_pages_are_the_same_as_payloads():
 def test_a_history_can_be_pickled():
     columns = history(LiftCommand, [LiftCommand(moment=(Vector3(k, 0.0, 0.0),)).encode() for k in range(3)])
     assert pickle.loads(pickle.dumps(columns))["moment.0.x"].tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 30])
+def test_messages_as_they_come_are_the_same_as_all_at_once(monkeypatch, count):
+    """Of pages of eight, with two shapes and texts."""
+    monkeypatch.setattr(module, "PAGE", 8)
+    said = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
+    payloads, gathered = [message.encode() for message in said], Gathered(Status)
+    for k, payload in enumerate(payloads):
+        gathered.add(1000 * k, payload)
+    times, found = gathered.history()
+    assert times.dtype == np.int64
+    assert times.tolist() == [1000 * k for k in range(count)]
+    whole = history(Status, payloads)
+    assert list(found) == list(whole)
+    assert found.payloads() == payloads
+    for name in whole:
+        assert np.array_equal(found[name], whole[name]), name
+        assert type(found[name]) is type(whole[name])
+
+
+def test_messages_as_they_come_are_in_memory_once():
+    payload, count = Imu(header(0, "body")).encode(), 20_000
+    gathered = Gathered(Imu)
+    tracemalloc.start()
+    try:
+        for k in range(count):
+            gathered.add(k, bytes(bytearray(payload)))
+        gathered.history()
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 1.5 * count * len(payload)

@@ -272,6 +272,56 @@ def test_a_browser_draws_a_cable_straight_where_it_pulls_and_as_long_as_it_is_wh
     assert np.linalg.norm(np.diff(slack, axis=0), axis=1).sum() == pytest.approx(2.0, rel=0.05)
 
 
+def standing():
+    """50 N on each of two feet, which are 0.4 m apart; told half as often as the truth."""
+    place, force = np.zeros((TICKS // 2, 2, 3)), np.zeros((TICKS // 2, 2, 3))
+    place[:, 0, 0], place[:, 1, 0], force[:, :, 2] = 0.2, -0.2, 50.0
+    whole = flight()
+    contact = TopicView(np.arange(0, TICKS, 2) * 10**7, {"position": place, "force": force})
+    return Flight({**{name: whole.topic(name) for name in whole.topics}, "contact": contact}, whole.origin)
+
+
+def test_the_page_is_given_the_forces_on_every_foot_where_they_are_told():
+    (table,) = json.loads(motion.to_json([standing()]))["flights"]
+    assert table["contact"]["points"] == 2
+    assert numbers(table["contact"]["p"]).reshape(-1, 2, 3)[:, :, 0] == pytest.approx(np.tile([0.2, -0.2], (TICKS, 1)))
+    assert numbers(table["contact"]["f"]).reshape(-1, 2, 3)[:, :, 2] == pytest.approx(50.0)
+    assert json.loads(motion.to_json([flight()]))["flights"][0]["contact"] is None
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_a_browser_draws_the_forces_on_the_feet_when_it_is_asked_to(tmp_path):
+    given = standing()
+    given.digest = "0" * 32
+    with chromium.Browser(write(given, tmp_path / "flight.html"), tmp_path / "profile") as browser:
+        hidden, before, after = browser.run(
+            """
+            const until = async (holds) => { while (!holds()) await new Promise((done) => setTimeout(done, 20)); };
+            await until(() => document.readyState === "complete");
+            const section = document.getElementById("motion"), forces = section.querySelector("[name=forces]");
+            await until(() => section.dataset.time !== undefined);
+            const drawn = () => {
+              const { data } = section.querySelector(".space");
+              const arrows = data.find(({ name }) => name === "force of contact or joint");
+              const { x, y, z } = arrows;
+              return x.map((_, k) => [x[k], y[k], z[k]]).filter(([value]) => value !== null);
+            };
+            if (forces.checked) forces.click();
+            await until(() => drawn().length === 0);
+            const before = drawn();
+            forces.click();
+            await until(() => drawn().length > 0);
+            return [forces.parentElement.hidden, before, drawn()];
+            """
+        )
+        assert browser.errors == []
+    assert not hidden
+    assert before == []
+    points = np.array(after).reshape(2, -1, 3)  # from, tip, and the barbs of each
+    assert points[:, 0] == pytest.approx(np.array([[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]]), abs=1e-6)
+    assert points[:, 1, 2] == pytest.approx(1.0)  # 0.02 m for 1 N
+
+
 TRIANGLE = Mesh(np.array([(0.5, 0.0, 0.0), (0.0, 0.25, 0.0), (0.0, 0.0, 0.125)]), np.array([(0, 1, 2)]))
 WITH_MESH = {"airframe": {**AIRFRAME, "mesh": "a.stl"}, "meshes": {"a.stl": pack(TRIANGLE)}}
 

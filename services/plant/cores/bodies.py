@@ -10,8 +10,9 @@ from dynamics.effects import _hooks as hooks
 from dynamics.generate import implements
 from dynamics.kernel import leaf
 from dynamics.multibody.five_bodies import FiveBodies
-from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from dynamics.vehicles.multirotor import MultirotorDrive, MultirotorParameters
+from dynamics.vehicles import multirotor_euler
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
+from dynamics.vehicles.multirotor_multibody_equations import joints
 from services.common.ports import BodyMotions, PerRotor
 
 
@@ -43,7 +44,7 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[Received, ...]) -> 
     g, memory = p.vehicle, s.vehicle.memory
     drive = MultirotorDrive(g, hooks.all_body(g.effects, memory, g.body), memory, command)
     x = on_se3(s.vehicle.motion)
-    j = multirotor_multibody.joints(drive, tick * p.interval, x)
+    j = joints(drive, tick * p.interval, x)
     a, (b, c, d, e) = x.chassis, x.propellers
     told = BodyMotions(
         (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),

@@ -6,7 +6,7 @@ from cosim.part import GO_ON, Received
 from dynamics.effects._interaction import Presence, all_interactions
 from dynamics.generate import each_index
 from dynamics.kernel import leaf
-from dynamics.vehicles.multirotor import MultirotorState
+from dynamics.vehicles.multirotor_equations import MultirotorState
 from services.plant.cores.multirotor import MultirotorPlantState
 
 

@@ -7,7 +7,8 @@ from dynamics import effects
 from dynamics.kernel import leaf
 from dynamics.noise import Key
 from dynamics.tree import finite
-from dynamics.vehicles.multirotor import MultirotorParameters, MultirotorState, advance, observe, seen
+from dynamics.vehicles.multirotor import advance, observe
+from dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
 from services.common.ports import BatteryGauge, PerRotor, TrueState
 from services.plant.cores.ending import signal
 from services.plant.cores.gripper import let_go

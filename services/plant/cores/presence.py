@@ -10,7 +10,7 @@ from dynamics.effects._types import Loads
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import rotation_matrix
 from dynamics.vector import add, apply, cross
-from dynamics.vehicles.multirotor import MultirotorParameters
+from dynamics.vehicles.multirotor_equations import MultirotorParameters
 
 
 class PresenceView(NamedTuple):

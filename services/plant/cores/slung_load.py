@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from cosim.part import GO_ON, Received
 from dynamics.kernel import leaf
 from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.vehicles.multirotor import RotorLayout
+from dynamics.vehicles.multirotor_equations import RotorLayout
 from dynamics.vehicles.multirotor_slung import cable_force
 from services.common.ports import BodyMotions
 

@@ -12,7 +12,15 @@ from dynamics.vector import Vec3
 from dynamics.vehicles import multirotor_slung
 from dynamics.vehicles.multirotor_slung import Sling
 from services.common.environment import environment
-from services.common.vehicle import Vehicle, VehicleAirframe, active, airframe, gravity, thrust_coefficient
+from services.common.vehicle import (
+    Vehicle,
+    VehicleAirframe,
+    active,
+    airframe,
+    gravity,
+    thrust_coefficient,
+    wake_slopes,
+)
 from services.plant.config import Solver
 from services.plant.cores.slung_load import SlungLoadView
 from services.plant.models import reduced
@@ -51,7 +59,9 @@ def _check_weight(scene: Scene) -> None:
     """The rotors lift vehicle and load."""
     frame, load = airframe(scene), scene[SlungLoad].mass
     fastest = frame.motor.max_voltage / frame.motor.rotor_constant
-    lift = len(frame.rotors.position) * thrust_coefficient(scene) * fastest**2
+    shares = wake_slopes(scene).thrust
+    count = sum(map(sum, shares)) if shares else len(frame.rotors.position)
+    lift = count * thrust_coefficient(scene) * fastest**2
     weight = (frame.mass.total + load) * gravity(scene)
     if lift <= weight:
         message = f"got {load:g}: the rotors lift at most {lift:.0f} N, vehicle and load weigh {weight:.0f} N"

@@ -23,8 +23,10 @@ from dynamics.multibody.five_bodies import machine as five_bodies_machine
 from dynamics.tree import flatten
 from dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
 from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor import advance, seen
+from dynamics.vehicles.multirotor import advance
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, seen
 from dynamics.vehicles.multirotor_euler import FiveEulerBodies
+from dynamics.vehicles.multirotor_multibody_equations import unloaded
 from studies.accuracy.coordinates import coordinates
 from studies.accuracy.problem import Outcome, Problem, Way
 from studies.accuracy.reference import TOLERANCE, turning
@@ -50,8 +52,8 @@ def _of_one(p: Any, x: Any) -> float:
 
 @kernel
 def _of_five(p: Any, x: Any) -> float:
-    drive = multirotor.MultirotorDrive(p, p.body, (), p.layout.x_body)
-    return hold.violation(multirotor_multibody.unloaded(drive, multirotor_multibody.seen(p.layout, x)), x)[0]
+    drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
+    return hold.violation(unloaded(drive, seen(p.layout, x)), x)[0]
 
 
 @kernel
@@ -91,7 +93,7 @@ def problems() -> dict[str, Problem]:
         for held in multirotor_multibody.STABILISATIONS:
             p = form.parameters(frame, (), "speed", held)
             x = thrown(p, frame)
-            state = multirotor.MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
+            state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
             ways.append(_way(f"{name}, {held}", p, state, volts))
     problem = Problem(
         "delivery drone of one and of five bodies, tumbling",

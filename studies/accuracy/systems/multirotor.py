@@ -10,7 +10,7 @@ from dynamics.integrators import RATES
 from dynamics.lie.quaternion import exp
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor import STANDARD_DENSITY, MultirotorDrive
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, rate
 from studies.accuracy.coordinates import of_state
 from studies.accuracy.integrate import ways
 from studies.accuracy.problem import Problem
@@ -23,7 +23,7 @@ START = Motion(
     (0.0, 0.0, 50.0), exp((0.2, -0.4, 0.1)), (1.0, 0.5, -0.3), (2.0, -1.5, 1.0), (330.0, 340.0, 320.0, 335.0)
 )
 
-RATES[MultirotorDrive] = multirotor.rate
+RATES[MultirotorDrive] = rate
 
 
 def problems() -> dict[str, Problem]:

@@ -9,8 +9,9 @@ from dynamics.effects._types import Motion
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.multibody.hold import NONE, PARTITION, PROJECTION, advance, violation
 from dynamics.tree import flatten
-from dynamics.vehicles import multirotor, multirotor_multibody
+from dynamics.vehicles import multirotor_multibody
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor_equations import MultirotorState
 from studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, STILL, flight
 from studies.accuracy.systems.delivery_drone import thrown as drone_thrown
 from studies.stability.case import Curve, Found, Plot, Row
@@ -44,7 +45,7 @@ def of_plant(stabilisation: str, seconds: float) -> float:
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     p = multirotor_multibody.parameters(frame, (), "speed", stabilisation)
     out = np.empty((2, len(flatten(Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)))))
-    state = multirotor.MultirotorState(drone_thrown(p, frame), ())
+    state = MultirotorState(drone_thrown(p, frame), ())
     return float(flight(METHOD.Method(), p, state, volts, 2e-3, round(seconds / 2e-3), out))
 
 

@@ -9,6 +9,7 @@ from dynamics import effects
 from dynamics.environment import Environment
 from dynamics.terrain import relief
 from dynamics.vehicles import multirotor
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from dynamics.vehicles.standing import at_rest, standing_pose
 from studies.stability.case import Curve, Found, Row, Sweep
 from studies.stability.cases.landing import DRONE, METHOD, STEP, G
@@ -18,7 +19,7 @@ HARD = "an upright step run into, an edge slid over, a take-off from a slope: fa
 
 SPEED, RISER, DROP = 2.0, 0.1, 0.4  # [m/s], [m], [m]
 ANGLE, LIGHT = math.radians(20.0), 0.5  # of the slope, and how much of the weight the rotors carry while it slides
-DENSITY = multirotor.STANDARD_DENSITY
+DENSITY = STANDARD_DENSITY
 
 
 def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:

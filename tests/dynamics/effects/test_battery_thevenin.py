@@ -83,8 +83,8 @@ def test_it_cuts_off_and_starts_again_with_hysteresis(drone, situation, rotors):
     ("table", "said"),
     [
         ({"restart": 2.9, "cut_off": 3.0}, "battery_thevenin.restart: expected more than cut_off = 3 V, got 2.9 V"),
-        ({"cooling_time": 0.0}, r"cooling_time: expected a number at least 1 and at most 1e\+06, got 0.0"),
-        ({"temperature": 20.0}, "temperature: expected a number at least 233.15 and at most 333.15, got 20.0"),
+        ({"cooling_time": 0.0}, r"cooling_time: expected a number at least 1 and at most 1e\+06 \[s\], got 0.0"),
+        ({"temperature": 20.0}, r"temperature: expected a number at least 233.15 and at most 333.15 \[K\], got 20.0"),
     ],
 )
 def test_what_is_out_of_range(drone, table, said):

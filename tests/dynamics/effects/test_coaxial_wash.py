@@ -12,6 +12,7 @@ from dynamics.kernel import uncompiled
 from dynamics.lie.quaternion import exp
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.inflow import thrust_in_wake
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
 
 share = uncompiled(thrust_in_wake)
 GAP = 0.10  # [m]
@@ -57,8 +58,8 @@ def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0), exp(turn), 0.0, velocity)
     motion = state.motion._replace(rotor_speed=speeds)
-    drive = multirotor.MultirotorDrive(p, p.body, state.memory, (0.0,) * 8)
-    rotors = uncompiled(multirotor.evaluate)(drive, 0.0, motion)[1]
+    drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * 8)
+    rotors = uncompiled(evaluate)(drive, 0.0, motion)[1]
     return np.array(rotors.thrust), np.array(rotors.torque)
 
 
@@ -91,6 +92,43 @@ def test_fast_flight_carries_the_wake_away(drone):
     found = [loads(frame, tables, (v, 0.0, 0.0))[0][0] for v in (0.0, 10.0, 20.0, 60.0)]
     assert np.all(np.diff(found) >= 0.0)
     assert found[-1] == pytest.approx(loads(frame, {"rotor_thrust": {}})[0][0])
+
+
+BOTH = {"rotor_thrust": {}, "coaxial_wash": {}}
+
+
+def test_slopes_are_those_of_the_plant(drone):
+    """Central differences of the plant's own loads over what each rotor would give by itself."""
+    frame = stacked(drone)
+    e, rotor = effects.from_scene(BOTH, frame)
+    slopes, k = e.slopes(), 1.225 * rotor.thrust_constant
+    alone, d = k * 300.0**2, 1e-4
+    for j in range(8):
+        shifted = [alone * (1.0 + sign * d * np.eye(8)[j]) for sign in (1.0, -1.0)]
+        more, less = (loads(frame, BOTH, speeds=tuple(np.sqrt(thrust / k))) for thrust in shifted)
+        thrust, torque = ((a - b) / (2.0 * d * alone) for a, b in zip(more, less, strict=True))
+        own = rotor.torque_constant / rotor.thrust_constant * np.eye(8)[j]
+        assert np.array(slopes.thrust)[:, j] == pytest.approx(thrust, abs=1e-7)
+        assert np.array(slopes.torque)[:, j] + own == pytest.approx(torque, abs=1e-8)
+
+
+def test_along_one_speed_of_all_rotors_the_slopes_give_the_loads_themselves(drone):
+    """Euler's theorem: loads are homogeneous in the squares of the speeds."""
+    e, _ = effects.from_scene(BOTH, stacked(drone))
+    slopes, t = e.slopes(), share(e.pitch, 1.0)
+    assert np.array(slopes.thrust).sum(axis=1) == pytest.approx([t, 1.0] * 4, rel=1e-12)
+    gained = e.flow * (t * through(e.pitch, t) - 1.0)
+    assert np.array(slopes.torque).sum(axis=1) == pytest.approx([gained, 0.0] * 4, rel=1e-12)
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), (9.0, 0.0, 2.0), (0.0, 4.0, -1.0)])
+def test_changes_are_what_the_plant_adds(drone, velocity):
+    frame = stacked(drone)
+    e, _ = effects.from_scene(BOTH, frame)
+    across, axial = math.hypot(*velocity[:2]), velocity[2]
+    with_wash, without = loads(frame, BOTH, velocity), loads(frame, {"rotor_thrust": {}}, velocity)
+    found = 1.225 * np.array(e.changes(300.0, axial, across)).T
+    assert found == pytest.approx(np.array(with_wash) - np.array(without), abs=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def test_lets_go_at_its_time_and_never_again(drone, situation, rotors):
     ("table", "message"),
     [
         ({"mass": 11.0}, r"effects.payload.mass: expected less than the vehicle's 10.0224 kg, got 11.0"),
-        ({"mass": -1.0}, r"effects.payload.mass: expected a number above 0, got -1.0"),
+        ({"mass": -1.0}, r"effects.payload.mass: expected a number above 0 \[kg\], got -1.0"),
         ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload: takes more inertia"),
     ],
 )

@@ -9,6 +9,7 @@ from dynamics import effects
 from dynamics.effects.rotor_inflow import rotor_inflow
 from dynamics.effects.rotor_thrust import rotor_thrust
 from dynamics.vehicles import multirotor
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
 
 def both(drone, s):
@@ -74,6 +75,6 @@ def test_the_damping_of_roll_is_the_slope_of_thrust_over_the_inertia(drone):
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=335.0, omega_body=(0.1, 0.0, 0.0))
     found = multirotor.observe(p, 0, 0.004, state, (32.0,) * 4).angular_acceleration_body[0] / -0.1
     inflow = p.effects[0]
-    slope = inflow.thrust_constant * multirotor.STANDARD_DENSITY * 335.0 * inflow.turn_per_metre  # [N s/m] of a rotor
+    slope = inflow.thrust_constant * STANDARD_DENSITY * 335.0 * inflow.turn_per_metre  # [N s/m] of a rotor
     assert found == pytest.approx(slope * sum(y * y for _, y, _ in drone.rotors.position) / drone.mass.inertia[0])
     assert found == pytest.approx(4.5, abs=0.2)

@@ -18,7 +18,7 @@ def test_the_delivery_drone_loads():
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("total = 10.0224", "total = -1.0", "mass.total: expected a number above 0, got -1.0"),
+        ("total = 10.0224", "total = -1.0", "mass.total: expected a number above 0 [kg], got -1.0"),
         (
             "total = 10.0224",
             "weight = 1.0",

@@ -14,6 +14,7 @@ from dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from dynamics.noise import stream_key
 from dynamics.vehicles import multirotor
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
@@ -21,7 +22,7 @@ KEY = stream_key(1, "drone1", "effects")
 BARE = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))
 G = 9.80665
 WEIGHT = DRONE.mass.total * G
-HOVER_SPEED = math.sqrt(WEIGHT / 4 / (BARE.effects[1].thrust_constant * multirotor.STANDARD_DENSITY))
+HOVER_SPEED = math.sqrt(WEIGHT / 4 / (BARE.effects[1].thrust_constant * STANDARD_DENSITY))
 HOVER_VOLTAGE = HOVER_SPEED / BARE.layout.speed_per_volt
 
 

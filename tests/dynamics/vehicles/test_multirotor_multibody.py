@@ -12,9 +12,10 @@ from dynamics.integrators import get
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import NO_ROTATION, exp
 from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor, multirotor_multibody
+from dynamics.vehicles import multirotor, multirotor_equations, multirotor_multibody
 from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor import MultirotorDrive
+from dynamics.vehicles.multirotor_equations import MultirotorDrive
+from dynamics.vehicles.multirotor_multibody_equations import joints
 
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
@@ -43,7 +44,7 @@ def reduced():
 
 @kernel
 def looked(p, x):
-    return multirotor.seen(p.layout, x)
+    return multirotor_equations.seen(p.layout, x)
 
 
 def fly(p, state, seconds, h):
@@ -94,7 +95,7 @@ def test_uneven_propellers_wobble_at_twice_their_speed():
 
 @kernel
 def hinges(p, state, volts):
-    return multirotor_multibody.joints(MultirotorDrive(p, p.body, state.memory, volts), 0.0, state.motion)
+    return joints(MultirotorDrive(p, p.body, state.memory, volts), 0.0, state.motion)
 
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])

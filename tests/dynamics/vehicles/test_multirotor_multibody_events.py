@@ -9,10 +9,17 @@ from dynamics import effects
 from dynamics.integrators import get
 from dynamics.kernel import kernel
 from dynamics.lie.quaternion import exp, rotation_matrix
-from dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
+from dynamics.vehicles import (
+    multirotor,
+    multirotor_equations,
+    multirotor_euler,
+    multirotor_multibody,
+    multirotor_multibody_equations,
+)
 from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor import MultirotorDrive
+from dynamics.vehicles.multirotor_equations import MultirotorDrive
 from dynamics.vehicles.multirotor_multibody import BECOMES
+from dynamics.vehicles.multirotor_multibody_equations import joints
 
 pytestmark = pytest.mark.long
 
@@ -32,12 +39,12 @@ def on_se3(x):
 
 @kernel
 def seen(p, x):
-    return multirotor.seen(p.layout, x)
+    return multirotor_equations.seen(p.layout, x)
 
 
 @kernel
 def struck(p, state, volts):
-    return multirotor_multibody.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+    return multirotor_multibody_equations.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
 
 
 @kernel
@@ -47,7 +54,7 @@ def euler_struck(p, state, volts):
 
 @kernel
 def hinges(p, x, volts):
-    return multirotor_multibody.joints(MultirotorDrive(p, p.body, (), volts), 0.0, x)
+    return joints(MultirotorDrive(p, p.body, (), volts), 0.0, x)
 
 
 def bodies(x):

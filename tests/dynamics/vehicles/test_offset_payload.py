@@ -187,7 +187,7 @@ def test_refused_in_a_scene(overrides, message):
     ("mass", "payload", "table", "message"),
     [
         ({"payload": 1.0}, {}, {}, "mass.payload: expected 0, got 1 beside a table"),
-        ({}, {"mass": -1.0}, {}, "payload.mass: expected a number above 0, got -1.0"),
+        ({}, {"mass": -1.0}, {}, "payload.mass: expected a number above 0 [kg], got -1.0"),
         ({}, {}, {"mass": 1.0}, "effects.payload.mass: stands beside the table airframe.payload; expected one of them"),
         ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload.size: stands beside the table airframe.payload"),
     ],

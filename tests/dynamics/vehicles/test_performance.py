@@ -11,6 +11,7 @@ from dynamics.atmosphere import Atmosphere, density
 from dynamics.lie.quaternion import exp
 from dynamics.vehicles import multirotor, performance
 from dynamics.vehicles.airframe import load_airframe
+from dynamics.vehicles.inflow import thrust_in_wake
 
 DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
 WEIGHT = DRONE.mass.total * 9.80665
@@ -115,3 +116,38 @@ def test_rotors_that_lean_past_one_another_carry_less():
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=t.rotor_speed)
     found = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 4)
     assert found.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def stacked(drone):
+    """Each rotor with a second one a decimetre above it, which turns the other way."""
+    r = drone.rotors
+    hubs = tuple((x, y, z) for x, y, _ in r.position for z in (0.0, 0.1))
+    spins = tuple(way for spin in r.spin_direction for way in (spin, "cw" if spin == "ccw" else "ccw"))
+    return drone.model_copy(update={"rotors": r.model_copy(update={"position": hubs, "spin_direction": spins})})
+
+
+@pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
+def test_the_trim_of_rotors_over_one_another_is_the_plants(speed):
+    """Under `coaxial_wash` the plant neither climbs nor sinks at the card's trim, and takes the card's current."""
+    frame = stacked(DRONE)
+    tables = {"gravity": {}, "rotor_thrust": {}, "rotor_inflow": {}, "body_drag": {}, "coaxial_wash": {}}
+    p = multirotor.parameters(frame, effects.from_scene(tables, frame))
+    t = performance.trim(frame, speed, rotor=performance.rotor_of(frame)._replace(drag=0.0))
+    state = multirotor.initial_state(p, (0.0, 0.0, 20.0), exp((0.0, t.tilt, 0.0)), t.rotor_speed, (speed, 0.0, 0.0))
+    found = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 8)
+    assert found.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert found.thrust[1] == pytest.approx(t.thrust)
+    assert t.current == pytest.approx(max(found.motor_current))
+
+
+def test_lower_rotors_cost_what_momentum_theory_says():
+    """Of four pairs, at the voltage at which four rotors by themselves reach their limit, the lower ones give 0.44."""
+    frame, rotor = stacked(DRONE), performance.rotor_of(stacked(DRONE))
+    lost = 1.0 - thrust_in_wake.py_func(rotor.wash.pitch, 1.0)
+    assert lost == pytest.approx(0.56, abs=0.01)
+    alone = performance.maximum_thrust(frame, rotor=rotor._replace(wash=None))
+    assert performance.maximum_thrust(frame) == pytest.approx((1.0 - 0.5 * lost) * alone, rel=1e-9)
+    assert performance.thrust_over_weight(frame) == pytest.approx(2.0 * 0.72 * 1.83, rel=0.01)
+    twice = frame.model_copy(update={"mass": frame.mass.model_copy(update={"total": 2.0 * DRONE.mass.total})})
+    assert performance.trim(twice).power > 1.2 * 2.0 * performance.trim(DRONE).power
+    assert performance.hover_time(twice) < 0.42 * performance.hover_time(DRONE)

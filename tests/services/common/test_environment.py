@@ -74,7 +74,10 @@ def test_a_recorded_scene_has_the_same_environment_without_its_files(tmp_path):
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ({"home": {"latitude_deg": 95.0}}, "home.latitude_deg: expected a number at least -90 and at most 90, got 95"),
+        (
+            {"home": {"latitude_deg": 95.0}},
+            "home.latitude_deg: expected a number at least -90 and at most 90 [deg], got 95",
+        ),
         ({"date": "2040-01-01"}, "date: expected a day of 2010 to 2029, or magnetic_field, got 2040-01-01, of which"),
         ({"date": "2025-02-30"}, "date: expected a day, as 2025-07-01, got 2025-02-30"),
         ({"gravity": -1.0}, "gravity: expected a number at least 0 and at most 30"),

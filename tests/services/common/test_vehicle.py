@@ -82,7 +82,7 @@ def test_the_mass_of_the_vehicle_is_that_of_its_airframe(overrides):
     ("scene", "overrides", "said"),
     [
         ("hover", ["vehicle.mas=9.5"], "--set vehicle.mas: unknown key 'mas'; did you mean mass?"),
-        ("hover", ["vehicle.mass=0"], "--set vehicle.mass: expected a number above 0, got 0"),
+        ("hover", ["vehicle.mass=0"], "--set vehicle.mass: expected a number above 0 [kg], got 0"),
         (
             "hover",
             ["vehicle.mass=9", "airframe.mass.total=8"],

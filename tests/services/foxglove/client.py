@@ -15,13 +15,14 @@ class Client:
 
     def __init__(self, port):
         self._socket = socket.create_connection(("127.0.0.1", port), timeout=30.0)
+        self._received = b""  # and not yet read
         key = base64.b64encode(os.urandom(16)).decode()
         lines = ["GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade"]
         lines += [f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Protocol: foxglove.sdk.v1"]
         self._socket.sendall("\r\n".join([*lines, "", ""]).encode())
-        answer = b""
-        while not answer.endswith(b"\r\n\r\n"):
-            answer += self._read(1)
+        while b"\r\n\r\n" not in self._received:
+            self._receive()
+        answer, _, self._received = self._received.partition(b"\r\n\r\n")
         assert b" 101 " in answer, answer
 
     def next(self):
@@ -79,13 +80,16 @@ class Client:
         return first & 0x0F, self._read(size)
 
     def _read(self, size):
-        data = b""
-        while len(data) < size:
-            part = self._socket.recv(size - len(data))
-            if not part:
-                raise EOFError
-            data += part
+        while len(self._received) < size:
+            self._receive()
+        data, self._received = self._received[:size], self._received[size:]
         return data
+
+    def _receive(self):
+        part = self._socket.recv(65536)
+        if not part:
+            raise EOFError
+        self._received += part
 
 
 def patient(port, process):

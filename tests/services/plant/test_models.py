@@ -133,7 +133,7 @@ WRONG = {
         "no direction, all zero",
     ),
     "no number": (SATELLITE, "gyrostat.damping=nan", "gyrostat.damping: expected a finite number, got nan"),
-    "a step below zero": (OS4, "solver.step=-0.001", "solver.step: expected a number at least 1e-09, got -0.001"),
+    "a step below zero": (OS4, "solver.step=-0.001", "solver.step: expected a number at least 1e-09 [s], got -0.001"),
     "a direction of nothing": (
         LOAD,
         "formation.link_direction=[[0, 0, 0], [1, 0, 0]]",

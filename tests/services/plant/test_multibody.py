@@ -105,7 +105,7 @@ WRONG = {
     "an event before the start": (
         [FLOWN],
         f"multibody.event=[{event(-1.0, 1, 'free')}]",
-        "multibody.event.0.time: expected a number at least 0, got -1",
+        "multibody.event.0.time: expected a number at least 0 [s], got -1",
     ),
     "an unknown fate": (
         [FLOWN],

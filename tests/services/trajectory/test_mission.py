@@ -128,10 +128,13 @@ def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
             "trajectory.phase.0.z=3.0",
             "trajectory.phase.0.z: expected a table with a kind of segment (chirp, hold, mini",
         ),
-        ("trajectory.phase.0.z={kind='hold', duration=-1}", "phase.0.z.duration: expected a number above 0, got -1"),
+        (
+            "trajectory.phase.0.z={kind='hold', duration=-1}",
+            "phase.0.z.duration: expected a number above 0 [s], got -1",
+        ),
         (
             "trajectory.phase.0.z=[{kind='hold', duration=-1}]",
-            "phase.0.z.0.duration: expected a number above 0, got -1",
+            "phase.0.z.0.duration: expected a number above 0 [s], got -1",
         ),
         ("trajectory.phase.0.z={kind='ramp', to=1.0}", "either rate or duration"),
         ("trajectory.phase.0.q=1.0", "trajectory.phase.0.q"),

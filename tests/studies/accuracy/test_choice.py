@@ -68,6 +68,18 @@ def test_it_is_measured_once_for_the_same_physics(measured, tmp_path):
     assert len(measured) == 2
 
 
+def test_a_damaged_cache_and_one_that_cannot_be_written_are_no_obstacle(measured, monkeypatch, tmp_path):
+    path = scene(tmp_path, "accuracy = 1e-4")
+    first = choice.overrides(load(path), lambda text: None)
+    (kept,) = (tmp_path / "cache" / "accuracy").glob("*.json")
+    for damage in (b"\xff", b"[{}]", b"[1", b"7", b"[]"):
+        kept.write_bytes(damage)
+        assert choice.overrides(load(path), lambda text: None) == first
+    assert len(measured) == 6
+    monkeypatch.setattr(choice, "cache_folder", lambda: Path("/dev/null/none"))
+    assert choice.overrides(load(path), lambda text: None) == first
+
+
 def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
     path = scene(tmp_path, "accuracy = 1e-12")
     with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: 1e-12: no method meets .* 1e-07, by rkmk4"):

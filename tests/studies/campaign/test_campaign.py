@@ -130,7 +130,7 @@ def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
     found = Results(read(tmp_path / "c"))
     assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
     assert f"{len(found)} timed out, {len(found.refused['run'])} refused" in said
-    assert "vehicle.mass: expected a number above 0, got -1.0" in found.refused["told"][0]
+    assert "vehicle.mass: expected a number above 0 [kg], got -1.0" in found.refused["told"][0]
     assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
 
 

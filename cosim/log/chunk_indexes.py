@@ -1,0 +1,50 @@
+"""Where a log's chunks are, kept for its end: as bytes, in a file without a name where they are many."""
+
+from pathlib import Path
+from tempfile import SpooledTemporaryFile
+from typing import NamedTuple
+
+IN_MEMORY = 1 << 16  # [bytes]: some 170 chunks and as many wall times
+
+
+class Extent(NamedTuple):
+    """How many chunks count, the bytes of their records, and the times of the first and last message."""
+
+    chunks: int = 0
+    size: int = 0  # [bytes]
+    start_ns: int | None = None
+    end_ns: int = 0
+
+
+class ChunkIndexes:
+    """Encoded records of kind CHUNK_INDEX. A flight of days has hundreds of thousands, as objects 2 kB each.
+
+    Attributes:
+        extent: what counts; set it to an earlier one to take back what was added since.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """None as yet; those that memory is too small for go into `folder`, the log's: it has the room for them."""
+        self.extent = Extent()
+        self._file = SpooledTemporaryFile(IN_MEMORY, dir=str(folder), prefix="lapwing-")  # noqa: SIM115 (closed in close)
+
+    def add(self, record: bytes, start_ns: int, end_ns: int) -> None:
+        """Keep the index of a chunk with messages of these times [ns].
+
+        Raises:
+            OSError: it cannot be written; it does not count then.
+        """
+        chunks, size, first_ns, last_ns = self.extent
+        self._file.seek(size)
+        self._file.write(record)
+        first_ns = start_ns if first_ns is None else min(first_ns, start_ns)
+        self.extent = Extent(chunks + 1, size + len(record), first_ns, max(last_ns, end_ns))
+
+    def records(self) -> bytes:
+        """All that count, in order. Raises OSError where they cannot be read."""
+        self._file.seek(0)
+        return self._file.read(self.extent.size)
+
+    def close(self) -> None:
+        """Forget them."""
+        self._file.close()

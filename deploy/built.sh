@@ -1,0 +1,15 @@
+#!/bin/sh
+# Build step of the Dockerfile: all that images have besides packages, to /image: sources, command, kernels.
+set -eu
+
+mkdir -p /image/app/recordings /image/opt/lapwing /image/var/cache
+cp -rp /app/. /image/app/
+chmod 777 /image/app/recordings
+
+pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing \
+    --no-deps --no-build-isolation --no-index --no-cache-dir --no-warn-script-location --editable /app
+cp /build/entrypoint.sh /image/opt/lapwing/bin/
+
+cp -rp /image/opt/lapwing/. /opt/lapwing/
+python /build/warm.py
+cp -rp "$LAPWING_CACHE" /image/var/cache/

@@ -1,0 +1,26 @@
+"""A process whose launcher is gone ends by itself, also while it is busy, and leaves no folder."""
+
+import subprocess
+import sys
+
+BUSY = """
+import sys, time
+from types import SimpleNamespace
+from cosim import process
+process.ORPHANED = 0.1
+process.Process.end_with_parent(SimpleNamespace(), sys.argv[1])
+print("busy", flush=True)
+time.sleep(600.0)
+"""
+
+
+def test_one_that_goes_on_is_ended(tmp_path):
+    folder = tmp_path / "sockets"
+    folder.mkdir()
+    command = [sys.executable, "-c", BUSY, f"unixsock-stream/{folder}/plant"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as busy:
+        assert busy.stdout.readline() == b"busy\n"
+        assert busy.poll() is None
+        busy.stdin.close()
+        assert busy.wait(60.0) == 1
+    assert not folder.exists()

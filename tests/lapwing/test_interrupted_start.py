@@ -1,0 +1,44 @@
+"""Ctrl-C while the command still imports: one line and exit code 130, from its first statement on."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+STRIKE = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may have it ignored
+struck = []
+def strike(event, arguments):
+    if event == "import" and arguments[0] == "MODULE" and not struck:
+        struck.append(True)
+        os.kill(os.getpid(), signal.NUMBER)
+sys.addaudithook(strike)
+sys.argv = ["lapwing", "--version"]
+from lapwing.cli.start import main
+main()
+"""
+
+
+def struck(module, number, said=subprocess.PIPE):
+    """The command, which gets a signal as it is about to import `module`."""
+    code = textwrap.dedent(STRIKE).replace("MODULE", module).replace("NUMBER", number.name)
+    return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=said, text=True, check=False)
+
+
+@pytest.mark.parametrize("module", ["cosim.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.studies"])
+def test_ctrl_c_at_an_import(module):
+    done = struck(module, signal.SIGINT)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
+
+
+def test_termination_at_an_import():
+    done = struck("typer", signal.SIGTERM)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
+
+
+def test_the_exit_code_is_the_same_where_nothing_can_be_said():
+    with open("/dev/full", "w") as full:
+        assert struck("typer", signal.SIGINT, full).returncode == 130

@@ -1,0 +1,114 @@
+"""Rotors over one another under `coaxial_wash`: what the autopilot takes them for is what the plant does."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from dynamics import effects
+from dynamics.kernel import uncompiled
+from dynamics.vehicles import multirotor
+from dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from services.autopilot import law
+from services.autopilot.allocation import demand_effects
+from services.autopilot.known_airframe import known_airframe
+from services.autopilot.motor import thrust_at
+from services.common.vehicle import Effects, airframe
+from services.table import load, resolve
+from studies.performance import card
+from studies.tune import corners
+from studies.tune.linearise import hover
+
+DRONE = load("hover").lookup("airframe")
+ARMS = [tuple(place[:2]) for place in DRONE.rotors.position]
+SPINS = [spin for ccw in (True, False, True, False) for spin in (("ccw", "cw") if ccw else ("cw", "ccw"))]
+X8 = {
+    "airframe.mass.total": 12.0, "airframe.mass.payload": 0.0, "airframe.mass.inertia": [0.54, 0.52, 0.84],
+    "airframe.rotors.position": [[*arm, z] for arm in ARMS for z in (0.0, 0.1)],
+    "airframe.rotors.spin_direction": SPINS,
+    "effects.coaxial_wash": {},
+}  # fmt: skip
+
+
+def wrench(scene, thrust):
+    """(force along body z [N], torque [N m]) of the plant at rest in the air, of thrusts that each would have alone."""
+    known, frame = known_airframe(scene), airframe(scene)
+    tables = {name: table for name, table in scene[Effects].tables.items() if name in ("rotor_thrust", "coaxial_wash")}
+    p = multirotor.parameters(frame, effects.from_scene(tables, frame))
+    state = multirotor.initial_state(p, (0.0, 0.0, 50.0))
+    speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / known.motor.thrust_coefficient)))
+    motion = state.motion._replace(rotor_speed=speeds)
+    drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * len(speeds))
+    _, _, force, torque = uncompiled(evaluate)(drive, 0.0, motion)
+    return np.array([force[2], *torque])
+
+
+def test_the_autopilot_knows_the_slopes_of_the_plants_force_and_torques():
+    scene = load("hover", X8)
+    found = law.rotor_effectiveness(known_airframe(scene))
+    for k, column in enumerate(found.T):
+        step = 1e-3 * np.eye(8)[k]
+        assert column == pytest.approx((wrench(scene, 12.0 + step) - wrench(scene, 12.0 - step)) / 2e-3, abs=1e-7)
+
+
+def test_hover_is_balanced_at_one_speed_of_all_rotors():
+    """The thrust of hovering that is fed forward carries the weight in the plant, which took 1.39 times as much."""
+    scene = load("hover", X8)
+    known = known_airframe(scene)
+    assert [share[0] for share in law.shares(known)[0]] == pytest.approx([1.0] * 8)
+    force, *torque = wrench(scene, [law.hover_thrust(known)] * 8)
+    assert force == pytest.approx(known.mass * known.gravity, rel=1e-12)
+    assert torque == pytest.approx([0.0] * 3, abs=1e-9)
+    without = {key: value for key, value in X8.items() if key != "effects.coaxial_wash"}
+    alone = law.hover_thrust(known_airframe(load("hover", without)))
+    assert law.hover_thrust(known) / alone == pytest.approx(1.39, abs=0.01)
+
+
+def test_demands_act_on_their_own_axis_alone():
+    known = known_airframe(load("hover", X8))
+    B, shares = law.rotor_effectiveness(known), np.array(law.shares(known)[0])
+    assert B @ shares == pytest.approx(np.diag(demand_effects(B)), abs=1e-12)
+
+
+def test_which_of_two_rotors_over_one_another_has_failed_is_not_guessed():
+    assert len(law.shares(known_airframe(load("hover", X8)))) == 1
+
+
+def test_a_vehicle_that_only_the_lost_thrust_would_carry_is_refused():
+    heavy = {**X8, "airframe.mass.total": 30.0}
+    assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_wash"}))
+    with pytest.raises(ValueError, match=r"the rotors give at most .* less than the .* that hovering needs"):
+        resolve(load("hover", heavy))
+
+
+def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
+    """But for the voltage that the motors' resistance takes, which the autopilot leaves to its loops."""
+    table = "\n".join(f"{key.removeprefix('airframe.')} = {json.dumps(X8[key])}" for key in X8 if "airframe" in key)
+    scene = tmp_path / "x8.toml"
+    text = load("hover").path.read_text()
+    scene.write_text(f"{text}\n[effects.coaxial_wash]\n[airframe]\n{table}\n")
+    known = known_airframe(load(scene))
+    assert known == known_airframe(load("hover", X8))
+    ideal = uncompiled(thrust_at)(known.motor, known.voltage_max) / law.hover_thrust(known)
+    computed = {row.name: row.computed for row in card(scene)}["thrust over weight"]
+    assert 0.85 * ideal < computed < ideal
+
+
+def test_the_tuner_sees_the_plant_that_the_autopilot_is_told_of():
+    scene = load("hover", X8)
+    found, known = hover(scene), known_airframe(scene)
+    assert found.rotor_speed == pytest.approx(
+        math.sqrt(law.hover_thrust(known) / known.motor.thrust_coefficient), rel=1e-3
+    )
+    assert found.altitude == pytest.approx(law.lift(known) / known.mass, rel=1e-3)
+    moments = law.moments(known)
+    for axis, k in (("roll", 0), ("pitch", 1), ("yaw", 2)):
+        assert getattr(found, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
+    assert found.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)
+
+
+def test_a_corner_of_the_tuner_has_more_thrust_of_every_rotor():
+    active = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, airframe(load("hover", X8)))
+    wash, rotor = (corners._stronger(e, 1.2) for e in active)
+    assert wash.thrust_constant == rotor.thrust_constant == pytest.approx(1.2 * active[1].thrust_constant)

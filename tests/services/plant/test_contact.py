@@ -1,0 +1,83 @@
+"""Forces on the single feet: Newton's second law on what the same flight tells of itself, and standing still."""
+
+import numpy as np
+import pytest
+
+import lapwing
+from cosim.scene import SceneError
+from services.table import load, resolve
+
+G = 9.80665
+ASKED = {"rates.contact": 250}
+STANDING = {"autopilot.operator": True, "autopilot.trajectory": False, "run.duration": 1.0, **ASKED}  # nobody arms it
+
+
+def up_of_body(orientation):
+    """Body z in world coordinates, shape (n, 3), of quaternions x, y, z, w."""
+    x, y, z, w = orientation.T
+    return np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def missing(flight):
+    """What thrust, weight and the forces on the feet leave of mass times acceleration [N], shape (n, 3)."""
+    truth, told, mass = flight.truth, flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    assert np.array_equal(told.times, truth.times)
+    thrust = truth.rotor_thrust.sum(axis=1)[:, None] * up_of_body(truth.orientation)
+    weight = np.array([0.0, 0.0, -mass * G])
+    return mass * truth.acceleration - thrust - weight - told.force.sum(axis=1)
+
+
+@pytest.mark.parametrize("friction", ["anchor", "smooth"])
+def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_to_rest(friction):
+    """Bounces of the landing included, in which the ground does more than carry the weight."""
+    flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})
+    force = flight.topic("contact").force
+    assert abs(missing(flight)).max() < 1e-6
+    assert np.ptp(force[:, :, 2].sum(axis=1)) > 50.0
+    airborne = ~flight.truth.ground_contact
+    assert airborne.any()
+    assert not force[airborne].any()
+
+
+def test_standing_still_they_are_the_weight_a_quarter_on_each_foot():
+    flight = lapwing.fly("hover", STANDING)
+    told, mass = flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    feet = len(flight.origin.scene["airframe"]["contact"]["feet"])
+    still = told.force[25:225]
+    assert still.sum(axis=1) == pytest.approx(np.tile([0.0, 0.0, mass * G], (200, 1)), abs=1e-6)
+    assert still[:, :feet, 2] == pytest.approx(mass * G / feet, rel=1e-6)
+    assert not still[:, feet:].any()  # the hull is in the air
+    assert told.position[100, :feet, 2] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_on_a_slope_friction_and_normal_forces_make_the_weight():
+    flight = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.2, 0.0]})
+    told, mass = flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    assert told.force[100].sum(axis=0) == pytest.approx([0.0, 0.0, mass * G], abs=1e-3)
+    lower, upper = told.force[100, [1, 2], 2].sum(), told.force[100, [0, 3], 2].sum()
+    assert lower > 1.05 * upper  # the centre of mass is over the lower feet
+
+
+@pytest.mark.parametrize("model", ["multibody", "slung_load"])
+def test_of_vehicles_of_several_bodies_too(model):
+    scene = {"multibody": "hover", "slung_load": "slung_load"}[model]
+    flight = lapwing.fly(scene, {**STANDING, "vehicle.model": model, "run.duration": 0.2})
+    mass = flight.origin.scene["airframe"]["mass"]["total"]
+    assert flight.topic("contact").force[10].sum(axis=0)[2] == pytest.approx(mass * G, rel=1e-3)
+
+
+def test_a_scene_that_does_not_ask_tells_nothing_of_them_and_one_that_does_flies_the_same():
+    asked, plain = lapwing.fly("hover", ASKED), lapwing.fly("hover")
+    assert not plain.has("contact")
+    assert np.array_equal(asked.truth.position, plain.truth.position)
+
+
+@pytest.mark.parametrize("scene", ["gyrostat_chaotic", "cooperative_load", "os4_motors"])
+def test_where_nothing_touches_the_ground_they_cannot_be_asked_for(scene):
+    with pytest.raises(SceneError, match=r"rates.contact: no effect of the scene tells of forces on feet; expected a"):
+        resolve(load(scene, {"rates.contact": 50}))
+
+
+def test_their_rate_divides_the_exchange_rate():
+    with pytest.raises(SceneError, match=r"rates.contact: expected a rate that divides exchange.rate"):
+        load("hover", {"rates.contact": 70})
