@@ -140,7 +140,7 @@ def stamp_columns(times_ns: np.ndarray, field: str = "header.stamp") -> dict[str
         field: name of the field: "clock", "transforms.0.header.stamp".
     """
     times_ns = np.asarray(times_ns, np.int64)
-    seconds = times_ns // _SECOND  # a sixth of what divmod takes
+    seconds = times_ns // _SECOND  # a third of what divmod takes
     return {f"{field}.sec": seconds, f"{field}.nanosec": times_ns - _SECOND * seconds}
 
 

@@ -138,12 +138,15 @@ class Container:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        record = encoded(chunk)
-        offset, length = self._offset, len(record)
+        records = [encoded(chunk)]
+        offset = end = self._offset
+        length = len(records[0])
         places: dict[int, int] = {}
         for each in messages.indexes:
-            places[each.channel_id] = offset + len(record)
-            record += each.record(len(head))
+            end += len(records[-1])
+            places[each.channel_id] = end
+            records.append(each.record(len(head)))
+        record = b"".join(records)
         index = ChunkIndex(
             chunk_start_offset=offset,
             chunk_length=length,

@@ -90,7 +90,7 @@ def _tables(text: str) -> dict[str, Any]:
 
 
 def copied(value: Any) -> Any:
-    """A copy of tables and lists, of what is in them too; an eighth of what `copy.deepcopy` takes."""
+    """A copy of tables and lists, and of those in them, in a third of what `copy.deepcopy` takes."""
     if isinstance(value, dict):
         return {key: copied(item) for key, item in value.items()}
     return [copied(item) for item in value] if isinstance(value, list) else value

@@ -405,3 +405,24 @@ def test_a_text_that_is_read_again_gives_tables_of_its_own(tmp_path):
     first = parse_toml("x = { y = [1] }", path)
     first["x"]["y"].append(2)
     assert parse_toml("x = { y = [1] }", path) == {"x": {"y": [1]}}
+
+
+def test_what_was_found_in_other_tables_stays_where_one_is_replaced():
+    asked = []
+
+    def name(scene):
+        asked.append("name")
+        return scene[Vehicle].name
+
+    def title(scene):
+        asked.append("title")
+        return f"{scene.once(name)} of {scene[Run].title}"
+
+    scene = load("hover")
+    assert scene.once(title) == scene.once(title) == f"drone1 of {scene[Run].title}"
+    retitled = scene.replaced(scene[Run].model_copy(update={"title": "another"}))
+    assert retitled.once(title) == "drone1 of another"
+    assert asked == ["title", "name", "title"]
+    renamed = retitled.replaced(scene[Vehicle].model_copy(update={"name": "scout"}))
+    assert renamed.once(title) == "scout of another"
+    assert asked[3:] == ["title", "name"]
