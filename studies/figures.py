@@ -11,9 +11,9 @@ from cosim.scene import Scene
 from dynamics.kernel import kernel
 from services.common.success import Success
 from studies.flight import Flight
-from studies.saturation import saturation
+from studies.saturation import limits, saturation
 from studies.touches import touches
-from studies.tracking import AXES, plain, strided
+from studies.tracking import AXES, Reference, errors, plain, strided, total, tracking
 
 SURE = 3.0  # standard deviations of its own that the estimate is given
 
@@ -68,6 +68,16 @@ def figures(flight: Flight) -> dict[str, Any]:
     found |= {f"rmse.{axis}": value for axis, value in tracked.rmse.items()}
     found |= {"max_distance": tracked.distance, "overshoot": max(0.0, tracked.beyond)}
     return found | _of_estimate(flight, armed)
+
+
+def compile_ahead() -> None:
+    """Compile what figures are made by, which is the same for every flight."""
+    rows, armed = np.zeros((2, 4)), np.ones(2, bool)  # of a single row numpy does not say how it lies
+    errors(np.zeros((2, 6)), rows, rows, armed)
+    tracking(Reference(rows, rows, rows[:, 0]), rows, rows, armed)
+    total(rows)
+    limits(rows, armed, 1.0)
+    _inside(strided(rows), strided(rows), strided(rows), plain(armed, bool))
 
 
 def _tilt(cosine: float) -> float:

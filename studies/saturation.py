@@ -49,9 +49,14 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
     voltage, t = truth.motor_voltage[:n], truth.times[:n]
     flying = armed & ~truth.ground_contact[:n]
     step = np.diff(t, append=t[-1]) if n else np.empty(0)
+    return Saturation(*limits(voltage, flying, highest), step, flying)
+
+
+def limits(voltage: np.ndarray, flying: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where motors are at 0, and where at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
     low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
     _limits(low, high, strided(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
-    return Saturation(low, high, step, flying)
+    return low, high
 
 
 @kernel

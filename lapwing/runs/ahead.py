@@ -13,6 +13,7 @@ from cosim.setup import Setup
 from cosim.single import PAGE
 from lapwing.runs.compiling import guessed, notice, told
 from services.processes import create_all
+from studies import figures
 
 NEARLY = 0.97  # of a scene's guess, where the bar waits
 
@@ -49,5 +50,6 @@ def compile_ahead(setups: Mapping[str, Setup], console: Console) -> None:
             started = time.perf_counter()
             with told(setup, say):
                 Graph(setup, create_all(setup), PAGE).advance(1)  # what steps the parts is compiled, too
+                figures.compile_ahead()
             done += guess
             console.print(f"{name}: ready after {time.perf_counter() - started:.1f} s", soft_wrap=True)
