@@ -20,7 +20,7 @@ from numba.extending import intrinsic
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._types import AnyMassProperties, PerRotor
 from dynamics.generate import define, each_index, implements
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import kernel, leaf, vectorised
 from dynamics.rows import construction, leaves, to_row, width
 from dynamics.vehicles import multirotor_steps
 from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
@@ -55,7 +55,7 @@ def put(memory: np.ndarray, index: int, value: Member) -> None:
     memory[index // WIDTH, :, index % WIDTH] = to_row(value)
 
 
-@kernel
+@vectorised
 def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count):
     """Advance the members of the blocks `first` to before `last` by `count` exchange intervals.
 

@@ -55,6 +55,15 @@ def apart(function: F) -> F:
     return _compile(function, forceinline=False)
 
 
+def vectorised(function: F) -> F:
+    """The same for a kernel with a loop over members side by side, which LLVM is to vectorise.
+
+    Loops that call functions look small until those are inlined; unrolled by then, they cannot be vectorised.
+    """
+    function.__vectorised__ = True  # type: ignore[attr-defined]
+    return _compile(function)
+
+
 def leaf(function: F) -> F:
     """The same for small functions that are always inlined into their caller."""
     return _compile(function, forceinline=True)

@@ -16,7 +16,13 @@ FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._disp
 
 
 class KernelLibrary(JITCodeLibrary):
-    """Code of a kernel, to which the functions apart that it reaches are linked only when all else is optimised."""
+    """Code of a kernel, to which the functions apart that it reaches are linked only when all else is optimised.
+
+    Attributes:
+        vectorises: whether its loops are left as they are until what they call is inlined.
+    """
+
+    vectorises = False
 
     def __init__(self, codegen: Any, name: str):
         super().__init__(codegen, name)
@@ -44,19 +50,23 @@ class KernelLibrary(JITCodeLibrary):
         super().finalize()
 
     def _optimize_functions(self, module: Any) -> None:
-        """As numba does, but for functions that are declared only, on which it spends most of its time, and for loops.
-
-        Unrolled before what they call is inlined, when they look small, they could no longer be vectorised.
-        """
+        """As numba does, which makes a pass manager for each function that is declared only, too: most of its time."""
         module.data_layout = self._codegen._data_layout
-        options = binding.create_pipeline_tuning_options(config.OPT)  # type: ignore[attr-defined]
-        options.loop_unrolling = options.loop_vectorization = options.slp_vectorization = False
         for function in module.functions:
             if not function.is_declaration:
-                builder = binding.create_pass_builder(self._codegen._tm, options)
-                manager = builder.getFunctionPassManager()
-                manager.add_refprune_pass()
+                manager, builder = self._function_passes()
                 manager.run(function, builder)
+
+    def _function_passes(self) -> Any:
+        """A pass manager and its builder."""
+        if not self.vectorises:
+            return self._codegen._function_pass_manager()
+        options = binding.create_pipeline_tuning_options(config.OPT)  # type: ignore[attr-defined]
+        options.loop_unrolling = options.loop_vectorization = options.slp_vectorization = False
+        builder = binding.create_pass_builder(self._codegen._tm, options)
+        manager = builder.getFunctionPassManager()
+        manager.add_refprune_pass()
+        return manager, builder
 
     def _finalize_final_module(self) -> None:
         for library in reversed(self._apart.values()):  # callers first: of a module only what is called is linked

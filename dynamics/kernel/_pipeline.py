@@ -106,6 +106,7 @@ class KernelLowering(NativeLowering):
         """Lower the function of `state`."""
         if state.library is None:
             state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.vectorises = hasattr(state.func_id.func, "__vectorised__")
             state.library.enable_object_caching()
         return super().run_pass(state)
 
