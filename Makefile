@@ -29,8 +29,8 @@ $(VENV)/.clients: $(VENV)/.installed
 	-$(INSTALL) --no-deps --target $(VENV)/ros2-sdk "zenoh-ros2-sdk>=0.1.8"
 	touch $@
 
-# One worker more than cores: tests wait for a third of their time.
-WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+# Two workers more than cores: tests wait for a third of their time.
+WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 20 --durations-min 1
 
 test: $(VENV)/.clients

@@ -8,7 +8,8 @@ row costs as much as the numbers that are used of it.
 # numba.core.types fills itself at import
 # mypy: disable-error-code="attr-defined"
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -53,20 +54,18 @@ def from_row(like: Any, row: np.ndarray) -> Any:
 
 def columns(like: Any, rows: np.ndarray) -> Any:
     """The tree of columns of `rows` (n, width): a number becomes (n,), a flat tuple of numbers (n, k)."""
-    first = 0
+    return _columns(like, rows, iter(range(rows.shape[1])))
 
-    def walk(part: Any) -> Any:
-        nonlocal first
-        if not isinstance(part, tuple):
-            first += 1
-            return rows[:, first - 1]
-        if not any(isinstance(item, tuple) for item in part) and (not hasattr(part, "_fields") or _alike(part)):
-            first += len(part)
-            return rows[:, first - len(part) : first]
-        items = [walk(item) for item in part]
-        return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
 
-    return walk(like)
+def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
+    """Those of a part of the tree from the next column on; no inner function, whose cycle would keep the rows."""
+    if not isinstance(part, tuple):
+        return rows[:, next(left)]
+    if not any(isinstance(item, tuple) for item in part) and (not hasattr(part, "_fields") or _alike(part)):
+        taken = list(islice(left, len(part)))
+        return rows[:, taken[0] : taken[0] + len(taken)] if taken else rows[:, :0]
+    items = [_columns(item, rows, left) for item in part]
+    return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
 
 
 def _alike(part: tuple) -> bool:

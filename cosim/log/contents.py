@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import zstandard
+from lz4.frame import LZ4FrameDecompressor
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -89,6 +90,7 @@ class Contents:
         try:
             chunk = records.Chunk.read(ReadDataStream(self._file))
             _check_size(chunk)
+            _unpack_lz4(chunk)
             stream, size = get_chunk_data_stream(chunk, validate_crc=True)
             data = stream.read(size)
             return self._messages(data, size, channels)
@@ -178,3 +180,18 @@ def _check_size(chunk: records.Chunk) -> None:
         size = max(size, zstandard.frame_content_size(chunk.data))  # -1: not told
     if size > LARGEST:
         raise ValueError(f"{size} bytes, expected at most {LARGEST}")
+
+
+def _unpack_lz4(chunk: records.Chunk) -> None:
+    """Unpack a chunk of this kind here: mcap's reader has no limit for it, and what is packed does not tell its size.
+
+    Raises:
+        ValueError: it is larger than `LARGEST`, or cut short.
+    """
+    if chunk.compression != "lz4":
+        return
+    unpacking = LZ4FrameDecompressor()
+    data = unpacking.decompress(chunk.data, max_length=LARGEST)
+    if not unpacking.eof:
+        raise ValueError(f"cut short, or larger than {LARGEST} bytes")
+    chunk.compression, chunk.data = "", data

@@ -12,8 +12,6 @@ FAILSAFES = (
     POSITION_LOST, MOTOR_FAILED, BATTERY_EMPTY, BATTERY_CRITICAL, BATTERY_LOW, LINK_LOST, SETPOINTS_LOST, FENCE_LEFT,
 )  # fmt: skip
 """Why a failsafe takes over; an event's number for one is its place here."""
-ACTIONS = ("hold", "return", "land", "descend", "altitude_control")
-"""Modes that a failsafe takes over with; the last one is that of sticks in somebody's hands."""
 
 NOT_STARTED = "the estimator has not started"
 NO_READINGS = "no good readings of the {}"  # and the source's name
@@ -28,12 +26,5 @@ AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "nobody took
 """Why it was disarmed."""
 TAKEN_OVER = "{}: {}"  # why, and in which mode
 
-TOLD_BY_STATUS = frozenset(
-    (
-        ARMED,
-        LANDED,
-        *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)],
-        *[TAKEN_OVER.format(reason, mode) for reason in FAILSAFES for mode in ACTIONS],
-    )
-)
-"""Texts that say no more than a change of the status does."""
+ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
+"""Texts of what happens in every flight."""

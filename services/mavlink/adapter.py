@@ -58,6 +58,7 @@ class Adapter:
         self.missions = MissionStore(
             self.clock, self.commands, lambda: self.vehicle.datum, flavour.HOME_FIRST, self.counts
         )
+        self.vehicle.mission = lambda: self.missions.held[mavlink.MAV_MISSION_TYPE_MISSION]
         self.parameters = ParameterStore(description, flavour, self.commands, self.broadcast, self.counts)
         self.sessions: dict[Endpoint, Session] = {}
         self.signature = Signature(key) if key else None

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from services.common.spoken import TOLD_BY_STATUS
+from services.common.spoken import ROUTINE, TAKEN_OVER
 from services.mavlink.dialect import id_of, mavlink
 from services.mavlink.events import Definition, watches
 from services.mavlink.telemetry import streams
@@ -24,6 +24,7 @@ class Announcements:
         self._item = (0, 0)
         self._reached = NO_ITEM
         self._texts = 0
+        self._told = ""  # the text of a failsafe that an event has told
         self._watches = watches() if vehicle.flavour.EVENTS else []
 
     def step(self) -> None:
@@ -31,6 +32,7 @@ class Announcements:
         s = self._vehicle.status
         if (mode := (s.mode, s.armed, s.failsafe)) != self._mode:
             self._mode = mode
+            self._told = TAKEN_OVER.format(s.text, s.mode) if s.failsafe else ""
             self._send("HEARTBEAT")
             self._send("EXTENDED_SYS_STATE")
         if (home := self._vehicle.home_world) != self._home:
@@ -46,7 +48,7 @@ class Announcements:
             for definition, values in watch.step(self._vehicle):
                 self._announce_event(definition, values)
 
-    def _announce_event(self, definition: Definition, values: Sequence[float]) -> None:
+    def _announce_event(self, definition: Definition, values: Sequence[int]) -> None:
         log, time_ms = self._vehicle.events, self._vehicle.boot_ms
         for message in log.add(definition.id, definition.level, definition.encode(values), time_ms):
             self._broadcast(message)
@@ -64,10 +66,12 @@ class Announcements:
 
         One that an event tells, too, ends with a tab, as PX4's do: ground stations that read events do not show it.
         """
-        if self._watches and text in TOLD_BY_STATUS:
-            text += "\t"
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
+        if text in ROUTINE:
+            severity = mavlink.MAV_SEVERITY_INFO
+        if self._watches and (text in ROUTINE or text == self._told):
+            text, self._told = f"{text}\t", ""
         self._texts = self._texts % 0xFFFF + 1
         for message in statustext(severity, text, self._texts):
             self._broadcast(message)

@@ -8,6 +8,7 @@ from services.mavlink.dialect import message_class
 
 KEPT = 100  # events that can be sent again
 ROUND = 1 << 16  # sequence numbers begin again after so many
+ARGUMENTS = 40  # [bytes] of a message
 ALL = 0  # destination of an event for everybody
 RESET = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET: the numbers have begun anew
 UNAVAILABLE = 0  # MAV_EVENT_ERROR_REASON_UNAVAILABLE
@@ -35,7 +36,7 @@ class EventLog:
         """
         begins = [] if self._kept else [self.current()]
         self.sequence = (self.sequence + 1) % ROUND
-        padded = list(arguments.ljust(40, b"\0"))
+        padded = list(arguments.ljust(ARGUMENTS, b"\0"))
         message = message_class("EVENT")(ALL, ALL, number, time_ms, self.sequence, level << 4 | level, padded)
         self._kept.append((self.sequence, message))
         return [*begins, message]

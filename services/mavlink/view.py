@@ -1,5 +1,6 @@
 """The newest state of the vehicle: every message that it publishes, decoded when somebody asks."""
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -56,11 +57,12 @@ class VehicleView:
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()
-        self.stations = 0  # that have been met
+        self.reports_asked = 0  # of what hinders arming, by stations; one that is new asks, too
         latitude, longitude, height = description.home
         # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height
         self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
+        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # the items that it holds, as endpoints wrote them
         self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}

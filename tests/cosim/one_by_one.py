@@ -8,6 +8,7 @@ from messages import (
     BatteryState,
     BodyStates,
     Clock,
+    ContactForces,
     Estimate,
     FluidPressure,
     Imu,
@@ -118,6 +119,11 @@ def bodies(given, time_ns, x):
             for vectors in (x.velocity_world, x.omega_body, x.force_world, x.torque_body)
         ],
     )
+
+
+def contact(given, time_ns, x):
+    places, forces = tuple(Point(*p) for p in x.position_world), tuple(Vector3(*f) for f in x.force_world)
+    return ContactForces(header(time_ns, "world"), places, forces)
 
 
 def imu(given, time_ns, r):
@@ -251,6 +257,7 @@ BUILDERS = {
     topics.CLOCK: clock,
     topics.BATTERY: battery,
     topics.BODIES: bodies,
+    topics.CONTACT: contact,
     topics.IMU: imu,
     topics.MAG: magnetometer,
     topics.GPS: gps,

@@ -106,9 +106,13 @@ def check_every_topic(setup, random):
             assert found[tick] == expected.encode(), wire.topic.name
 
 
-def test_the_scenes_that_ship_and_one_under_an_operator_speak_on_every_topic():
-    operated = load("bridge", ["autopilot.operator=true"])  # its autopilot tells what it got of the airspeed
-    scenes = [*map(load, SCENES), operated]
+def test_forces_on_feet_are_their_values_one_by_one():
+    check_every_topic(resolve(load("hover", ["rates.contact=50"])), np.random.default_rng(5))
+
+
+def test_the_scenes_that_ship_and_one_that_is_asked_for_more_speak_on_every_topic():
+    asked = load("bridge", ["autopilot.operator=true", "rates.contact=50"])  # tells what it got of the airspeed, too
+    scenes = [*map(load, SCENES), asked]
     spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
     assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}
 

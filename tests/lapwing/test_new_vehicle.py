@@ -4,6 +4,7 @@ import math
 import os
 import pty
 import re
+import select
 import sys
 
 import pytest
@@ -56,14 +57,19 @@ def in_a_terminal(folder, *answers, more=()):
     if pid == 0:
         os.chdir(folder)
         os.execv(sys.executable, [sys.executable, "-m", "lapwing", "new", "vehicle", "mine", *more])
-    said, left = b"", list(answers)
+    said, left, typed = b"", list(answers), b""
     while True:
+        if not select.select([terminal], [], [], 1.0)[0]:
+            if typed == b"\x03":  # which Python does not hear that is about to wait for a line: as anybody, once more
+                os.write(terminal, typed)
+            continue
         try:
             said += os.read(terminal, 4096)
         except OSError:  # closed with the last process on it
             break
         if said.endswith((b"]: ", b"[y/N] ")):
-            os.write(terminal, left.pop(0).encode() if left else b"\x04")  # who has no answer any more ends it
+            typed = left.pop(0).encode() if left else b"\x04"  # who has no answer any more ends it
+            os.write(terminal, typed)
     return said.decode().replace("\r\n", "\n"), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 

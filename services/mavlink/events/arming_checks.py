@@ -101,7 +101,7 @@ class ArmingWatch:
 
     def step(self, v: VehicleView) -> Iterator[Happened]:
         """The next report, where one is due."""
-        told = v.stations, tuple(v.status.prearm)
+        told = v.reports_asked, tuple(v.status.prearm)
         if told == self._told and v.time_ns < self._next:
             return
         self._next = v.time_ns + INTERVAL

@@ -17,10 +17,7 @@ _motors = Argument(
     ),
 )
 
-TOUCHED = event(
-    "ground_contact", "contact", "Touches the ground at {1:.1m/s}", Argument("speed", "float"),
-    description="The speed downwards of the last reading before, a tenth of a second ago at most.",
-)  # fmt: skip
+TOUCHED = event("ground_contact", "contact", "Touches the ground")
 LEFT = event("ground_left", "contact", "Leaves the ground")
 SATURATED = event(
     "motors_saturated", "motors", "Motor {1} at the limit", _motors, level=WARNING,
@@ -33,7 +30,7 @@ class ContactWatch:
     """Compares each reading of the truth with the one before."""
 
     def __init__(self) -> None:
-        self._contact, self._speed = True, 0.0
+        self._contact = True
 
     def step(self, v: VehicleView) -> Iterator[Happened]:
         """Whether the vehicle has come down, or up."""
@@ -42,11 +39,7 @@ class ContactWatch:
             return
         if truth.ground_contact != self._contact:
             self._contact = truth.ground_contact
-            if truth.ground_contact:
-                yield TOUCHED, (self._speed,)
-            else:
-                yield LEFT, ()
-        self._speed = max(0.0, -truth.velocity.z)
+            yield (TOUCHED if truth.ground_contact else LEFT), ()
 
 
 @watch

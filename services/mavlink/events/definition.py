@@ -13,8 +13,7 @@ from services.common.events import KINDS
 from services.mavlink.dialect import mavlink
 from services.mavlink.view import VehicleView
 
-FORMATS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
-SIZE = 40  # [bytes] of all arguments of an event
+FORMATS = {"uint8_t": "B", "uint32_t": "I"}
 EMERGENCY, CRITICAL, WARNING = (
     mavlink.MAV_SEVERITY_EMERGENCY,
     mavlink.MAV_SEVERITY_CRITICAL,
@@ -76,12 +75,12 @@ class Definition(NamedTuple):
         """With the component in front."""
         return _COMPONENT << 24 | self.sub_id
 
-    def encode(self, values: Sequence[float]) -> bytes:
+    def encode(self, values: Sequence[int]) -> bytes:
         """The arguments as they travel, one after the other."""
         return struct.pack("<" + "".join(FORMATS[a.base] for a in self.arguments), *values)
 
 
-Happened = tuple[Definition, Sequence[float]]  # and the values of its arguments
+Happened = tuple[Definition, Sequence[int]]  # and the values of its arguments
 
 
 class Watch(Protocol):

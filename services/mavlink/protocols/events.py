@@ -1,7 +1,9 @@
-"""The Events Interface's request for what has got lost."""
+"""What endpoints ask for of the events: those that have got lost, and a report of what hinders arming."""
 
 from typing import Any
 
+from services.mavlink.dialect import mavlink
+from services.mavlink.protocols.commands import ACCEPTED, UNSUPPORTED, Command, Outcome, rule
 from services.mavlink.protocols.handler import handles
 from services.mavlink.session import Session
 
@@ -11,3 +13,12 @@ def request_events(session: Session, m: Any) -> None:
     """Events once more; free to everybody, as all telemetry."""
     for message in session.vehicle.events.replies(m.first_sequence, m.last_sequence, session.address):
         session.send(message)
+
+
+@rule(mavlink.MAV_CMD_RUN_PREARM_CHECKS, changes=False)
+def report(session: Session, c: Command) -> Outcome:
+    """They are checked all the time; the report comes with the next status."""
+    if not session.vehicle.flavour.EVENTS:
+        return UNSUPPORTED
+    session.vehicle.reports_asked += 1
+    return ACCEPTED

@@ -11,7 +11,7 @@ from services.mavlink.telemetry import requested
 @handles("HEARTBEAT")
 def heartbeat(session: Session, m: Any) -> None:
     """An endpoint is there; a companion computer gets other rates."""
-    session.vehicle.stations += session.endpoint.last_heartbeat is None
+    session.vehicle.reports_asked += session.endpoint.last_heartbeat is None
     session.endpoint.last_heartbeat = session.clock.now
     session.schedule.set_onboard(m.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
 

@@ -39,6 +39,17 @@ _OPTIONAL = {  # by the sensors that they stand for, and only where one of them 
 }
 
 
+_BETWEEN = {  # ground and air, by the mode or the item of a mission
+    "takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF,
+    mavlink.MAV_CMD_NAV_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    "land": mavlink.MAV_LANDED_STATE_LANDING,
+    "descend": mavlink.MAV_LANDED_STATE_LANDING,
+    mavlink.MAV_CMD_NAV_LAND: mavlink.MAV_LANDED_STATE_LANDING,
+    mavlink.MAV_CMD_NAV_VTOL_LAND: mavlink.MAV_LANDED_STATE_LANDING,
+}
+
+
 @stream("HEARTBEAT", 1.0)
 def heartbeat(v: VehicleView) -> Any:
     """I am here, in this mode."""
@@ -104,9 +115,9 @@ def extended_state(v: VehicleView) -> Any:
     if s.landed:
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
     else:
-        between = {"takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF, "land": mavlink.MAV_LANDED_STATE_LANDING}
-        between["descend"] = mavlink.MAV_LANDED_STATE_LANDING
-        state = between.get(s.mode, mavlink.MAV_LANDED_STATE_IN_AIR)
+        items = v.mission() if s.mode == "mission" else ()
+        doing = items[s.mission_current].command if s.mission_current < len(items) else s.mode
+        state = _BETWEEN.get(doing, mavlink.MAV_LANDED_STATE_IN_AIR)
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
 
 

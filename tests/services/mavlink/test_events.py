@@ -8,7 +8,7 @@ import struct
 import pytest
 from bench import Bench
 
-from messages import Actuators, Vector3, VehicleState
+from messages import Actuators, VehicleState
 from messages.topics import ACTUATORS, TRUTH
 from services.autopilot.commander.failsafes import FAILSAFES
 from services.autopilot.commander.mode_table import MODES
@@ -162,7 +162,7 @@ def test_contact_and_motors_at_their_limit_are_told():
     one = reader(bench)
     highest = bench.adapter.vehicle.description.max_voltage
     bench.vehicle.armed, bench.vehicle.landed = True, False
-    bench.vehicle.more = [(TRUTH, VehicleState(velocity=Vector3(0.0, 0.0, -2.5))), (ACTUATORS, Actuators())]
+    bench.vehicle.more = [(TRUTH, VehicleState()), (ACTUATORS, Actuators())]
     bench.step(3)
     bench.vehicle.more = [(ACTUATORS, Actuators(motor_voltage=(0.5 * highest, highest, 0.3, 0.0)))]
     bench.step(40)
@@ -171,7 +171,7 @@ def test_contact_and_motors_at_their_limit_are_told():
     bench.vehicle.more = [(TRUTH, VehicleState(ground_contact=True))]
     bench.step(3)
     assert one.said().count("Motor 2|4 at the limit") == 1
-    assert one.said()[-1] == "Touches the ground at 2.5"
+    assert one.said()[-1] == "Touches the ground"
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -258,13 +258,30 @@ def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
     assert len(one.told) == 2
 
 
+def test_a_report_comes_to_whoever_asks_for_one():
+    bench = Bench()
+    one = reader(bench)
+    bench.step(100)
+    one.told.clear()
+    assert one.station.command(mavlink.MAV_CMD_RUN_PREARM_CHECKS) == mavlink.MAV_RESULT_ACCEPTED
+    bench.step(10)
+    assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
+
+
 def test_texts_that_events_tell_too_end_with_a_tab():
     bench = Bench()
     station = bench.station()
-    bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: descend"]
+    bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: hold"]
+    bench.step()
+    bench.vehicle.status = {"failsafe": True, "text": "the position is lost"}
+    bench.vehicle.text = ["the position is lost: hold", "the position is lost: hold"]
     bench.step()
     told = [m.text for m in station.all("STATUSTEXT")]
-    assert told == ["armed\t", "the position is lost: descend in 9 s", "the position is lost: descend\t"]
+    severities = [m.severity for m in station.all("STATUSTEXT")]
+    information, warning, critical = (getattr(mavlink, f"MAV_SEVERITY_{s}") for s in ("INFO", "WARNING", "CRITICAL"))
+    assert severities == [information, warning, warning, critical, critical]
+    last = "the position is lost: hold"
+    assert told == ["armed\t", "the position is lost: descend in 9 s", last, f"{last}\t", last]  # once for one event
 
 
 def test_ground_stations_of_ardupilot_are_told_by_texts_alone():

@@ -89,6 +89,24 @@ def retrying_station(bench, **more):
     return found
 
 
+def test_the_items_of_a_mission_show_in_the_landed_state():
+    bench = Bench()
+    client = retrying_station(bench)
+    commands = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LAND)
+    assert client.upload([item(k, command) for k, command in enumerate(commands)]) == mavlink.MAV_MISSION_ACCEPTED
+    shown = []
+    for k in range(len(commands)):
+        bench.vehicle.status = {"mode": "mission", "landed": False, "mission_current": k}
+        client.got.clear()
+        bench.step(60)
+        shown.append(client.last("EXTENDED_SYS_STATE").landed_state)
+    assert shown == [
+        mavlink.MAV_LANDED_STATE_TAKEOFF,
+        mavlink.MAV_LANDED_STATE_IN_AIR,
+        mavlink.MAV_LANDED_STATE_LANDING,
+    ]
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_transfers_complete_over_a_bad_line(seed):
     bench = Bench()

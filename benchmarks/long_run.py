@@ -1,0 +1,32 @@
+"""What a run takes in memory to its end, figures and page included, as it grows longer.
+
+    python -m benchmarks.long_run [MOST]
+
+The delivery mission, which hovers until its time is over, in one process; 75, 150, 300 ... s up to MOST. Each run is a
+process of its own.
+"""
+
+import sys
+import tempfile
+
+from benchmarks._bars import LAPWING
+from benchmarks.growth import taken
+
+SLOW = True
+HOVERS = ["--set", "trajectory.phase.2.duration=1e6", "--set", "success.require=[\"verdict == 'timed out'\"]"]
+
+
+def main(most=600):
+    with tempfile.TemporaryDirectory() as folder:
+        seconds = 75
+        while seconds <= most:
+            words = ["run", "delivery_mission", "--mode", "single", *HOVERS, "--set", f"run.duration={seconds}"]
+            processor, peak = taken([*LAPWING, *words, "--log", f"{folder}/{seconds}.mcap"])
+            print(
+                f"{seconds:7} s simulated: {processor:6.1f} s of processor time, {peak:6.0f} MB at the most", flush=True
+            )
+            seconds *= 2
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

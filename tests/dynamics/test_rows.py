@@ -1,0 +1,52 @@
+"""Trees as rows, and the columns of many rows."""
+
+import gc
+import weakref
+from typing import NamedTuple
+
+import numpy as np
+
+from dynamics.lie.quaternion import Quaternion
+from dynamics.rows import columns, from_row, to_row, width
+
+
+class Inner(NamedTuple):
+    place: tuple[float, float, float]
+    on: bool
+
+
+class Tree(NamedTuple):
+    time: float
+    attitude: Quaternion
+    inner: Inner
+    several: tuple[tuple[float, float], ...]
+    none: tuple[float, ...] = ()
+
+
+LIKE = Tree(1.0, Quaternion(1.0, 0.0, 0.0, 0.0), Inner((2.0, 3.0, 4.0), True), ((5.0, 6.0), (7.0, 8.0)))
+
+
+def test_columns_are_the_numbers_of_each_part():
+    rows = np.stack([to_row(LIKE), 10.0 * to_row(LIKE)])
+    assert rows.shape == (2, width(LIKE))
+    found = columns(LIKE, rows)
+    assert found.time.tolist() == [1.0, 10.0]
+    assert found.attitude.shape == (2, 4)
+    assert found.inner.place[1].tolist() == [20.0, 30.0, 40.0]
+    assert found.inner.on.tolist() == [1.0, 10.0]
+    assert [part.tolist() for part in found.several] == [[[5.0, 6.0], [50.0, 60.0]], [[7.0, 8.0], [70.0, 80.0]]]
+    assert found.none.shape == (2, 0)
+    assert from_row(LIKE, rows[0]) == LIKE
+
+
+def test_rows_are_let_go_with_their_columns():
+    """Without the garbage collector, which commands run seldom: a page of rows is there no longer than it is used."""
+    rows = np.stack([to_row(LIKE)] * 3)
+    gone = weakref.ref(rows)
+    gc.disable()
+    try:
+        found = columns(LIKE, rows)
+        del rows, found
+        assert gone() is None
+    finally:
+        gc.enable()
