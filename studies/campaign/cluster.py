@@ -4,6 +4,7 @@ Dask hands a task of a worker that is lost to another one, and hands tasks to wo
 before its first task that it flies what the campaign was begun with (`runs.fly_runs`).
 """
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -25,6 +26,7 @@ def dask(address: str) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterat
         from distributed.scheduler import KilledWorker
     except ImportError:
         raise ValueError("--cluster: Dask is not installed; pip install lapwing[cluster]") from None
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it tells of a lost scheduler by a traceback
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as fault:

@@ -2,9 +2,13 @@
 
 import os
 import signal
+import socket
+import subprocess
+import sys
 
 import pytest
 
+from cosim.launcher import RunFailed
 from studies.campaign import local
 from studies.campaign.cluster import dask
 from studies.campaign.folder import begin, manifest
@@ -37,6 +41,32 @@ def test_a_killed_worker_and_a_late_one_change_nothing(tmp_path):
     assert count.runs == 40
     assert len(calls) == 1 + len(folder.shards)
     assert folder.finish() == alone.finish()
+
+
+def test_a_lost_scheduler_is_told_in_a_line_and_what_was_flown_stays(tmp_path, capfd):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    common = ["--no-dashboard"]
+    scheduler = ["dask_scheduler", "--host", address, *common]
+    worker = ["dask_worker", address, "--nthreads", "1", "--local-directory", str(tmp_path), *common]
+    made = plan("delivery_mission", ("run.duration=3.5",), runs=400, seed=7)
+    first = reference(*first_setup(made))
+    folder = begin(tmp_path / "folder", made, manifest(made, first))
+    with (tmp_path / "said").open("w") as said:
+        helpers = [
+            subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *words], stdout=said, stderr=said)
+            for name, *words in (scheduler, worker)
+        ]
+        try:
+            with pytest.raises(RunFailed, match=f"the scheduler at {address} is lost; the same command goes on"):
+                campaign(folder, first, dask(address), lambda count: helpers[0].kill() if count.runs else None)
+        finally:
+            for helper in helpers:
+                helper.kill()
+                helper.wait(timeout=60)
+    assert 0 < len(folder.missing()) < len(folder.shards)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_nobody_answers(monkeypatch):
