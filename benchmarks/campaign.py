@@ -1,22 +1,36 @@
 """How fast campaigns fly on one core, and what a run takes besides its flight, with kernels compiled before.
 
-Besides its flight a run takes resolving the scene, making and reading its graph, and its figures.
+Besides its flight a run takes resolving the scene, making and reading its graph, and its figures: each is told.
 
 python -m benchmarks.campaign [RUNS]
 """
 
 import sys
 import time
+from contextlib import ExitStack, contextmanager
 from statistics import median
 
+import studies.fly
 from benchmarks._bars import Row, show
 from cosim.graph import Graph
+from studies.campaign import runs as campaign_runs
 from studies.campaign.distributions import parse
 from studies.campaign.plan import plan
 from studies.campaign.runs import row_of
+from studies.flight import Flight
 
 SCENE = "delivery_mission"
 VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.wind_random.mean.0": parse("uniform(0, 12)")}
+FLIGHT = "flight"
+PARTS = {
+    "scene and set-up": (campaign_runs, "setup_of"),
+    "services": (studies.fly, "create_all"),
+    "graph": (studies.fly, "Graph"),
+    FLIGHT: (Graph, "advance"),
+    "rows as columns": (Flight, "of_each"),
+    "figures": (campaign_runs, "figures"),
+}
+"""What the parts of a run are called, and the functions that do them."""
 
 
 def main(runs=20):
@@ -33,24 +47,35 @@ def main(runs=20):
 
 def flown(given):
     """Of the runs of a plan: processor time [s], what a run takes besides its flight to the flight, time flown [s]."""
-    advance, spent, rows = Graph.advance, [], {}
+    rows, total, simulated = {}, [], 0.0
     row_of(given, 0, rows)  # loads what is compiled
-
-    def timed(graph, stop):
-        began = time.process_time()
-        advance(graph, stop)
-        spent.append(time.process_time() - began)
-
-    Graph.advance, total, simulated = timed, [], 0.0
-    try:
+    with ExitStack() as stack:
+        spent = {part: stack.enter_context(timed(*place)) for part, place in PARTS.items()}
         for run in range(given.runs):
             began = time.process_time()
             simulated += row_of(given, run, rows)["duration"]
             total.append(time.process_time() - began)
-    finally:
-        Graph.advance = advance
-    besides = median((whole - flight) / flight for whole, flight in zip(total, spent, strict=True))
+    print(", ".join(f"{part} {1e3 * median(times):.2f} ms" for part, times in spent.items()), flush=True)
+    besides = median((whole - flight) / flight for whole, flight in zip(total, spent[FLIGHT], strict=True))
     return sum(total), besides, simulated
+
+
+@contextmanager
+def timed(of, name):
+    """The list that gets the processor time [s] of each call of a function."""
+    function, spent = getattr(of, name), []
+
+    def call(*args, **kwargs):
+        began = time.process_time()
+        found = function(*args, **kwargs)
+        spent.append(time.process_time() - began)
+        return found
+
+    setattr(of, name, call)
+    try:
+        yield spent
+    finally:
+        setattr(of, name, function)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,25 @@
-"""Closed-loop flights for Monte Carlo on one core: ours beside RotorPy's, and how exact each is.
+"""Closed-loop flights for Monte Carlo on one core: ours beside RotorPy's and JSBSim's, and how exact each is.
 
     python -m benchmarks.closed_loop
 
 Simulated seconds to a second of processor time, the median of interleaved repeats, of flights of two seconds: `hover`
 as campaigns fly it, with its figures (steps of 1 ms, control at 250 Hz); RotorPy's Crazyflie that goes to a point 0.5 m
-away under its SE(3) controller, as it comes (100 Hz, RK45 of SciPy). The error is that of the last position, against
-the same simulator at an eighth of the step or a relative tolerance of 1e-10. What is not installed (extra `bench`) is
-left out.
+away under its SE(3) controller, as it comes (100 Hz, RK45 of SciPy); a quadrotor of ours in JSBSim, which ships none,
+that goes as far under cascaded PID in JSBSim's own flight control system (`_jsbsim.py`), with steps of 1 ms as ours and
+with one step to a control interval, without any figures. The error is that of the last position, against the same
+simulator at an eighth of the step or a relative tolerance of 1e-10. What is not installed (extra `bench`) is left out.
 """
 
 import time
+from collections.abc import Callable
 from importlib.util import find_spec
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks._bars import Row, show
+from benchmarks._jsbsim import CONTROL, JsbsimQuad
 from services.table import load
 from studies.campaign.plan import plan
 from studies.campaign.runs import row_of
@@ -23,6 +27,8 @@ from studies.campaign.setup import TOPICS, campaign_setup
 from studies.fly import fly
 
 SECONDS, RUNS, REPEATS = 2.0, 10, 3
+AWAY = 0.5  # [m] the others fly to a point so far
+STEP = 1e-3  # [s]
 OVERRIDES = (f"run.duration={SECONDS}",)
 GIVEN, ROWS = plan("hover", OVERRIDES, runs=1000), {}
 
@@ -30,15 +36,14 @@ GIVEN, ROWS = plan("hover", OVERRIDES, runs=1000), {}
 def ours():
     for run in range(RUNS):
         row_of(GIVEN, run, ROWS)
-    return RUNS * SECONDS
 
 
 def our_error():
-    steps = 1e-3, 1e-3 / 8
+    steps = STEP, STEP / 8
     ends = [
         fly(campaign_setup(load("hover", [*OVERRIDES, f"solver.step={h}"])), TOPICS).truth.position[-1] for h in steps
     ]
-    return np.abs(ends[0] - ends[1]).max()
+    return apart(*ends)
 
 
 def rotorpy(**integrator):
@@ -50,29 +55,70 @@ def rotorpy(**integrator):
     from rotorpy.vehicles.multirotor import Multirotor
 
     vehicle = Multirotor(quad_params, integrator_kwargs={"method": "RK45", **integrator})
-    trajectory = HoverTraj(x0=np.array([0.5, 0.0, 0.0]))
+    trajectory = HoverTraj(x0=np.array([AWAY, 0.0, 0.0]))
     world = Environment(vehicle, SE3Control(quad_params), trajectory, sim_rate=100)
     return world.run(t_final=SECONDS, terminate=False, plot=False)["state"]["x"][-1]
 
 
-def main():
-    if not find_spec("rotorpy"):
-        print("rotorpy is not installed: pip install 'lapwing[bench]'")
-        return []
-    ours(), rotorpy()
-    rates = {"lapwing": [], "RotorPy": []}
-    for _ in range(REPEATS):
-        for name, fly_some in (("lapwing", ours), ("RotorPy", lambda: SECONDS if rotorpy() is not None else 0.0)):
-            began = time.process_time()
-            simulated = fly_some()
-            rates[name].append(simulated / (time.process_time() - began))
-    errors = our_error(), np.abs(rotorpy() - rotorpy(rtol=1e-10, atol=1e-12)).max()
-    for (name, found), error in zip(rates.items(), errors, strict=True):
-        print(f"{name:8}{median(found):10.1f} times real time, error of the last position {error:.1e} m")
-    ratio = median(a / b for a, b in zip(*rates.values(), strict=True))
-    found = [Row("closed-loop flights to RotorPy, one core", ratio, "", 3.0, True)]
-    show(found)
+class Simulator(NamedTuple):
+    """How one flies."""
+
+    fly: Callable[[], object]  # some flights
+    flights: int  # how many these are
+    error: Callable[[], float]  # of the last position [m]
+
+
+def simulators():
+    """Those that are installed, by name."""
+    found = {"lapwing": Simulator(ours, RUNS, our_error)}
+    if find_spec("rotorpy"):
+        found["RotorPy"] = Simulator(rotorpy, 1, lambda: apart(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12)))
+    if find_spec("jsbsim"):
+        for step in (STEP, CONTROL):
+            found[f"JSBSim, steps of {1e3 * step:g} ms"] = in_jsbsim(step)
     return found
+
+
+def in_jsbsim(step):
+    """JSBSim with steps of `step` [s]."""
+    vehicle = JsbsimQuad(step)
+
+    def fly():
+        for _ in range(RUNS):
+            vehicle.fly(SECONDS, (AWAY, 0.0, 0.0))
+
+    def last(of):
+        return of.fly(SECONDS, (AWAY, 0.0, 0.0))
+
+    return Simulator(fly, RUNS, lambda: apart(last(vehicle), last(JsbsimQuad(step / 8))))
+
+
+def apart(one, other):
+    """The greatest difference of two places [m] along any axis."""
+    return np.abs(one - other).max()
+
+
+def main():
+    found = simulators()
+    rates = {name: [] for name in found}
+    for each in found.values():
+        each.fly()  # loads what is compiled
+    for _ in range(REPEATS):
+        for name, each in found.items():
+            began = time.process_time()
+            each.fly()
+            rates[name].append(each.flights * SECONDS / (time.process_time() - began))
+    for name, each in found.items():
+        rate = f"{median(rates[name]):10.1f} times real time"
+        print(f"{name:22}{rate}, error of the last position {each.error():.1e} m")
+    rows = []
+    for name in list(found)[1:]:
+        ratio = median(a / b for a, b in zip(rates["lapwing"], rates[name], strict=True))
+        rows.append(Row(f"closed-loop flights to {name}, one core", ratio, "", 3.0, True))
+    if len(found) < 4:
+        print("not all are installed: pip install 'lapwing[bench]'")
+    show(rows)
+    return rows
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ LARGEST = 1 << 26  # [bytes] of a message that is put together from fragments; a
 
 
 def _configuration(
-    listen: Iterable[str], connect: Iterable[str], mode: str, security: Mapping[str, Any]
+    listen: Iterable[str], connect: Iterable[str], mode: str, security: Mapping[str, Any], awaits: bool
 ) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in {
@@ -39,6 +39,7 @@ def _configuration(
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 1.5},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "open/return_conditions/connect_scouted": awaits,
         "transport/shared_memory/enabled": False,
         "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
@@ -73,6 +74,7 @@ class ZenohBus:
         mode: str = "peer",
         mark: bytes = b"",
         security: Mapping[str, Any] = MappingProxyType({}),
+        awaits: bool = True,
     ):
         """Open the session.
 
@@ -82,6 +84,7 @@ class ZenohBus:
             mode: of Zenoh: "peer", "client" or "router".
             mark: 16 bytes that every message carries; made up where there are none.
             security: further entries of the Zenoh configuration, by key.
+            awaits: wait until a peer is there, half a second at most; else they are met as they come.
 
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
@@ -90,7 +93,7 @@ class ZenohBus:
         _opened = True
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configuration(listen, connect, mode, security))
+            self._session = zenoh.open(_configuration(listen, connect, mode, security, awaits))
         except zenoh.ZError as error:
             tried = connect if mode == "client" else listen
             endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)

@@ -20,7 +20,7 @@ from cosim.watch import STALL, WATCHER, Watch
 
 GRACE = 1.5  # [s] a process gets to end after SIGTERM
 LAST_NEWS = 0.05  # [s] for what the processes said at their end
-FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick
+FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick, or the last news after it
 REFUSED = 2  # exit code of a service whose user can mend what is wrong
 
 
@@ -72,7 +72,7 @@ def launch(
                     give(name, endpoints, stream)
 
         listen, connect = mesh(WATCHER, endpoints)
-        with ZenohBus(listen, connect, mark=participants.mark(WATCHER)) as bus:
+        with ZenohBus(listen, connect, mark=participants.mark(WATCHER), awaits=False) as bus:
             try:
                 watch = Watch(bus, participants, [*names, *beside, *external])
                 bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it
@@ -145,11 +145,11 @@ def _follow(
             ended_at = ended_at or time.monotonic()
             if time.monotonic() - ended_at > STALL:
                 _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
-            if time.monotonic() - max(ended_at, watch.recorded_at) > FAREWELL:
+            if time.monotonic() - max(ended_at, watch.last_news) > FAREWELL:
                 if early := watch.broken_off():  # the first fault is told
                     raise RunFailed(early)
                 left = ", ".join(name for name, child in children.items() if child.poll() is None)
-                raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last tick")
+                raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last news")
     watch.poll(LAST_NEWS)
     observe(watch)
     if early := watch.broken_off():

@@ -52,7 +52,6 @@ class Watch:
         self.outcome: str | None = None  # "" when the run has come to its end, else why it ended before; None: unknown
         self._refused: dict[str, int] = {}  # messages of strangers, by who refused them
         self.last_news = time.monotonic()
-        self.recorded_at = 0.0  # [s] of the monotonic clock, when the recorder last told how far it is
         senders: dict[str, bytes | None] = {}
         for key in HEARD:
             senders |= participants.senders(key, names)
@@ -85,7 +84,7 @@ class Watch:
             elif head == WAITING_KEY:
                 self.waiting[name] = payload.decode(errors="replace")
             elif head == RECORDED_KEY:
-                self.last_news = self.recorded_at = time.monotonic()
+                self.last_news = time.monotonic()
                 self.slow_disk = self.slow_disk or waits_for_disk(payload)
             elif head == ENDED_KEY:
                 self.outcome = payload.decode(errors="replace")

@@ -41,7 +41,7 @@ fail() {
 }
 passed() { echo "docker-test: $*"; }
 
-for image in "$IMAGE" "$IMAGE-tests"; do
+for image in "$IMAGE" "$IMAGE-cluster" "$IMAGE-tests"; do
     size=$(docker image inspect --format '{{.Size}}' "$image")
     [ "$size" -lt $LIMIT ] || fail "$image has $size bytes, allowed are $LIMIT"
     [ "$(docker run --rm --network none "$image" id -u)" -ne 0 ] || fail "$image runs as root"
@@ -83,6 +83,16 @@ there=$(field recordings/mission.json digest)
 here=$(field local.json digest)
 [ "$there" = "$here" ] || fail "digest $there in containers, $here locally"
 passed "digest equal to the local run's: $here"
+
+# A campaign on a scheduler and two workers gives the table of a local one.
+# shellcheck disable=SC2086
+RUNS=4 timeout $TIMEOUT $COMPOSE --profile cluster up --no-build --exit-code-from campaign > compose.log 2>&1 < /dev/null ||
+    fail "the campaign ended with exit code $?"
+[ "$(stat -c %u:%g recordings/campaign/runs.csv)" = "$owner" ] || fail "the campaign's table does not belong to $owner"
+"$LAPWING" campaign $SCENE --runs 4 --workers 1 --csv --out campaign > local.log 2>&1 ||
+    { tail -5 local.log >&2; fail "the local campaign failed"; }
+cmp recordings/campaign/runs.csv campaign/runs.csv || fail "the campaign has another table than the local one"
+passed "a campaign on two workers: the local one's table"
 
 # One that is killed in flight ends them all, by name; what runs cannot write to its image, and is healthy while it flies.
 before=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what the tests need besides to /opt/lapwing-tests.
+# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what workers of a cluster and the tests need besides
+# to /opt/lapwing-cluster and /opt/lapwing-tests.
 set -eu
 cd /build
 
@@ -9,5 +10,7 @@ if ls ./*.whl > /dev/null 2>&1; then export PIP_NO_INDEX=1 PIP_FIND_LINKS=/build
 # The environment gets no pip of its own: the base's serves, and nothing is installed at run time.
 python3 -m venv --without-pip /opt/lapwing
 pip --python /opt/lapwing/bin/python install --no-deps -r requirements.lock
-pip --python /opt/lapwing/bin/python install --no-deps --target /opt/lapwing-tests -r requirements-tests.lock
-python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-tests
+for more in cluster tests; do
+    pip --python /opt/lapwing/bin/python install --no-deps --target /opt/lapwing-$more -r requirements-$more.lock
+done
+python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-cluster /opt/lapwing-tests

@@ -3,9 +3,10 @@
 #
 #   deploy/lock.sh [PACKAGE]     all anew, or only PACKAGE to its newest version
 #
-# Writes requirements.lock (what the runtime image holds, and the build backend) and requirements-tests.lock (what the
-# tests need on top of it), each with the hashes of all files of that version, for every platform. pip refuses what has
-# another hash. A local environment gets the same versions by `pip install --constraint`.
+# Writes requirements.lock (what the runtime image holds, and the build backend), requirements-cluster.lock and
+# requirements-tests.lock (what a Dask cluster and the tests need on top of it), each with the hashes of all files of that
+# version, for every platform. pip refuses what has another hash. A local environment gets the same versions by
+# `pip install --constraint`.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -22,17 +23,21 @@ upgrade=--upgrade
 
 if [ "$upgrade" != --upgrade ]; then
     cp deploy/requirements.lock "$work/runtime"
-    cat deploy/requirements.lock deploy/requirements-tests.lock > "$work/all"
+    for more in cluster tests; do cat deploy/requirements.lock deploy/requirements-$more.lock > "$work/$more"; done
 fi
 echo 'setuptools>=77' > "$work/backend.in"
 pin "$upgrade" --output-file "$work/runtime" pyproject.toml "$work/backend.in" > /dev/null
-pin "$upgrade" --output-file "$work/all" --extra test --constraint "$work/runtime" \
-    pyproject.toml "$work/backend.in" > /dev/null
+for more in cluster tests; do
+    pin "$upgrade" --output-file "$work/$more" --extra ${more%s} --constraint "$work/runtime" \
+        pyproject.toml "$work/backend.in" > /dev/null
+done
 
 # A package a line, in one sorting order whatever the locale, and a hash a line again.
 lines() { sed -e :again -e '/\\$/{N; s/ *\\\n */ /; b again' -e '}' "$1" | LC_ALL=C sort; }
 hashes() { sed 's/ --hash/ \\\n    --hash/g'; }
 lines "$work/runtime" > "$work/runtime.lines"
 hashes < "$work/runtime.lines" > deploy/requirements.lock
-lines "$work/all" | LC_ALL=C comm -13 "$work/runtime.lines" - | hashes > deploy/requirements-tests.lock
-grep -c == deploy/requirements.lock deploy/requirements-tests.lock
+for more in cluster tests; do
+    lines "$work/$more" | LC_ALL=C comm -13 "$work/runtime.lines" - | hashes > deploy/requirements-$more.lock
+done
+grep -c == deploy/requirements*.lock

@@ -10,7 +10,7 @@ set -eu
 cd "$(dirname "$0")/.."
 
 wheels=build/wheels
-stamp=$(cat deploy/requirements.lock deploy/requirements-tests.lock deploy/wheels.sh | sha256sum)
+stamp=$(cat deploy/requirements*.lock deploy/wheels.sh | sha256sum)
 if [ "$(cat build/wheels.stamp 2>/dev/null)" = "$stamp" ]; then exit 0; fi
 
 # Wheels for the image (CPython 3.11 on Debian bookworm, glibc 2.36), not for the host's Python.
@@ -22,6 +22,6 @@ mkdir -p "$wheels"
 ${PYTHON:-python3} -m pip download --quiet --disable-pip-version-check --no-deps --only-binary :all: --dest "$wheels" \
     --python-version 3.11 --implementation cp --abi cp311 --abi abi3 --abi none \
     $platforms --platform "manylinux2014_$machine" --platform "manylinux1_$machine" \
-    -r deploy/requirements.lock -r deploy/requirements-tests.lock
+    -r deploy/requirements.lock -r deploy/requirements-cluster.lock -r deploy/requirements-tests.lock
 echo "$stamp" > build/wheels.stamp
 du -sh "$wheels"

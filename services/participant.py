@@ -100,7 +100,9 @@ def take_part(given: Participation) -> None:
         security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
     else:
         security = settings(setup, given.name, given.key_prefix, given.keys)
-    with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security) as bus:
+    # All wait for one another later (`Process.join`); only one that is started again asks others before
+    awaits = given.journal >= 0
+    with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security, awaits) as bus:
         watched = WATCHER in given.peers and not given.with_parent
         others = [*processes.needed(setup, given.external or ()), *([WATCHER] if WATCHER in given.peers else [])]
         if given.with_parent and processes.ROUTER in given.peers:

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from cosim.scene import Scene
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import kernel
 from services.common.success import Success
-from studies import tracking
 from studies.flight import Flight
 from studies.saturation import saturation
 from studies.touches import touches
-from studies.tracking import AXES, plain
+from studies.tracking import AXES, plain, strided
 
 SURE = 3.0  # standard deviations of its own that the estimate is given
 
@@ -51,13 +50,11 @@ def figures(flight: Flight) -> dict[str, Any]:
     n, t = len(armed), truth.times
     found: dict[str, Any] = dict.fromkeys(FIGURES, math.nan)
     found |= {"verdict": verdict.kind, "told": str(verdict), "time": verdict.time, "duration": float(t[-1])}
-    cosine = 1.0 - 2.0 * (truth.orientation[:, :2] ** 2).sum(axis=1)
-    tilt = np.arccos(cosine.clip(-1.0, 1.0))
-    found |= {"max_tilt": float(tilt.max()), "energy": flight.energy}
+    found |= {"max_tilt": _tilt(truth.tilt_cosine.min()), "energy": flight.energy}
     last = max((touch.start for touch in touches(truth)), default=0)
     if last:
         x, y, _ = map(float, truth.position[last])
-        found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": float(tilt[last])}
+        found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": _tilt(truth.tilt_cosine[last])}
         found |= {"touchdown.speed": verdict.touchdown}
     if n == 0:
         return found
@@ -67,52 +64,27 @@ def figures(flight: Flight) -> dict[str, Any]:
         found["saturation"] = limits.share(limits.lasted)
     if not armed.any():
         return found
-    found |= {f"rmse.{axis}": value for axis, value in flight.rmse.items()}
-    flown, armed = plain(truth.position[:n]), plain(armed, bool)
-    distance, overshoot = _farthest(flight.reference, flown, armed)
-    found |= {"max_distance": distance, "overshoot": max(0.0, overshoot)}
-    return found | _of_estimate(flight, flown, armed)
+    tracked = flight.tracking(truth)
+    found |= {f"rmse.{axis}": value for axis, value in tracked.rmse.items()}
+    found |= {"max_distance": tracked.distance, "overshoot": max(0.0, tracked.beyond)}
+    return found | _of_estimate(flight, armed)
 
 
-@kernel
-def _farthest(reference: Any, position: Any, armed: Any) -> tuple[float, float]:
-    """Greatest distance from the reference [m], and farthest beyond its extremes along any axis [m], while armed."""
-    away = 0.0
-    for row in range(len(armed)):
-        if armed[row]:
-            squares = 0.0
-            for i in range(3):
-                squares += (reference[row, i] - position[row, i]) ** 2
-            away = _greater(away, squares)
-    beyond = -np.inf
-    for i in range(3):
-        high, low, highest, lowest = -np.inf, -np.inf, -np.inf, -np.inf  # of the position; of the reference; -x for low
-        for row in range(len(armed)):
-            if armed[row]:
-                high, low = _greater(high, position[row, i]), _greater(low, -position[row, i])
-                highest, lowest = _greater(highest, reference[row, i]), _greater(lowest, -reference[row, i])
-        beyond = _greater(beyond, _greater(high - highest, low - lowest))
-    return np.sqrt(away), beyond
+def _tilt(cosine: float) -> float:
+    """The angle [rad] of this cosine, which rounding may have brought beyond 1."""
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-@leaf
-def _greater(a: float, b: float) -> float:
-    """The greater number; NaN if one is."""
-    return a if a >= b or a != a else b
-
-
-def _of_estimate(flight: Flight, flown: np.ndarray, armed: np.ndarray) -> dict[str, float]:
-    """What only an estimate at every tick tells, beside the position flown (n, 3)."""
+def _of_estimate(flight: Flight, armed: np.ndarray) -> dict[str, float]:
+    """What only an estimate at every tick tells."""
     n = len(armed)
     if not flight.has("estimate") or len(flight.estimate) < n:
         return {}
-    estimate = flight.estimate
-    position = plain(estimate.position[:n])
-    errors = tracking.errors(flight.reference, position, estimate.attitude[:n], armed)
-    inside = _inside(position, flown, plain(estimate.position_std[:n]), armed)
+    estimate, truth = flight.estimate, flight.truth
+    places = strided(estimate.position[:n]), strided(truth.position[:n]), strided(estimate.position_std[:n])
     return {
-        **{f"rmse_estimate.{axis}": value for axis, value in tracking.rmse(errors).items()},
-        **{f"inside.{axis}": float(share) for axis, share in zip("xyz", inside, strict=True)},
+        **{f"rmse_estimate.{axis}": value for axis, value in flight.tracking(estimate).rmse.items()},
+        **{f"inside.{a}": share for a, share in zip("xyz", _inside(*places, plain(armed, bool)), strict=True)},
     }
 
 

@@ -64,12 +64,13 @@ class Flight:
         self.others: tuple[Flight, ...] = ()
 
     @classmethod
-    def read(cls, path: str | Path, vehicle: str | None = None) -> Self:
+    def read(cls, path: str | Path, vehicle: str | None = None, only: Collection[Topic] | None = None) -> Self:
         """A recorded flight.
 
         Args:
             path: of the MCAP log.
             vehicle: its name; by default that of the first topic /NAME/truth.
+            only: the topics wanted, None for all.
 
         Raises:
             ValueError: no such file, no MCAP log, no flight in it, or a damaged message.
@@ -82,7 +83,7 @@ class Flight:
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
             others = {topic.key(name) for name in fleet for topic in IN_SPACE}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
-            return cls._of_log(log, str(path), log.histories(own), named, fleet)
+            return cls._of_log(log, str(path), log.histories(_wanted(own, only, fleet)), named, fleet)
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
@@ -100,8 +101,7 @@ class Flight:
             fleet = _vehicles(known, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
-            wanted = None if only is None else {topic.key(name) for topic in only for name in fleet}
-            histories = log.histories(name for name in known if wanted is None or name in wanted)
+            histories = log.histories(_wanted(known, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod
@@ -239,16 +239,27 @@ class Flight:
         The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
         The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
         """
-        if not (self.has("setpoint") and self.has("actuators")):
+        if not self._tracked:
             return np.empty((0, len(AXES)))
-        setpoint, actuators = self.setpoint, self.actuators
-        n = min(len(self.truth), len(setpoint), len(actuators))
-        return np.column_stack([setpoint.position[:n], actuators.attitude_reference[:n, :2], setpoint.yaw[:n]])
+        position, roll_pitch, yaw = self._reference
+        return np.column_stack([position, roll_pitch, yaw])
+
+    @cached_property
+    def _tracked(self) -> int:
+        """The count of times of `reference`."""
+        if not (self.has("setpoint") and self.has("actuators")):
+            return 0
+        return min(len(self.truth), len(self.setpoint), len(self.actuators))
+
+    @property
+    def _reference(self) -> tracking.Reference:
+        n, setpoint = self._tracked, self.setpoint
+        return tracking.Reference(setpoint.position[:n], self.actuators.attitude_reference[:n, :2], setpoint.yaw[:n])
 
     @cached_property
     def armed(self) -> np.ndarray:
         """Whether the motors are armed, at the times of `reference`, shape (n,) of bool."""
-        n = len(self.reference)
+        n = self._tracked
         return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
 
     @cached_property
@@ -260,15 +271,20 @@ class Flight:
         found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
         return dict(zip(AXES, found.T, strict=True))
 
+    def tracking(self, of: TopicView) -> tracking.Tracking:
+        """What the errors of the pose that a topic tells come to; of a flight with a reference."""
+        n = self._tracked
+        return tracking.tracking(self._reference, of.position[:n], of.attitude[:n], self.armed)
+
     @cached_property
     def rmse(self) -> dict[str, float]:
         """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
-        return tracking.rmse(np.column_stack(list(self.errors.values()))) if self.errors else {}
+        return self.tracking(self.truth).rmse if self._tracked else {}
 
     @property
     def energy(self) -> float:
         """Electrical energy that the motors have taken [J]."""
-        return float(self.truth.motor_power.sum() * self.setup.interval)
+        return tracking.total(self.truth.motor_power) * self.setup.interval
 
     @cached_property
     def finished(self) -> bool:
@@ -314,6 +330,14 @@ class Flight:
             raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
         view = self.topic(topic)
         return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
+    """Of the names in a log those of the topics that are wanted."""
+    if only is None:
+        return names
+    wanted = {topic.key(name) for topic in only for name in fleet}
+    return [name for name in names if name in wanted]
 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:

@@ -3,14 +3,16 @@
 import json
 import math
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import Airframe, load_airframe
+from services.autopilot.allocation import demand_effects, effectiveness, tables, tilted_effectiveness
 from services.common.vehicle import airframe, rotor_constants
 from services.table import load
 
@@ -26,15 +28,37 @@ class Row(NamedTuple):
     reason: str  # why the two differ, or why nothing is computed
 
 
-# name of the function and of the published figure: (unit shown, SI units in one of it)
-_SHOWN = {
-    "thrust_over_weight": ("-", 1.0),
-    "hover_time": ("min", 60.0),
-    "maximum_payload": ("kg", 1.0),
-    "maximum_range": ("km", 1000.0),
-    "ceiling": ("km", 1000.0),
-    "maximum_tilt": ("deg", math.pi / 180.0),
-    "maximum_speed": ("m/s", 1.0),
+def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Rotor) -> float:
+    """With the rotor lost whose loss leaves least, by the autopilot's allocation in hover (theory.md, eq. (4.27)).
+
+    Raises:
+        ValueError: the rotors cannot lose one.
+    """
+    rotors, count = airframe.about_centre.rotors, len(airframe.rotors.position)
+    reaction = tuple(sign * rotor.torque / rotor.thrust for sign in rotors.reaction_sign)
+    if rotors.tilted_axis:
+        B = tilted_effectiveness(rotors.position, rotors.tilted_axis, reaction)
+    else:
+        x, y, _ = zip(*rotors.position, strict=True)
+        B = effectiveness(x, y, reaction)
+    _, *lost = tables(B)
+    if not lost:
+        raise ValueError(f"the {count} rotors cannot lose one")
+    most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] of a rotor
+    lifts = (most / max(collective for collective, *_ in shares) for shares in lost)
+    return float(demand_effects(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
+
+
+# name of the figure, and of what is published of it: (what computes it, unit shown, SI units in one of it)
+_SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
+    "thrust over weight": (performance.thrust_over_weight, "-", 1.0),
+    "the same without a rotor": (thrust_over_weight_without_a_rotor, "-", 1.0),
+    "hover time": (performance.hover_time, "min", 60.0),
+    "maximum payload": (performance.maximum_payload, "kg", 1.0),
+    "maximum range": (performance.maximum_range, "km", 1000.0),
+    "ceiling": (performance.ceiling, "km", 1000.0),
+    "maximum tilt": (performance.maximum_tilt, "deg", math.pi / 180.0),
+    "maximum speed": (performance.maximum_speed, "m/s", 1.0),
 }
 
 
@@ -49,17 +73,17 @@ def card(subject: Path) -> list[Row]:
     """
     vehicle, rotor = _vehicle(subject)
     rows = []
-    for name, (unit, size) in _SHOWN.items():
-        stated = getattr(vehicle.published, name, None)
+    for name, (figure, unit, size) in _SHOWN.items():
+        stated = getattr(vehicle.published, name.replace(" ", "_"), None)
         computed, reason = None, stated.reason if stated else ""
         try:
-            value = getattr(performance, name)(vehicle, rotor=rotor)
+            value = figure(vehicle, rotor=rotor)
             computed = (value[0] if isinstance(value, tuple) else value) / size
         except ValueError as lacking:
             reason = str(lacking)
         rows.append(
             Row(
-                name.replace("_", " "),
+                name,
                 unit,
                 computed,
                 stated.value / size if stated else None,

@@ -97,6 +97,10 @@ def _samples(message: Any, *payloads: bytes) -> History:
 
 def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:
     """The different rows of some columns of whole numbers that change seldom."""
-    keys = np.stack([np.asarray(column, np.int64) for column in texts], axis=1)
-    changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
-    return list(dict.fromkeys(map(tuple, keys[[0, *changes]].tolist())))
+    changed = np.zeros(len(texts[0]), bool)
+    changed[0] = True
+    for column in texts:
+        changed[1:] |= column[1:] != column[:-1]
+    at = np.flatnonzero(changed)
+    keys = np.stack([np.asarray(column[at], np.int64) for column in texts], axis=1)
+    return list(dict.fromkeys(map(tuple, keys.tolist())))

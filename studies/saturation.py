@@ -1,10 +1,13 @@
 """When motors are at a limit of their voltage in the air."""
 
-from typing import NamedTuple
+import functools
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynamics.kernel import kernel
 from studies.topic_view import TopicView
+from studies.tracking import plain, strided
 
 NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
 APART = 1.0  # [s] stretches that are nearer to each other are told as one
@@ -21,7 +24,8 @@ class Saturation(NamedTuple):
     @property
     def any(self) -> np.ndarray:
         """Whether any motor is at a limit, shape (n,)."""
-        return (self.low | self.high).any(axis=1)
+        at_limit = self.low | self.high
+        return functools.reduce(np.logical_or, at_limit.T) if at_limit.any() else np.zeros(len(at_limit), bool)
 
     @property
     def lasted(self) -> float:
@@ -45,8 +49,17 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
     voltage, t = truth.motor_voltage[:n], truth.times[:n]
     flying = armed & ~truth.ground_contact[:n]
     step = np.diff(t, append=t[-1]) if n else np.empty(0)
-    low, high = voltage < NEAR * highest, voltage > (1.0 - NEAR) * highest
-    return Saturation(low & flying[:, None], high & flying[:, None], step, flying)
+    low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
+    _limits(low, high, strided(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
+    return Saturation(low, high, step, flying)
+
+
+@kernel
+def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: float) -> None:
+    for row in range(voltage.shape[0]):
+        for k in range(voltage.shape[1]):
+            low[row, k] = flying[row] and voltage[row, k] < least
+            high[row, k] = flying[row] and voltage[row, k] > most
 
 
 def stretches(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:

@@ -52,6 +52,12 @@ class TopicView:
         """Roll, pitch, yaw of the pose [rad], shape (n, 3); yaw without jumps."""
         return tracking.roll_pitch_yaw(self.orientation)
 
+    @cached_property
+    def tilt_cosine(self) -> np.ndarray:
+        """Cosine of the pose's tilt from the vertical, shape (n,)."""
+        x, y = self.orientation[:, 0], self.orientation[:, 1]
+        return 1.0 - 2.0 * (x * x + y * y)
+
     @property
     def fields(self) -> list[str]:
         """The dotted names of all fields that every message has."""

@@ -1,10 +1,10 @@
 """How far a flight is from what was asked: errors of the six axes while the motors are armed."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel
+from dynamics.kernel import kernel, leaf
 
 TURN = 2.0 * np.pi
 AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
@@ -47,6 +47,25 @@ def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
     return np.require(values, kind, ("C", "W"))
 
 
+def strided(values: np.ndarray) -> np.ndarray:
+    """The same numbers, to be read only, laid out with gaps between rows as they lie in the rows of ports, so that one
+    compiled version serves all; a copy where they lie otherwise."""
+    found = np.asarray(values, float)
+    if found.flags.contiguous or not found.flags.aligned:
+        found = np.empty((*found.shape, 2))[..., 0]
+        found[...] = values
+    found = found.view()
+    found.flags.writeable = False
+    return found
+
+
+@leaf
+def _turn(wanted: float, flown: float) -> float:
+    """The shortest way from one angle to another [rad]."""
+    turn = wanted - flown
+    return turn if abs(turn) <= 0.5 * TURN else turn - TURN * np.rint(turn / TURN)
+
+
 @kernel
 def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any) -> None:
     k = 0
@@ -54,12 +73,91 @@ def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any
         if armed[row]:
             for i in range(3):
                 found[k, i] = reference[row, i] - position[row, i]
-                turn = reference[row, 3 + i] - attitude[row, i]
-                found[k, 3 + i] = turn - TURN * np.rint(turn / TURN)
+                found[k, 3 + i] = _turn(reference[row, 3 + i], attitude[row, i])
             k += 1
 
 
-def rmse(errors: np.ndarray) -> dict[str, float]:
-    """Root-mean-square error of each axis [m], [rad]; NaN where the motors were never armed."""
-    values = np.sqrt(np.mean(errors**2, axis=0)) if len(errors) else np.full(len(AXES), np.nan)
-    return dict(zip(AXES, map(float, values), strict=True))
+class Tracking(NamedTuple):
+    """What the errors come to while the motors are armed; NaN where they never were."""
+
+    rmse: dict[str, float]  # root-mean-square of each axis [m], [rad]
+    distance: float  # greatest from the reference [m]
+    beyond: float  # farthest beyond the reference's extremes along any axis [m]; below 0: it never came as far
+
+
+class Reference(NamedTuple):
+    """Where the vehicle ought to be at n times."""
+
+    position: np.ndarray  # x, y, z [m], shape (n, 3)
+    roll_pitch: np.ndarray  # [rad], shape (n, 2) or more
+    yaw: np.ndarray  # [rad], shape (n,)
+
+
+def tracking(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> Tracking:
+    """What the errors come to, in one pass over the rows; other arguments as of `errors`."""
+    wanted = Reference(*(strided(values) for values in reference))
+    found = _tracking(*wanted, strided(position), plain(attitude), plain(armed, bool))
+    return Tracking(dict(zip(AXES, found[:6], strict=True)), *found[6:])
+
+
+@kernel
+def _tracking(
+    wanted: Any, roll_pitch: Any, heading: Any, position: Any, attitude: Any, armed: Any
+) -> tuple[float, float, float, float, float, float, float, float]:
+    rows, away = 0, 0.0
+    x = y = z = roll = pitch = yaw = 0.0
+    along_x = along_y = along_z = (-np.inf, -np.inf, -np.inf, -np.inf)
+    for row in range(len(armed)):
+        if armed[row]:
+            rows += 1
+            ex, ey = (wanted[row, 0] - position[row, 0]) ** 2, (wanted[row, 1] - position[row, 1]) ** 2
+            ez = (wanted[row, 2] - position[row, 2]) ** 2
+            x, y, z, away = x + ex, y + ey, z + ez, _greater(away, ex + ey + ez)
+            roll += _turn(roll_pitch[row, 0], attitude[row, 0]) ** 2
+            pitch += _turn(roll_pitch[row, 1], attitude[row, 1]) ** 2
+            yaw += _turn(heading[row], attitude[row, 2]) ** 2
+            along_x = _extended(along_x, position[row, 0], wanted[row, 0])
+            along_y = _extended(along_y, position[row, 1], wanted[row, 1])
+            along_z = _extended(along_z, position[row, 2], wanted[row, 2])
+    n = rows if rows else np.nan
+    return (
+        np.sqrt(x / n), np.sqrt(y / n), np.sqrt(z / n), np.sqrt(roll / n), np.sqrt(pitch / n), np.sqrt(yaw / n),
+        np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z))),
+    )  # fmt: skip
+
+
+Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown; that was wanted
+
+
+@leaf
+def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
+    """Extremes with another x."""
+    return (
+        _greater(known[0], flown), _greater(known[1], -flown), _greater(known[2], wanted), _greater(known[3], -wanted),
+    )  # fmt: skip
+
+
+@leaf
+def _beyond(known: Extremes) -> float:
+    """How far what was flown reaches beyond what was wanted."""
+    return _greater(known[0] - known[2], known[1] - known[3])
+
+
+@leaf
+def _greater(a: float, b: float) -> float:
+    """The greater number; NaN if one is."""
+    return a if a >= b or a != a else b
+
+
+def total(values: np.ndarray) -> float:
+    """The sum of all numbers (n, k)."""
+    return _total(strided(values))
+
+
+@kernel
+def _total(values: Any) -> float:
+    found = 0.0
+    for row in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            found += values[row, k]
+    return found

@@ -52,7 +52,7 @@ def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverge
         failure: why the flight ended before its time; "" where it did not.
         diverged: whether that is a state that was no longer finite.
     """
-    end, cosine = float(truth.times[-1]), _cosine(truth)
+    end, cosine = float(truth.times[-1]), truth.tilt_cosine
     found = touches(truth) if status is not None else []
     x, y, z = map(float, truth.position[-1])
     tilt = math.acos(max(-1.0, min(1.0, float(cosine[-1]))))
@@ -92,12 +92,6 @@ def over(status: TopicView) -> bool:
     # along the scene's own trajectory a stop on the ground is a part of the mission; its mode is "mission"
     at_rest = status.landed[-1] and not status.armed[-1] and status.mode[-1] == "hold"
     return bool(at_rest and status.armed.any())
-
-
-def _cosine(truth: TopicView) -> np.ndarray:
-    """Of the tilt from the vertical, shape (n,)."""
-    x, y = truth.orientation[:, 0], truth.orientation[:, 1]
-    return 1.0 - 2.0 * (x * x + y * y)
 
 
 def _accident(truth: TopicView, cosine: np.ndarray, found: list[Touch]) -> tuple[float, str] | None:

@@ -1,4 +1,4 @@
-"""docker-compose.yml, without Docker: it is sound, and its commands on this machine make a ground station's vehicle."""
+"""docker-compose.yml, without Docker: sound, and on this machine its commands make a vehicle and fly a campaign."""
 
 import math
 import re
@@ -40,8 +40,20 @@ def test_every_service_has_a_known_command_and_needs_only_what_is_there():
     for name, service in services.items():
         assert set(service.get("depends_on", ())) <= set(services), name
         if command := service.get("command"):
-            assert command[0] == "lapwing"
-            assert command[1] in ("run", "service", "replay")
+            assert command[0] == "lapwing" or command[:2] == ["python", "-m"]
+            assert command[1] in ("run", "service", "replay", "campaign", "-m")
+
+
+def test_a_profile_starts_all_that_it_needs_and_nothing_else():
+    services = compose()
+    for name, service in services.items():
+        assert service["profiles"], name  # one without starts with every profile
+        for needed in service.get("depends_on", ()):
+            assert set(service["profiles"]) <= set(services[needed]["profiles"]), f"{name} needs {needed}"
+    of = {p: {n for n, s in services.items() if p in s["profiles"]} for p in ("cluster", "mission", "groundstation")}
+    assert of["cluster"] == {"scheduler", "worker", "campaign"}
+    assert of["mission"] == {"mission", *services["mission"]["depends_on"]}
+    assert of["groundstation"] == {*of["mission"], "groundstation"}
 
 
 def test_with_certificates_every_service_is_given_its_own_and_no_other():
@@ -64,7 +76,7 @@ def test_containers_are_closed():
             assert service["read_only"], name
             assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
         # who starts as root has what is needed to become another, and no more (deploy/entrypoint.sh)
-        added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder") else []
+        added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder", "campaign") else []
         assert service.get("cap_add", []) == added, name
         assert ("user" in service) == bool(added), name
 
@@ -87,6 +99,34 @@ def test_every_process_that_a_scene_needs_has_a_container_and_an_endpoint(scene)
 def test_every_process_of_the_table_has_an_endpoint():
     peers, _ = endpoints()
     assert {entry.name for entry in processes.PROCESSES} <= set(peers)
+
+
+def test_a_cluster_flies_a_campaign(tmp_path):
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
+    services, port = compose(), str(free_port())
+
+    def begun(name, *more):
+        words = [word.replace("scheduler:8786", f"127.0.0.1:{port}") for word in services[name]["command"]]
+        words = [port if word == "8786" else word.replace("recordings/", f"{tmp_path}/") for word in words]
+        other = {"/tmp": str(tmp_path), SET["SCENE"]: "scenes/hover.toml"}
+        words = [other.get(word, word) for word in words]
+        program = [sys.executable, *words[1:]] if words[0] == "python" else [sys.executable, "-m", *words]
+        with (tmp_path / f"{name}.txt").open("w") as said:
+            return subprocess.Popen([*program, *more], cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
+
+    helpers = []
+    try:
+        helpers = [begun("scheduler"), begun("worker")]
+        flown = begun("campaign", "--set", "run.duration=1", "--runs", "4")
+        assert flown.wait(timeout=300) == 0, (tmp_path / "campaign.txt").read_text()
+        assert "4 runs" in (tmp_path / "campaign.txt").read_text()
+        assert (tmp_path / "campaign" / "report.html").exists()
+        assert "Register worker" in (tmp_path / "scheduler.txt").read_text()
+    finally:
+        for process in helpers:
+            process.terminate()
+        for process in helpers:
+            process.wait(timeout=60)
 
 
 def test_the_groundstations_services_fly_as_separate_processes(tmp_path):

@@ -4,12 +4,11 @@ What an entry says of a table is laid over the common one, key by key. A text in
 the vehicle: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` changes what the file says.
 """
 
-import copy
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from cosim.scene.errors import SceneError, Source
-from cosim.scene.files import laid_over
+from cosim.scene.files import copied, laid_over
 from cosim.scene.overrides import Override
 from cosim.scene.scene import Scene, Section, Vocabulary
 from dynamics.errors import KeyedError
@@ -50,7 +49,7 @@ def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str,
         else:
             own[VEHICLE][name] = value
     defaults = {name: keys for name, section in vocabulary.sections.items() if (keys := section.numbered(i))}
-    return copy.deepcopy(laid_over(defaults, laid_over(common, own)))
+    return copied(laid_over(defaults, laid_over(common, own)))
 
 
 def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:

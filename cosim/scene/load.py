@@ -1,6 +1,5 @@
 """From a file, its overrides and the files that it names to a scene; or from a recorded tree."""
 
-import copy
 import difflib
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -11,7 +10,7 @@ from pydantic import ValidationError
 
 from cosim.scene import fleet
 from cosim.scene.errors import SceneError, Source
-from cosim.scene.files import Files, parse_toml
+from cosim.scene.files import Files, copied, parse_toml
 from cosim.scene.locate import line_of, source_of
 from cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
 from cosim.scene.scene import Scene, Section, Vocabulary
@@ -183,7 +182,7 @@ def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[Sectio
         if not isinstance(raw, dict):
             raise KeyedError(name, f"got {raw!r}", f"a table [{name}]")
         try:
-            tables[section] = section.model_validate(copy.deepcopy(raw))
+            tables[section] = section.model_validate(copied(raw))
         except ValidationError as error:
             raise fault(error, section).under(name) from None
     return tables

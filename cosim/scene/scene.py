@@ -77,6 +77,13 @@ S = TypeVar("S", bound=Section)
 T = TypeVar("T")
 
 
+class _Found(NamedTuple):
+    """What a function has found in a scene, and the tables that it has asked for."""
+
+    value: Any
+    read: set[type[Section] | None]
+
+
 class Scene:
     """A validated scene. `scene[Run]` is the table that the class `Run` declares. It opens no file."""
 
@@ -97,19 +104,33 @@ class Scene:
         self._locate = locate  # what a key is called in the file, and who gave it its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
-        self._found: dict[Callable[[Scene], Any], Any] = {}
+        self._found: dict[Callable[[Scene], Any], _Found] = {}
+        self._reading: list[set[type[Section] | None]] = []  # the tables that functions under way have asked for
 
     def once(self, of: Callable[["Scene"], T]) -> T:
-        """What a function finds in the scene, which never changes: called once, and remembered."""
-        if of not in self._found:
-            self._found[of] = of(self)
-        return self._found[of]
+        """What a function finds in the scene, which never changes: called once, and remembered.
+
+        It is to look at the tables alone, by `[]`, `has`, `section`, `tables` and `lookup`.
+        """
+        found = self._found.get(of)
+        if found is None:
+            self._reading.append(set())
+            try:
+                value = of(self)
+            finally:
+                read = self._reading.pop()
+            found = self._found[of] = _Found(value, read)
+        if self._reading:
+            self._reading[-1] |= found.read
+        return found.value
 
     def __getitem__(self, section: type[S]) -> S:
         return self._known(section)._tables[section]  # type: ignore[return-value]
 
     def _known(self, section: type[Section] | None) -> "Scene":
         """This scene; SceneError where that is one of several vehicles, who each have such a table of their own."""
+        if self._reading:
+            self._reading[-1].add(section)
         if self.vehicles and section is not None and not section.SHARED:
             expected = "a scene of one vehicle, which is all that can be used here"
             raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, Source(self.path))
@@ -133,7 +154,9 @@ class Scene:
         """The same scene with this table in the place of its own; not checked against the others."""
         tables = {**self._tables, type(section): section}
         vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
-        return Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
+        scene = Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
+        scene._found = {of: found for of, found in self._found.items() if type(section) not in found.read}
+        return scene
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -86,8 +86,9 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
     x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring beyond its onset
     place = position[:2]
     residual = _springs(e, weight, x, place)
+    left = _norm(residual)
     for _ in range(ITERATIONS):
-        if np.linalg.norm(residual) < BALANCED * weight:
+        if left < BALANCED * weight:
             break
         growth = np.array([_springs(e, weight, x + change, place) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
         try:
@@ -95,12 +96,14 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
         except np.linalg.LinAlgError:  # fewer than three feet press
             return position, attitude
         shares = 0.5 ** np.arange(20.0)
-        trials = (x + share * step for share in shares)
-        nearer = (t for t in trials if np.linalg.norm(_springs(e, weight, t, place)) < np.linalg.norm(residual))
-        if (better := next(nearer, None)) is None:
+        for trial in (x + share * step for share in shares):
+            found = _springs(e, weight, trial, place)
+            if (nearer := _norm(found)) < left:
+                break
+        else:
             break  # as near as numbers allow
-        x, residual = better, _springs(e, weight, better, place)
-    if not np.linalg.norm(residual) < TOLERATED * weight:
+        x, residual, left = trial, found, nearer
+    if not left < TOLERATED * weight:
         return position, attitude
     slope = (float(x[1]), float(x[2]))
     level = NO_ROTATION if attitude == NO_ROTATION and math.hypot(*slope) < CONVERGED else None
@@ -112,14 +115,20 @@ def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
 
     `x`: height [m] and slopes of the vehicle. A foot that friction holds pushes straight up.
     """
-    R_world_body = _aligned((float(x[1]), float(x[2])))
-    found = np.array([-weight, 0.0, 0.0])
+    height, *slope = x.tolist()
+    R_world_body = _aligned(slope)
+    force, x_moment, y_moment = -weight, 0.0, 0.0  # one by one: arrays of three numbers take longer
     for foot in e.feet:
         arm = apply(R_world_body, foot)
-        depth, normal = _depth(e, arm, (*place, float(x[0])))
+        depth, normal = _depth(e, arm, (*place, height))
         if depth > 0.0:
-            found += _press(e, depth) / normal[2] * np.array([1.0, arm[0], arm[1]])
-    return found
+            push = _press(e, depth) / normal[2]
+            force, x_moment, y_moment = force + push, x_moment + push * arm[0], y_moment + push * arm[1]
+    return np.array([force, x_moment, y_moment])
+
+
+def _norm(residual: np.ndarray) -> float:
+    return math.sqrt(residual.dot(residual))
 
 
 def _depth(e: Any, arm: Vec3, centre: Vec3) -> tuple[float, Vec3]:
@@ -153,7 +162,7 @@ def _anchors(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Any, ...] | 
     return tuple(found)
 
 
-def _aligned(slope: tuple[float, float]) -> Mat3:
+def _aligned(slope: Sequence[float]) -> Mat3:
     """R_world_body of a body that stands on a plane z = a x + b y, with its x axis over the world's."""
     a, b = slope
     forward, normal = 1.0 / math.hypot(1.0, a), 1.0 / math.sqrt(1.0 + a * a + b * b)

@@ -104,11 +104,13 @@ def report(
     """Write a report of a log, or of two laid over each other: a page for a browser, or plots on paper."""
     from lapwing.cli.files import check_distinct, check_report
     from lapwing.flight import Flight
+    from studies.flight import SHOWN
 
     with user_errors():
         check_distinct({"FILE": log, "the second FILE": other, "--out": out})
         check_report("--out", out)
-        typer.echo(Flight.read(log, vehicle).report(out, Flight.read(other, vehicle) if other else None))
+        beside = Flight.read(other, vehicle, SHOWN) if other else None
+        typer.echo(Flight.read(log, vehicle, SHOWN).report(out, beside))
 
 
 @app.command()
@@ -123,12 +125,13 @@ def view(
 
     from lapwing.flight import Flight
     from lapwing.rerun import open_in_rerun
+    from studies.flight import SHOWN
 
     with user_errors():
         if rerun:
             open_in_rerun(log)
             return
-        page = Flight.read(log).report()
+        page = Flight.read(log, only=SHOWN).report()
         if not webbrowser.open(page.resolve().as_uri()):
             typer.echo("no browser was found; open the page yourself:")
         typer.echo(page)

@@ -35,7 +35,7 @@ def scene_schema() -> Schema:
     tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
     tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
     tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
-    tables["vehicle"]["properties"]["model"]["enum"] = models.names()
+    tables["vehicle"]["properties"]["model"]["enum"] = list(models.names())
     tables["autopilot"]["properties"]["parameters"] = _parameters()
     for name, section in sections.items():
         if section.FROM_FILE:  # what a scene says of it is laid over the file's content

@@ -11,6 +11,10 @@ from services.common.vehicle import Effects, airframe, gravity, rotor_constants,
 
 def known_airframe(scene: Scene) -> Airframe:
     """What the autopilot is told of the vehicle: nominal numbers, in the air of home."""
+    return scene.once(_known_airframe)
+
+
+def _known_airframe(scene: Scene) -> Airframe:
     frame = airframe(scene)
     rotor = rotor_constants(scene)
     torque_per_thrust = rotor.torque / rotor.thrust

@@ -119,6 +119,10 @@ def table(scene: "Scene") -> dict[str, Parameter]:
     Raises:
         KeyedError: the scene sets a parameter that is not there, or to a value that it cannot have.
     """
+    return dict(scene.once(_table))
+
+
+def _table(scene: "Scene") -> dict[str, Parameter]:
     known = {p.name: p for p in (*of_gains(scene.section("gains")), *_FLIGHT, *_FAILSAFES)}
     for name, value in scene.lookup("autopilot.parameters").items():
         if name not in known:

@@ -181,6 +181,10 @@ def gravity(scene: Scene) -> float:
 
 def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     """(position of the centre of mass [m], attitude) in the world of the vehicle that stands on the ground at home."""
+    return scene.once(_start_pose)
+
+
+def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
     pose = standing_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
     if not isinstance(terrain, Level):

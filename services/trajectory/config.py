@@ -21,7 +21,7 @@ from typing import Any, ClassVar, Literal
 from cosim.scene import Files, Scene, Section
 from cosim.scene.files import named
 from dynamics.errors import KeyedError
-from services.trajectory.mission import CHANNELS, compile
+from services.trajectory.mission import CHANNELS, Compiled, compile
 from services.trajectory.phases import Phases
 from services.trajectory.table_file import parse
 
@@ -50,6 +50,15 @@ class Trajectory(Phases, Section):
 
     def check(self, scene: Scene) -> None:
         """The segments join, phases are long enough; a frame is that of a leader."""
-        compile(self)
+        compiled(scene)
         if self.frame and not self.follow:
             raise KeyedError("trajectory.frame", "there is no leader whose it could be", "trajectory.follow, or none")
+
+
+def compiled(scene: Scene) -> Compiled:
+    """The scene's trajectory about the origin; KeyedError as of `compile`."""
+    return scene.once(_compiled)
+
+
+def _compiled(scene: Scene) -> Compiled:
+    return compile(scene[Trajectory])

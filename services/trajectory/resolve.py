@@ -14,10 +14,9 @@ from services.common.exchange import Exchange
 from services.common.ports import Reference
 from services.common.sections import follows_trajectory
 from services.common.vehicle import start_place
-from services.trajectory.config import Trajectory
+from services.trajectory.config import Trajectory, compiled
 from services.trajectory.core import TrajectoryPath
 from services.trajectory.following import FollowedPath
-from services.trajectory.mission import compile
 from services.trajectory.piece import Parameters
 from services.trajectory.service import TrajectorySetup
 
@@ -29,12 +28,12 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     if not follows_trajectory(scene):
         return None
     exchange = scene[Exchange]
-    trajectory = scene[Trajectory]
-    compiled = compile(trajectory, start_place(scene))
-    core = TrajectoryPath(compiled.parameters, compiled.final, exchange.interval)
+    trajectory, found = scene[Trajectory], compiled(scene)
+    path = found.parameters._replace(origin_world=start_place(scene))
+    core = TrajectoryPath(path, found.final, exchange.interval)
     ahead = max(1, round(LEAD * exchange.rate))
     return ServiceSetup(
-        TrajectorySetup(core, compiled.phases, *_leader(trajectory)),
+        TrajectorySetup(core, found.phases, *_leader(trajectory)),
         (Input(ports.TRUTH, ahead),),
         (Port(ports.TRAJECTORY, Reference()),),
     )

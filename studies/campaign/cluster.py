@@ -44,6 +44,7 @@ def dask(address: str) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterat
                 message = f"the scheduler at {address} is lost"
                 raise RunFailed(f"{message}; the same command goes on where it stopped") from None
             finally:
-                client.cancel(list(futures))
+                if left := [future for future in futures if not future.done()]:
+                    client.cancel(left)
 
     return run

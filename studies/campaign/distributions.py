@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,7 +108,8 @@ def parse(text: str) -> Distribution:
     try:
         return KINDS[found[1]](*arguments)
     except TypeError:
-        raise ValueError(f"{found[1]}: got {found[2]!r}, expected the arguments as numbers") from None
+        wanted = ", ".join(signature(KINDS[found[1]]).parameters)
+        raise ValueError(f"{found[1]}: got {found[2]!r}, expected {found[1]}({wanted}) with numbers") from None
 
 
 def _made(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:

@@ -10,7 +10,7 @@ from studies.campaign.results import Results
 from studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
 from studies.figures import FIGURES
 from studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
-from studies.report.style import AXIS_COLOURS, BOUND, FLOWN, QUIET, REFERENCE
+from studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
 from studies.report.thin import every
 from studies.tracking import DEGREE
 
@@ -54,9 +54,10 @@ def _distributions(found: Results, names: list[str], caption: str) -> Plot:
     limits, panels = required(found), []
     for k, name in enumerate(names):
         label, scale = shown(name)
-        values = scale * np.sort(found[name][np.isfinite(found[name])])
-        share = np.arange(1, len(values) + 1) / len(values)
-        marks: list[Mark] = [Line(values, share, "runs")]
+        marks: list[Mark] = []
+        for legend, column, colour in _each(found, name):
+            values = scale * np.sort(column[np.isfinite(column)])
+            marks.append(Line(values, np.arange(1, len(values) + 1) / len(values), legend, colour))
         if name in found.published:
             marks.append(_upright(scale * found.published[name], found.source, REFERENCE))
         if name in limits:
@@ -66,8 +67,19 @@ def _distributions(found: Results, names: list[str], caption: str) -> Plot:
     return _grid(panels, caption)
 
 
+def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
+    """(legend, figure of the runs, colour) of each vehicle of a fleet; of the run where there is one vehicle, or more
+    than can be told apart."""
+    own = found.of_vehicles(name)
+    if not 0 < len(own) <= len(COLOURS):
+        return [("the worst vehicles" if own else "runs", found[name], FLOWN)]
+    return [(vehicle, own[vehicle], colour) for vehicle, colour in zip(own, COLOURS, strict=False)]
+
+
 def touchdown(found: Results) -> Plot:
-    """Where the vehicle touches down, and the ellipses of a normal distribution."""
+    """Where the vehicles touch down; of one also the ellipses of a normal distribution."""
+    if found.vehicles:
+        return _touchdowns(found)
     points = np.column_stack([found["touchdown.x"], found["touchdown.y"]])
     good = found["success"].astype(bool)[np.isfinite(points).all(axis=1)]
     points = points[np.isfinite(points).all(axis=1)]
@@ -87,6 +99,19 @@ def touchdown(found: Results) -> Plot:
     )
     drawn = tuple(mark for mark in marks if len(mark.x))
     return Plot((Panel(drawn, "y [m]", "x [m]", timed=False, equal=True),), caption, 5.0)
+
+
+def _touchdowns(found: Results) -> Plot:
+    """Those of each vehicle of a fleet."""
+    marks = []
+    for (vehicle, x, colour), (_, y, _) in zip(_each(found, "touchdown.x"), _each(found, "touchdown.y"), strict=True):
+        there = np.isfinite(x) & np.isfinite(y)
+        if there.any():
+            marks.append(_dots(np.column_stack([x, y])[there], vehicle, colour))
+    if not marks:
+        raise NotRecordedError("no vehicle touches down, or there are too many to tell apart")
+    panel = Panel(tuple(marks), "y [m]", "x [m]", timed=False, equal=True)
+    return Plot((panel,), "Last touch-down of each vehicle in each run.", 5.0)
 
 
 def success(found: Results) -> Plot:

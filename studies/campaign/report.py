@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from studies.campaign import plots
+from studies.campaign import plots, show
 from studies.campaign.results import Results
 from studies.report.page import render
 from studies.report.paper import write_pdf, write_png
@@ -79,6 +79,10 @@ def _page(found: Results, sections: list[Section]) -> str:
         facts={name: text for name, text in facts.items() if text},
         heads=[label for label, _ in heads],
         worst=worst,
+        vehicles=show.vehicle_cells(found),
+        vehicle_heads=show.VEHICLE_COLUMNS,
+        vehicle_title=show.VEHICLES,
+        nearest=show.nearest_of(found) if found.vehicles else "",
         refused=list(refused)[:WORST],
         refusals=len(found.refused["run"]),
         sections=sections,

@@ -85,6 +85,10 @@ class Results:
         """How a figure is distributed."""
         return spread(self[name], self["run"], least=name in LEAST_IS_WORST)
 
+    def of_vehicles(self, name: str) -> dict[str, np.ndarray]:
+        """A figure of each vehicle of a fleet, by the vehicle's name; {} of a scene of one."""
+        return {vehicle: self[f"{vehicle}.{name}"] for vehicle in self.vehicles}
+
     def number(self, key: str) -> np.ndarray:
         """A parameter as numbers: texts by their place in alphabetical order."""
         values = self[key]

@@ -12,6 +12,8 @@ from studies.campaign.results import Results
 from studies.tracking import AXES, shown
 
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
+VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success")
+VEHICLES = "The vehicles: worst run of each, and in how many runs it did not fail"
 LISTED = 10  # failures, refusals
 
 
@@ -47,19 +49,33 @@ def show(console: Console, found: Results) -> None:
 
 
 def _vehicles(console: Console, found: Results) -> None:
-    table = Table(title="The vehicles: worst run of each, and in how many runs it did not fail", title_justify="left")
+    table = Table(title=VEHICLES, title_justify="left")
     table.add_column("vehicle", no_wrap=True)
-    for column in ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success"):
+    for column in VEHICLE_COLUMNS:
         table.add_column(column, justify="right", no_wrap=True)
-    for vehicle in found.vehicles:
-        spreads = [found.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
-        share = f"{found[f'{vehicle}.success'].astype(bool).mean():.1%}"
-        table.add_row(vehicle, *(f"{s.worst:.4f}" if s else "" for s in spreads), share)
+    for vehicle, cells in vehicle_cells(found).items():
+        table.add_row(vehicle, *cells)
     console.print(table)
+    console.print(f"Nearest of any two vehicles: {nearest_of(found)}", highlight=False)
+
+
+def vehicle_cells(found: Results) -> dict[str, list[str]]:
+    """What `VEHICLE_COLUMNS` say of each vehicle of a fleet."""
+    return {vehicle: _cells(found, vehicle) for vehicle in found.vehicles}
+
+
+def _cells(found: Results, vehicle: str) -> list[str]:
+    spreads = [found.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
+    share = f"{found[f'{vehicle}.success'].astype(bool).mean():.1%}"
+    return [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+
+
+def nearest_of(found: Results) -> str:
+    """How near two vehicles of a fleet came to one another."""
     least = found.spread(NEAREST)
-    if least:
-        text = f"{least.worst:.2f} m apart (run {least.run}), in half of the runs below {least.median:.2f} m"
-        console.print(f"Nearest of any two vehicles: {text}", highlight=False)
+    if least is None:
+        return "unknown"
+    return f"{least.worst:.2f} m apart (run {least.run}), in half of the runs below {least.median:.2f} m"
 
 
 def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str]) -> None:

@@ -11,13 +11,8 @@ from services.table import load, resolve
 
 OWN = {"cosim", "dynamics", "messages", "services"}
 NEEDED = {"annotated_types", "llvmlite", "numba", "numpy", "typing_extensions", "zenoh"}
-BY_OTHERS = {
-    "cffi",
-    "cython_runtime",
-    "pycparser",
-    "scipy",
-    "yaml",
-}  # numpy's, and what numba imports where it is installed
+# numpy's, and what numba imports where it is installed
+BY_OTHERS = {"cffi", "cython_runtime", "pycparser", "scipy", "yaml"}
 CHILD = """
 import sys
 before = set(sys.modules)

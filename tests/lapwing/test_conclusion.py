@@ -90,6 +90,6 @@ def test_what_the_end_of_a_run_reads_is_all_that_it_shows(tmp_path, scene):
     log = package.fly(package.load(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
     (part,), whole = Flight.read_all(log, SHOWN), Flight.read(log)
     assert set(part.topics) < set(whole.topics)
-    assert flight_page([part]) == flight_page([whole])
+    assert flight_page([part]) == flight_page([whole]) == flight_page([Flight.read(log, only=SHOWN)])
     assert part.events == whole.events
     assert str(figures(part)) == str(figures(whole))  # as texts: some are NaN

@@ -44,8 +44,8 @@ def steps(stream):
 class Run:
     """A run in this process, half a second a step, as a launcher would see it."""
 
-    def __init__(self, scene="hover"):
-        self.setup = resolve(load(scene, {"run.duration": 3.0}))
+    def __init__(self, scene="hover", overrides=()):
+        self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
         self._graph = Graph(self.setup, create_all(self.setup), PAGE)
         self.spoken, self.listen, self.time_ns = set(self.setup.services), None, 0
         self.published = []
@@ -107,7 +107,7 @@ def test_of_a_fleet_every_vehicle_is_shown_and_its_events_are_its_own():
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
-    run = Run()
+    run = Run(overrides={"rates.contact": 125})
     until = "const until = async (holds) => { while (!holds()) await new Promise((done) => setTimeout(done, 20)); };"
     until += 'await until(() => document.readyState === "complete");'
     until += 'const section = document.getElementById("motion"), state = document.getElementById("state");'
@@ -125,7 +125,7 @@ def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
                 follow.observe(run)
             browser.run(until + "await until(() => Number(section.dataset.time) > 1.9);")
             page.__exit__()
-            path, rotors, events = browser.run(
+            path, rotors, events, forces = browser.run(
                 until
                 + """
                 await until(() => state.textContent === "the flight is over");
@@ -136,7 +136,14 @@ def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
                 const named = (name) => section.querySelector(".space").data.filter((trace) => trace.name === name);
                 const rows = document.querySelectorAll(".events tbody tr").length;
                 const rotors = section.querySelector(".space").data.findLast(({ line }) => line && line.width === 3);
-                return [named("flown")[0].z, rotors.z.filter((value) => value !== null).length, rows];
+                const shown = [named("flown")[0].z, rotors.z.filter((value) => value !== null).length, rows];
+                section.querySelector("[name=forces]").click();
+                slider.value = 0;
+                slider.dispatchEvent(new Event("input"));
+                await until(() => Number(section.dataset.time) === 0);
+                const arrows = () => named("force of contact or joint")[0].z.filter((value) => value !== null);
+                await until(() => arrows().length > 0);
+                return [...shown, arrows()];
                 """
             )
             assert browser.errors == []
@@ -144,6 +151,8 @@ def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
     assert np.all(np.diff(path[6:-1]) > -1e-6)  # it climbs
     assert rotors == 4 * (25 + 2)
     assert events == 4
+    weight = [max(forces[k : k + 5]) - forces[k] for k in range(0, len(forces), 5)]  # of each arrow, 0.02 m for 1 N
+    assert weight == pytest.approx([0.02 * 10.0224 * 9.80665 / 4] * 4, rel=1e-3)
 
 
 def test_a_run_is_shown_from_the_command_line(tmp_path):

@@ -62,8 +62,8 @@ def in_a_terminal(folder, *answers, more=()):
             said += os.read(terminal, 4096)
         except OSError:  # closed with the last process on it
             break
-        if left and re.search(rb"\[[^\[\]]*\]:? ?$", said):
-            os.write(terminal, left.pop(0).encode())
+        if said.endswith((b"]: ", b"[y/N] ")):
+            os.write(terminal, left.pop(0).encode() if left else b"\x04")  # who has no answer any more ends it
     return said.decode().replace("\r\n", "\n"), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 

@@ -7,8 +7,8 @@ import pytest
 from cosim.scene import SceneError
 from services.common.success import Success, holds
 from services.table import load
-from studies.figures import FIGURES, _farthest, check_success, figures
-from studies.tracking import AXES
+from studies.figures import FIGURES, check_success, figures
+from studies.tracking import AXES, Reference, strided, total, tracking
 
 N = 400
 
@@ -122,12 +122,38 @@ def test_the_default_lets_crashes_and_divergences_fail():
         check_success(load("hover", {"success.require": ["rmse.zz < 1"]}))
 
 
-def test_distance_and_overshoot_have_the_bits_of_numpys():
+@pytest.fixture
+def made():
+    """Reference, position, attitude and what is armed of 300 times, all over the place."""
     random = np.random.default_rng(7)
-    reference, position, armed = random.normal(size=(300, 6)), random.normal(size=(300, 3)), random.random(300) > 0.4
-    wanted, flown = reference[:, :3][armed], position[armed]
+    wanted, flown, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
+    return Reference(wanted[:, :3], 4.0 * wanted[:, 3:5], 4.0 * wanted[:, 5]), flown[:, :3], flown[:, 3:], armed
+
+
+def test_one_pass_over_the_rows_finds_what_numpy_finds(made):
+    (position, roll_pitch, yaw), flown, attitude, armed = made
+    found = tracking(*made)
+    errors = np.column_stack([position - flown, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))])
+    rmse = np.sqrt((errors[armed] ** 2).mean(axis=0))
+    assert list(found.rmse.values()) == pytest.approx(rmse, rel=1e-12)
+    wanted, flown = position[armed], flown[armed]
     beyond = np.concatenate([flown.max(axis=0) - wanted.max(axis=0), wanted.min(axis=0) - flown.min(axis=0)])
-    found = _farthest(reference, position, armed)
-    assert found == (np.linalg.norm(wanted - flown, axis=1).max(), beyond.max())
-    position[np.flatnonzero(armed)[7], 1] = np.nan
-    assert np.isnan(_farthest(reference, position, armed)).all()
+    assert found.distance == pytest.approx(np.linalg.norm(wanted - flown, axis=1).max(), rel=1e-12)
+    assert found.beyond == beyond.max()
+
+
+def test_what_is_no_number_stays_none(made):
+    _, flown, _, armed = made
+    assert np.isnan(list(tracking(*made[:3], np.zeros(300, bool)).rmse.values())).all()
+    flown[np.flatnonzero(armed)[7], 1] = np.nan
+    found = tracking(*made)
+    assert np.isnan([found.distance, found.beyond, found.rmse["y"]]).all()
+    assert np.isfinite([found.rmse[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
+
+
+@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
+def test_the_layout_of_the_numbers_is_no_matter(made, laid):
+    values = laid(made[1])
+    assert np.array_equal(strided(values), values)
+    assert total(values) == pytest.approx(values.sum(), rel=1e-12)
+    assert tracking(made[0], values, *made[2:]) == tracking(*made)

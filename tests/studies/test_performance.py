@@ -4,11 +4,15 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from dynamics.vehicles import performance
 from dynamics.vehicles.airframe import load_airframe
 from services.autopilot.known_airframe import known_airframe
+from services.autopilot.law import rotor_effectiveness
+from services.autopilot.law import shares as law_shares
 from services.table import load, resolve
 from studies.performance import card, show, write_json
 from studies.terminal import console
@@ -116,3 +120,23 @@ def test_an_airframe_of_which_nothing_says_what_its_rotors_give_is_refused_by_ch
         card(airframe_without(tmp_path, "propeller"))
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
         load("hover", {"vehicle.airframe": str(airframe_without(tmp_path, "propeller"))})
+
+
+def test_without_a_rotor_a_hexacopter_has_what_linear_programming_leaves_at_most():
+    """All thrusts up to the highest, torques of roll, pitch and yaw 0: the autopilot's least squares come near it."""
+    rows = {row.name: row for row in card(ROOT / "scenes/vehicles/hexacopter.toml")}
+    known = known_airframe(load("hexacopter"))
+    B, whole = rotor_effectiveness(known), rows["thrust over weight"].computed
+    bounds, most = [(0.0, 1.0)] * 6, []
+    for k, shares in enumerate(law_shares(known)[1:]):
+        torques = B[1:] if any(share[3] for share in shares) else B[1:3]
+        free = [(0.0, 0.0) if j == k else bound for j, bound in enumerate(bounds)]
+        most.append(-linprog(-B[0], A_eq=torques, b_eq=np.zeros(len(torques)), bounds=free).fun / 6.0)
+    found = rows["the same without a rotor"].computed
+    assert 0.75 * min(most) * whole < found <= min(most) * whole * (1.0 + 1e-9)
+    assert found > 1.0  # it flies on
+
+
+def test_four_rotors_cannot_lose_one():
+    row = next(row for row in card(VEHICLE) if row.name == "the same without a rotor")
+    assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")

@@ -7,6 +7,7 @@ of `dynamics.integrators.RATES`, `system(scene)` gives its parameters and the st
 
 import importlib
 import pkgutil
+from functools import cache
 from types import ModuleType
 
 from cosim.scene import Scene
@@ -14,9 +15,10 @@ from dynamics.errors import KeyedError
 from services.common.vehicle import Vehicle
 
 
-def names() -> list[str]:
+@cache
+def names() -> tuple[str, ...]:
     """Every model's name: its file name."""
-    return sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
 
 def get(name: str) -> ModuleType:

@@ -10,11 +10,13 @@ from lapwing.cli.main import app
 from services.table import load, resolve
 from studies.campaign.folder import read
 from studies.campaign.plan import plan
+from studies.campaign.plots import errors, touchdown
 from studies.campaign.results import Results
 from studies.campaign.runs import row_of
 from studies.campaign.setup import TOPICS
 from studies.figures import figures
 from studies.fly import fly_each
+from studies.report.plot import NotRecordedError
 from tests.cosim.memory_log import fly
 
 SHORT = ("run.duration=2.0", 'vehicle.2.success.require=["max_tilt < 0.001"]')
@@ -66,6 +68,19 @@ def test_a_row_has_the_worst_of_the_vehicles_and_each_of_them(folder):
     assert all(text.startswith("scout: Timed out") for text in found["told"])
     assert 4.0 < found["nearest"].min() < 4.3  # they stand 4.24 m apart
     assert "Nearest of any two vehicles" in said
+
+
+def test_the_report_shows_every_vehicle(folder):
+    path, _ = folder
+    page, found = (path / "report.html").read_text(), Results(read(path))
+    for vehicle in found.vehicles:
+        assert f'<th scope="row">{vehicle}</th>' in page
+    lines = {mark.name: mark for mark in errors(found).panels[0].marks}
+    assert set(lines) == {"left", "right", "scout"}
+    for vehicle, line in lines.items():
+        assert np.array_equal(line.x, np.sort(found[f"{vehicle}.rmse.x"]))
+    with pytest.raises(NotRecordedError, match="no vehicle touches down"):
+        touchdown(found)
 
 
 def test_what_varies_reaches_the_vehicle_that_it_names(folder):

@@ -1,0 +1,36 @@
+"""What a shard takes of a Dask scheduler and of the command that waits for it: how many workers one can keep busy.
+
+    python -m benchmarks.cluster [SHARDS]
+
+Shards of 250 runs whose rows are there at once, on one worker; scheduler and command are this process. It needs
+`pip install lapwing[cluster]`.
+"""
+
+import sys
+import time
+
+from studies.campaign.cluster import dask
+from studies.campaign.folder import MOST
+from studies.figures import FIGURES
+
+
+def rows(shard):
+    """Rows of a shard as they come from a flight, made up."""
+    numbers = {name: 1.0 / (1 + k) for k, name in enumerate(FIGURES)}
+    return [{"run": MOST * shard + k, "seed": k + 1, **numbers} for k in range(MOST)]
+
+
+def main(shards=2000):
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        began = time.process_time()
+        for _ in dask(cluster.scheduler_address)(rows, [(k,) for k in range(shards)]):
+            pass
+        each = (time.process_time() - began) / shards
+    print(f"{1e3 * each:.2f} ms of processor time for a shard: {1 / each:.0f} shards, {MOST / each:.0f} runs a second")
+    return []
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])
