@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,19 @@ def compose():
     text = (ROOT / "docker-compose.yml").read_text()
     text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: SET.get(m[1], m[2]), text)
     return yaml.safe_load(text)["services"]
+
+
+@contextmanager
+def ended_after(seconds):
+    """A list of processes, which are ended at last, each within so many seconds."""
+    running = []
+    try:
+        yield running
+    finally:
+        for process in running:
+            process.terminate()
+        for process in running:
+            process.wait(timeout=seconds)
 
 
 def free_port(kind=socket.SOCK_STREAM):
@@ -114,19 +128,14 @@ def test_a_cluster_flies_a_campaign(tmp_path):
         with (tmp_path / f"{name}.txt").open("w") as said:
             return subprocess.Popen([*program, *more], cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
 
-    helpers = []
-    try:
-        helpers = [begun("scheduler"), begun("worker")]
+    with ended_after(60) as helpers:
+        helpers.append(begun("scheduler"))
+        helpers.append(begun("worker"))
         flown = begun("campaign", "--set", "run.duration=1", "--runs", "4")
         assert flown.wait(timeout=300) == 0, (tmp_path / "campaign.txt").read_text()
         assert "4 runs" in (tmp_path / "campaign.txt").read_text()
         assert (tmp_path / "campaign" / "report.html").exists()
         assert "Register worker" in (tmp_path / "scheduler.txt").read_text()
-    finally:
-        for process in helpers:
-            process.terminate()
-        for process in helpers:
-            process.wait(timeout=60)
 
 
 def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
@@ -143,8 +152,7 @@ def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
         return word.replace("recordings/", f"{tmp_path}/")
 
     names = [*services["groundstation"]["depends_on"], "groundstation"]
-    running = []
-    try:
+    with ended_after(30) as running:
         for name in names:
             command = [sys.executable, "-m", "lapwing", *map(here, services[name]["command"][1:])]
             with (tmp_path / f"{name}.txt").open("w") as said:
@@ -177,8 +185,3 @@ def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
             pass
         station.close()
         assert "does not call for it" in (tmp_path / "trajectory.txt").read_text()
-    finally:
-        for process in running:
-            process.terminate()
-        for process in running:
-            process.wait(timeout=30)

@@ -24,17 +24,18 @@ from services.mavlink.view import VehicleView
 INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
 WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
 MODES = tuple(dict.fromkeys(mode.kind for mode in flavours.get("px4").MODES))
-SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer", "optical_flow", "airspeed")
+_GPS = ("gps", "GPS")
 _OF_SOURCE = {  # what PX4 calls them
     "imu": ("gyro", "Gyroscope and accelerometer"),
-    "gps": ("gps", "GPS"),
+    "gps": _GPS,
+    "gps_velocity": _GPS,
     "barometer": ("absolute_pressure", "Absolute pressure"),
     "sonar": ("distance_sensor", "Distance sensor"),
     "magnetometer": ("magnetometer", "Magnetometer"),
     "optical_flow": ("optical_flow", "Optical flow"),
     "airspeed": ("differential_pressure", "Differential pressure"),
 }
-_OF_SOURCE["gps_velocity"] = _OF_SOURCE["gps"]
+SOURCES = tuple(_OF_SOURCE)
 _COMPONENTS = tuple(
     dict.fromkeys(
         (
