@@ -8,34 +8,28 @@ import sys
 
 from benchmarks._bars import Row, empty_cache, show
 
-FLY = """
-import sys, time
-import lapwing
-lapwing.{how}
-print(time.process_time())
-"""
-HOVER, MISSION = "fly('hover')", "fly('delivery_mission')"
-MORE = "fly('delivery_mission', {'effects.body_drag.area': [0.06, 0.06, 0.06]})"
-LOOP = "campaign('delivery_mission', runs=1)"
-EULER = "fly('delivery_mission', {'vehicle.model': 'multibody', 'multibody.coordinates': 'euler', 'run.duration': 0.1})"
+DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.wind_random.beside_drag": True}
+EULER = {"vehicle.model": "multibody", "multibody.coordinates": "euler", "run.duration": 0.1}
+# What is flown: the function of `lapwing` and its arguments, and the bar [s]; those of one group share a cache.
+GROUPS = (
+    (("hover", "fly('hover')", 12.0),),
+    (("mission", "fly('delivery_mission')", 30.0), ("one more effect", f"fly('delivery_mission', {DRAG})", 7.0)),
+    (("the mission's closed loop", "campaign('delivery_mission', [1])", 12.0),),
+    (("five bodies in Euler angles", f"fly('delivery_mission', {EULER})", 40.0),),
+)
 
 
-def taken(environment, how):
-    """Processor time [s] of a process that does so."""
-    output = subprocess.check_output([sys.executable, "-c", FLY.format(how=how)], env=environment, text=True)
-    return float(output.splitlines()[-1])
+def taken(environment, call):
+    """Processor time [s] of a process that makes this call."""
+    code = f"import time, lapwing; lapwing.{call}; print(time.process_time())"
+    return float(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True).splitlines()[-1])
 
 
 def rows():
-    with empty_cache() as environment:
-        yield Row("hover, cold, processor time", taken(environment, HOVER), "s", 12.0)
-    with empty_cache() as environment:
-        yield Row("mission, cold, processor time", taken(environment, MISSION), "s", 30.0)
-        yield Row("one more effect, processor time", taken(environment, MORE), "s", 7.0)
-    with empty_cache() as environment:
-        yield Row("the mission's closed loop, cold, processor time", taken(environment, LOOP), "s", 12.0)
-    with empty_cache() as environment:
-        yield Row("five bodies in Euler angles, cold, processor time", taken(environment, EULER), "s", 40.0)
+    for group in GROUPS:
+        with empty_cache() as environment:
+            for name, call, bar in group:
+                yield Row(f"{name}, cold, processor time", taken(environment, call), "s", bar)
 
 
 def main():
