@@ -24,7 +24,7 @@ from numba.extending import intrinsic
 from cosim.schedule import KEPT, Input, Port, due
 from dynamics.cell import Cell
 from dynamics.generate import define, implements
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import kernel, leaf, uncounted
 from dynamics.rows import load, store
 
 GO_ON, LOOK, END, FAILED = range(4)
@@ -164,7 +164,7 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
     return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
-@kernel
+@uncounted
 def advance(memory: Any, tick: int) -> int:
     """One step of the part whose `Core` is in the cell `memory`; its signal."""
     core = memory.value

@@ -12,7 +12,7 @@ arguments that are functions or whose class cannot be imported by name: put kern
 from dynamics.kernel._began import BEGAN  # noqa: F401 (first of all)
 from dynamics.kernel._by_class import ByClass
 from dynamics.kernel._cache import Statistics, on_compile, statistics
-from dynamics.kernel._decorators import apart, kernel, leaf, uncompiled, vectorised
+from dynamics.kernel._decorators import apart, kernel, leaf, uncompiled, uncounted, vectorised
 from dynamics.kernel._files import root as cache_folder
 from dynamics.kernel._pipeline import Pipeline
 from dynamics.kernel._sources import digest as source_digest
@@ -31,5 +31,6 @@ __all__ = [
     "source_digest",
     "statistics",
     "uncompiled",
+    "uncounted",
     "vectorised",
 ]

@@ -64,6 +64,16 @@ def vectorised(function: F) -> F:
     return _compile(function)
 
 
+def uncounted(function: F) -> F:
+    """The same for a kernel that is called by its address alone, and changes arrays in place or not at all.
+
+    What it is given belongs to its caller until it returns, so that no references need to be counted: half of the time
+    of a flight. It must not put an array in another's place; one that makes arrays counts as any other.
+    """
+    function.__uncounted__ = True  # type: ignore[attr-defined]
+    return _compile(function)
+
+
 def leaf(function: F) -> F:
     """The same for small functions that are always inlined into their caller."""
     return _compile(function, forceinline=True)

@@ -15,14 +15,32 @@ from numba.core.environment import lookup_environment
 FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._dispose
 
 
+ALLOCATES = ("NRT_Allocate", "NRT_MemInfo_alloc", "NRT_MemInfo_new", "NRT_MemInfo_varsize_alloc")
+_COUNTING = ("NRT_incref", "NRT_decref")
+# In place of numba's: inlined, and gone. Weak, since what is linked later must stand before what is there.
+_NOTHING = "".join(f"define weak_odr void @{name}(ptr %0) alwaysinline {{ ret void }}\n" for name in _COUNTING)
+
+
+def _allocates(module: Any) -> bool:
+    return any(function.name.startswith(ALLOCATES) for function in module.functions)
+
+
+def _without_counting(module: Any) -> None:
+    """Let the code count no references, once functions are inlined."""
+    module.link_in(binding.parse_assembly(_NOTHING))
+    for name in _COUNTING:
+        module.get_function(name).linkage = "internal"
+
+
 class KernelLibrary(JITCodeLibrary):
     """Code of a kernel, to which the functions apart that it reaches are linked only when all else is optimised.
 
     Attributes:
         vectorises: whether its loops are left as they are until what they call is inlined.
+        uncounted: whether its code is to count no references, unless it makes arrays.
     """
 
-    vectorises = False
+    vectorises = uncounted = False
 
     def __init__(self, codegen: Any, name: str):
         super().__init__(codegen, name)
@@ -47,7 +65,15 @@ class KernelLibrary(JITCodeLibrary):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking())
         self._inner.clear()
+        if self.uncounted:
+            apart = [library._get_module_for_linking() for library in self._apart.values()]
+            self.uncounted = not any(map(_allocates, (self._final_module, *apart)))
         super().finalize()
+
+    def _optimize_final_module(self) -> None:
+        if self.uncounted:
+            _without_counting(self._final_module)
+        super()._optimize_final_module()
 
     def _optimize_functions(self, module: Any) -> None:
         """As numba does, which makes a pass manager for each function that is declared only, too: most of its time."""
@@ -71,6 +97,11 @@ class KernelLibrary(JITCodeLibrary):
     def _finalize_final_module(self) -> None:
         for library in reversed(self._apart.values()):  # callers first: of a module only what is called is linked
             self._final_module.link_in(library._get_module_for_linking())
+        if self.uncounted and self._apart:
+            _without_counting(self._final_module)
+            inliner = binding.create_new_module_pass_manager()
+            inliner.add_always_inliner_pass()
+            inliner.run(self._final_module, self._codegen._function_pass_manager()[1])
         super()._finalize_final_module()
         emitted = self._final_module
         self._bitcode = super()._get_module_for_linking().as_bitcode()

@@ -107,6 +107,7 @@ class KernelLowering(NativeLowering):
         if state.library is None:
             state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.vectorises = hasattr(state.func_id.func, "__vectorised__")
+            state.library.uncounted = hasattr(state.func_id.func, "__uncounted__")
             state.library.enable_object_caching()
         return super().run_pass(state)
 

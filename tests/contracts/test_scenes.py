@@ -6,10 +6,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
 
+import cosim.graph
+from cosim.graph import Graph
 from cosim.log import LogReader
+from cosim.part import run
+from services.common.operator import nobody
 from services.common.sections import Published, Run
-from services.table import load
+from services.processes import create_all
+from services.table import load, resolve
 
 pytestmark = pytest.mark.long
 
@@ -29,6 +35,26 @@ def fly(scene, folder):
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
 def test_scene_is_valid_and_says_what_it_is(scene):
     assert load(scene)[Run].title
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
+def test_no_part_makes_arrays(scene, monkeypatch):
+    """One that does counts references, which took half of a flight's time (docs/benchmarks.md, "Campaign")."""
+    made = 0
+
+    def watched(*arguments):
+        nonlocal made
+        before = rtsys.get_allocation_stats().mi_alloc
+        stopped = run(*arguments)
+        made += rtsys.get_allocation_stats().mi_alloc - before
+        return stopped
+
+    monkeypatch.setattr(cosim.graph, "run", watched)
+    setup = resolve(load(scene))
+    _nrt_python.memsys_enable_stats()
+    Graph(setup, create_all(setup, nobody), 1).advance(250)
+    _nrt_python.memsys_disable_stats()
+    assert made == 0
 
 
 def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):

@@ -10,7 +10,7 @@ from services.autopilot.estimator.height import follow_ground, update_barometer,
 from services.autopilot.estimator.parameters import PRESETS, Estimator
 from services.autopilot.estimator.predict import predict
 from services.autopilot.estimator.standstill import update_standstill
-from services.autopilot.estimator.state import NAMES, SOURCES, State, estimate, initial
+from services.autopilot.estimator.state import NAMES, SOURCES, State, estimate, initial, new_memory
 
 __all__ = [
     "NAMES",
@@ -21,6 +21,7 @@ __all__ = [
     "estimate",
     "follow_ground",
     "initial",
+    "new_memory",
     "predict",
     "update_barometer",
     "update_flow",

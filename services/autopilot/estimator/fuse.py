@@ -5,6 +5,7 @@ the rows of one reading are all taken about the same estimate.
 """
 
 from dynamics.kernel import kernel, leaf
+from dynamics.lanes import load, spread, store
 from dynamics.vector import Mat3, Vec3
 from services.autopilot.estimator.state import ACCELEROMETER, SIZE, THETA, Memory
 
@@ -20,15 +21,17 @@ def clear(m: Memory) -> None:
 @kernel
 def innovation_variance(m: Memory, variance: float) -> float:
     """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
-    m.product[:] = 0.0
+    for i in range(0, SIZE, 4):
+        store(m.product, i, spread(0.0))
     for j in range(SIZE):
         h = m.row[j]
-        if h != 0.0:
-            for i in range(SIZE):
-                m.product[i] += h * m.covariance[j, i]
+        if h != 0.0:  # of most rows only a few are not
+            for i in range(0, SIZE, 4):
+                store(m.product, i, load(m.product, i) + h * load(m.covariance, SIZE * j + i))
     total = variance + FLOOR
     for i in range(SIZE):
-        total += m.row[i] * m.product[i]
+        if m.row[i] != 0.0:
+            total += m.row[i] * m.product[i]
     return total
 
 
@@ -43,12 +46,16 @@ def absorb(m: Memory, innovation: float, s: float) -> float:
     """`fuse` with the innovation's variance s, and its covariance with the error in `m.product`."""
     y = innovation
     for i in range(SIZE):
-        y -= m.row[i] * m.correction[i]
+        if m.row[i] != 0.0:
+            y -= m.row[i] * m.correction[i]
     inverse = 1.0 / s
+    for i in range(0, SIZE, 4):
+        store(m.correction, i, load(m.correction, i) + load(m.product, i) * y * inverse)
     for i in range(SIZE):
-        m.correction[i] += m.product[i] * y * inverse
-        for j in range(SIZE):
-            m.covariance[i, j] -= (m.product[i] * m.product[j]) * inverse  # exactly symmetric
+        one = m.product[i]
+        for j in range(0, SIZE, 4):
+            change = (one * load(m.product, j)) * inverse  # exactly symmetric
+            store(m.covariance, SIZE * i + j, load(m.covariance, SIZE * i + j) - change)
     return y * y * inverse
 
 

@@ -1,12 +1,14 @@
 """Prediction by the inertial measurement unit (theory.md, eqs. (3.21) to (3.24))."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from dynamics.kernel import kernel, leaf
+from dynamics.lanes import load, store
 from dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
-from dynamics.vector import Mat3, Vec3, add, apply, norm, scale, subtract
+from dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
 from services.autopilot.estimator.parameters import Estimator
 from services.autopilot.estimator.state import (
     ACCELEROMETER,
@@ -24,6 +26,7 @@ from services.autopilot.estimator.state import (
     Inertial,
     Nominal,
     State,
+    three,
 )
 from services.autopilot.estimator.watch import repeated
 
@@ -32,29 +35,50 @@ _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 
 
 @leaf
-def _transform_rows(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
-    """c <- F c, with F = I + A dt: row blocks in an order in which none is overwritten before it is read."""
-    for j in range(SIZE):
-        for i in range(3):
-            c[POSITION + i, j] += dt * c[VELOCITY + i, j]
-        tx, ty, tz = c[THETA, j], c[THETA + 1, j], c[THETA + 2, j]
-        ax, ay, az = c[ACCELEROMETER, j], c[ACCELEROMETER + 1, j], c[ACCELEROMETER + 2, j]
-        gx, gy, gz = c[GYRO, j], c[GYRO + 1, j], c[GYRO + 2, j]
-        c[VELOCITY, j] += dt * (ty * f[2] - tz * f[1] - (r[0] * ax + r[1] * ay + r[2] * az))
-        c[VELOCITY + 1, j] += dt * (tz * f[0] - tx * f[2] - (r[3] * ax + r[4] * ay + r[5] * az))
-        c[VELOCITY + 2, j] += dt * (tx * f[1] - ty * f[0] - (r[6] * ax + r[7] * ay + r[8] * az))
-        c[THETA, j] -= dt * (r[0] * gx + r[1] * gy + r[2] * gz)
-        c[THETA + 1, j] -= dt * (r[3] * gx + r[4] * gy + r[5] * gz)
-        c[THETA + 2, j] -= dt * (r[6] * gx + r[7] * gy + r[8] * gz)
+def _transformed(
+    theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
+) -> tuple[Any, Any, Any]:
+    """The changed part of F c, with F = I + A dt, of a column c or of several in lanes: (theta, velocity, position)."""
+    return (
+        subtract(theta, scale(dt, apply(r, gyro))),
+        add(velocity, scale(dt, subtract(cross(theta, f), apply(r, accelerometer)))),
+        add(position, scale(dt, velocity)),
+    )
+
+
+@leaf
+def _loaded(c: np.ndarray, i: int, j: int) -> Any:
+    """The rows i to i + 2 of c, in lanes the columns j to j + 3."""
+    return load(c, SIZE * i + j), load(c, SIZE * (i + 1) + j), load(c, SIZE * (i + 2) + j)
+
+
+@leaf
+def _stored(c: np.ndarray, i: int, j: int, rows: Any) -> None:
+    for k in range(3):
+        store(c, SIZE * (i + k) + j, rows[k])
 
 
 @leaf
 def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
-    """c <- F c F^T."""
-    _transform_rows(c, f, r, dt)
-    _transform_rows(c.T, f, r, dt)
-    for i in range(GYRO):  # the two passes round differently: keep it exactly symmetric
-        for j in range(i):
+    """c <- F c F^T for a symmetric c."""
+    for j in range(0, SIZE, 4):
+        theta, velocity, position = _transformed(
+            _loaded(c, THETA, j), _loaded(c, VELOCITY, j), _loaded(c, POSITION, j),
+            _loaded(c, GYRO, j), _loaded(c, ACCELEROMETER, j), f, r, dt,
+        )  # fmt: skip
+        _stored(c, THETA, j, theta)
+        _stored(c, VELOCITY, j, velocity)
+        _stored(c, POSITION, j, position)
+    for i in range(GYRO):  # F changes no row below
+        row = c[i]
+        theta, velocity, position = _transformed(
+            three(row, THETA), three(row, VELOCITY), three(row, POSITION),
+            three(row, GYRO), three(row, ACCELEROMETER), f, r, dt,
+        )  # fmt: skip
+        for k in range(3):
+            row[THETA + k], row[VELOCITY + k], row[POSITION + k] = theta[k], velocity[k], position[k]
+    for i in range(SIZE):  # the two passes round differently: keep it exactly symmetric
+        for j in range(min(i, GYRO)):
             c[i, j] = c[j, i]
 
 

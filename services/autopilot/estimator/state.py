@@ -93,17 +93,37 @@ def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaterni
     return from_matrix((east[0], east[1], east[2], north[0], north[1], north[2], up[0], up[1], up[2]))
 
 
+def new_memory() -> Memory:
+    """Memory for a state."""
+    count = WATCHED
+    return Memory(
+        np.zeros((SIZE, SIZE)),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        np.zeros((HISTORY, 8)),
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros((count, 6)),
+        np.zeros(count),
+    )
+
+
 @kernel
-def initial(p: Estimator, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
+def initial(p: Estimator, memory: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
     """State of a vehicle that stands still.
 
     Args:
         p: `Estimator`.
+        memory: of the state, as `new_memory` makes it or of a state that is no longer used; it is written over.
         position_world: [m] where it is thought to stand, good to `p.start_std`.
         specific_force_body: [m/s^2] a reading of the accelerometers, or a mean of several.
         field_body: [T] the same of the magnetometer.
     """
-    covariance = np.zeros((SIZE, SIZE))
+    m = memory
+    covariance = m.covariance
+    covariance[:] = 0.0
     for i in range(3):
         covariance[THETA + i, THETA + i] = p.attitude_std**2
         covariance[VELOCITY + i, VELOCITY + i] = 0.1**2
@@ -116,23 +136,15 @@ def initial(p: Estimator, position_world: Vec3, specific_force_body: Vec3, field
     covariance[HEADING, HEADING] = p.heading_std**2
     covariance[BAROMETER, BAROMETER] = 50.0**2
     covariance[SCALE, SCALE] = p.sonar_scale_std**2
+    m.correction[:] = m.row[:] = m.product[:] = 0.0
+    m.history[:] = 0.0
+    m.since[:] = NEVER
+    m.refused[:] = m.repeats[:] = 0
+    m.last[:] = math.nan
+    m.nis[:] = 0.0
     attitude = level(p, specific_force_body, field_body)
     nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
-    inertial = Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False)
-    count = WATCHED
-    memory = Memory(
-        covariance,
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        np.zeros((HISTORY, 8)),
-        np.full(count, NEVER),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.full((count, 6), np.nan),
-        np.zeros(count),
-    )
-    return State(nominal, inertial, memory)
+    return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False), m)
 
 
 @leaf

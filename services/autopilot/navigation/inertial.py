@@ -35,7 +35,7 @@ def step(
         if magnetometer.due and still:
             nothing = (math.nan, math.nan, math.nan)
             field = magnetometer.value.field_body if magnetometer.value.valid else nothing
-            x = estimator.initial(p.filter, p.start_world, r.specific_force_body, field)
+            x = estimator.initial(p.filter, x.memory, p.start_world, r.specific_force_body, field)
             begun = True
     if begun:
         omega_variance = r.omega_variance if r.valid else -1.0

@@ -2,11 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from dynamics.lie.quaternion import NO_ROTATION
 from dynamics.vector import ZERO
-from services.autopilot.estimator.state import HISTORY, SIZE, WATCHED, Inertial, Memory, Nominal, State
+from services.autopilot.estimator.state import Inertial, Nominal, State, new_memory
 
 
 class NavigationState(NamedTuple):
@@ -18,19 +16,6 @@ class NavigationState(NamedTuple):
 
 def blank() -> NavigationState:
     """Before the first reading."""
-    n = WATCHED
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False)
-    memory = Memory(
-        np.zeros((SIZE, SIZE)),
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        np.zeros((HISTORY, 8)),
-        np.zeros(n, np.int64),
-        np.zeros(n, np.int64),
-        np.zeros(n, np.int64),
-        np.zeros((n, 6)),
-        np.zeros(n),
-    )
-    return NavigationState(False, State(nominal, inertial, memory))
+    return NavigationState(False, State(nominal, inertial, new_memory()))

@@ -89,7 +89,7 @@ def truth_at(t, agility):
 
 
 @kernel
-def fly(p, instruments, keys, ticks, agility, start, use_velocity, out):
+def fly(p, memory, instruments, keys, ticks, agility, start, use_velocity, out):
     """Fly and write one row per GPS period; returns the last estimate."""
     imu_p, mag_p, gps_p, baro_p, sonar_p = instruments
     imu_k, mag_k, gps_k, baro_k, sonar_k = keys
@@ -101,7 +101,7 @@ def fly(p, instruments, keys, ticks, agility, start, use_velocity, out):
     sonar_s = sonar.initial(sonar_p, sonar_k, truth)
     imu_s, i = imu.sample(imu_p, imu_s, imu_k, -2, truth)
     mag_s, m = magnetometer.sample(mag_p, mag_s, mag_k, -2, truth)
-    s = estimator.initial(p, start, i.specific_force_body, m.field_body)
+    s = estimator.initial(p, memory, start, i.specific_force_body, m.field_body)
     for tick in range(ticks):
         t = tick * INTERVAL
         truth = truth_at(t, agility)
@@ -187,6 +187,6 @@ def flight(seed=1, instruments=DEFAULT, p=estimator.PRESETS["rtk"], duration=40.
     keys = tuple(stream_key(seed, "drone1", name) for name in NAMES)
     draw = normal3(keys[0], TURN_ON, 999)  # the first guess is as wrong as the filter is told
     guess = (p.start_std * draw[0], p.start_std * draw[1], REST + p.start_std * draw[2])
-    fly(p, instruments, keys, ticks, agility, guess, velocity, out)
+    fly(p, estimator.new_memory(), instruments, keys, ticks, agility, guess, velocity, out)
     covariance = out[:, COVARIANCE:].reshape(-1, 9, 9)
     return Flight(out[:, :9], covariance, out[:, NIS:HEALTH], out[:, HEALTH].astype(int), out[:, REJECTED].astype(int))

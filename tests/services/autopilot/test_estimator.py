@@ -22,7 +22,9 @@ SEEDS = 100
 
 def at_rest(attitude=NO_ROTATION, p=P):
     force = rotate_back(attitude, (0.0, 0.0, p.gravity))
-    return estimator.initial(p, ZERO, force, rotate_back(attitude, STANDARD.magnetic_field_world))
+    return estimator.initial(
+        p, estimator.new_memory(), ZERO, force, rotate_back(attitude, STANDARD.magnetic_field_world)
+    )
 
 
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.1, -0.2, 2.5), (-0.4, 0.3, -1.0), (0.0, 0.0, math.pi / 2)])

@@ -16,7 +16,7 @@ REST = (0.0, 0.0, P.gravity)
 
 
 def at_rest():
-    return estimator.initial(P, ZERO, REST, STANDARD.magnetic_field_world)
+    return estimator.initial(P, estimator.new_memory(), ZERO, REST, STANDARD.magnetic_field_world)
 
 
 def predicted(s, ticks, force=REST):

@@ -25,7 +25,9 @@ P = estimator.PRESETS["rtk"]
 def test_row_against_differences_and_the_sensor(axis):
     """Errors of attitude and velocity by the truth: the row tells how the flow that a camera sees differs."""
     attitude, velocity, distance = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([2.0, -1.0, 0.5]), 4.0
-    memory = ef.estimator.initial(P, (0.0, 0.0, 0.0), (0.0, 0.0, 9.81), P.magnetic_field_world).memory
+    memory = ef.estimator.initial(
+        P, ef.estimator.new_memory(), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81), P.magnetic_field_world
+    ).memory
     r = tuple(rotation_matrix(attitude))
 
     def seen(q, v):
@@ -44,7 +46,7 @@ def test_row_against_differences_and_the_sensor(axis):
 
 
 @kernel
-def fly(p, instruments, keys, start, sees, out):
+def fly(p, memory, instruments, keys, start, sees, out):
     """The smooth flight of `estimator_flight` without a receiver from OUTAGE on; ten rows a second."""
     imu_p, mag_p, gps_p, sonar_p, flow_p = instruments
     imu_k, mag_k, gps_k, sonar_k, flow_k = keys
@@ -54,7 +56,7 @@ def fly(p, instruments, keys, start, sees, out):
     flow_s = optical_flow.initial(flow_p, flow_k, truth)
     imu_s, i = imu.sample(imu_p, imu_s, imu_k, -2, truth)
     mag_s, m = magnetometer.sample(mag_p, mag_s, mag_k, -2, truth)
-    s = estimator.initial(p, start, i.specific_force_body, m.field_body)
+    s = estimator.initial(p, memory, start, i.specific_force_body, m.field_body)
     for tick in range(round(END / ef.INTERVAL)):
         t = tick * ef.INTERVAL
         truth = ef.truth_at(t, 1.0)
@@ -92,7 +94,7 @@ def flights(sees):
         keys = tuple(stream_key(seed, "drone1", name) for name in names)
         draw = normal3(keys[0], TURN_ON, 999)
         guess = (P.start_std * draw[0], P.start_std * draw[1], ef.REST + P.start_std * draw[2])
-        fly(P, instruments, keys, guess, sees, out[seed])
+        fly(P, estimator.new_memory(), instruments, keys, guess, sees, out[seed])
     return out[..., :9], out[..., ef.COVARIANCE :].reshape(*out.shape[:2], 9, 9), out[..., ef.HEALTH].astype(int)
 
 

@@ -29,7 +29,7 @@ def test_the_height_comes_from_where_the_parameter_says(reference, least, most):
 def test_the_ground_moves_the_height_and_leaves_the_barometers_sum_alone():
     """z counts from the ground, z + b_h does not: its variance, and that of all else, stays."""
     p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
-    s = estimator.initial(p, (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
+    s = estimator.initial(p, estimator.new_memory(), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
     s = s._replace(nominal=s.nominal._replace(velocity_world=(3.0, 4.0, 1.0)))
     root = rng.normal(size=(state.SIZE, state.SIZE))
     s.memory.covariance[:] = root @ root.T

@@ -1,0 +1,22 @@
+"""A part that makes an array at every tick."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+from tests.cosim.parts.arrays import Last, Sum
+
+
+class Squares(NamedTuple):
+    """The sum of the squares up to the tick, in an array of its own."""
+
+    size: int
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The sum of the squares."""
+    squares = np.arange(p.size) ** 2.0
+    return Last(squares, s.count + 1), (Sum(squares.sum()),), GO_ON

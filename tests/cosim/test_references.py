@@ -1,0 +1,68 @@
+"""Compiled parts count no references to arrays, and what they hold is still freed once, when its last owner goes."""
+
+import gc
+import sys
+
+import numpy as np
+import pytest
+from numba.core.runtime import _nrt_python, rtsys
+
+from cosim.part import Part, advance
+from cosim.schedule import Port
+from dynamics.cell import Cell, read
+from tests.cosim.parts.arrays import Last, Mean, Sum
+from tests.cosim.parts.new_arrays import Squares
+from tests.cosim.small_graph import graph_of
+
+TICKS = 1000
+SUM = Port("sum", Sum(0.0))
+
+
+def counts(parameters):
+    """Whether the code of the parts of this class counts references."""
+    compiled = [found for found in advance.overloads.values() if parameters.__name__ in str(found.signature)]
+    return [b"NRT_incref" in found.library._get_compiled_object() for found in compiled]
+
+
+@pytest.fixture
+def living():
+    """What numba has made and not freed: (arrays' owners, blocks of memory)."""
+    _nrt_python.memsys_enable_stats()
+
+    def count():
+        gc.collect()
+        stats = rtsys.get_allocation_stats()
+        return stats.mi_alloc - stats.mi_free, stats.alloc - stats.free
+
+    yield count
+    _nrt_python.memsys_disable_stats()
+
+
+def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(living):
+    weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
+    before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
+    part = Part("mean", Mean(weights), Cell(Last(ticks, 0)), (), (SUM,))
+    graph = graph_of(part)
+    graph.advance(TICKS)
+    last = np.array([TICKS - 5 + (i - TICKS) % 5 for i in range(5)], float)
+    assert graph.latest("sum", TICKS - 1).number == pytest.approx(weights @ last)
+    assert read(part.state).count == TICKS
+    assert counts(Mean) == [False]
+    del part, graph
+    assert living() == owners
+    assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before
+
+
+def test_a_part_that_makes_arrays_counts_and_frees_them(living):
+    owners = living()
+    part = Part("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
+    graph = graph_of(part)
+    graph.advance(10)
+    held = living()
+    graph.advance(TICKS)
+    assert living() == held
+    assert graph.latest("sum", TICKS - 1).number == 91.0
+    assert read(part.state).ticks.tolist() == [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0]
+    assert counts(Squares) == [True]
+    del part, graph
+    assert living() == owners
