@@ -17,6 +17,7 @@ from numba.core.callconv import RETCODE_OK, CPUCallConv, excinfo_t
 from numba.core.imputils import impl_ret_new_ref
 from numba.core.lowering import Lower
 
+WIDEST = '"prefer-vector-width"="512"'  # left to itself, LLVM takes half of the registers of Intel's processors
 WHOLE = ".whole"  # at the end of the names of functions that are called so
 
 
@@ -112,6 +113,12 @@ def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
 
 class KernelLower(Lower):
     """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        """Begin the function."""
+        super().setup_function(fndesc)
+        if hasattr(self.func_ir.func_id.func, "__vectorised__"):
+            set.add(self.function.attributes, WIDEST)  # which llvmlite would refuse as unknown
 
     def incref(self, typ: types.Type, val: Any) -> None:
         if self._is_counted(typ):
