@@ -76,6 +76,7 @@ class Part:
         every: ticks between two steps.
         failure: the error of a step at a tick that says that the state is unsound.
         vehicle: of a fleet, whose part it is.
+        trusted: whether its step changes arrays in place or not at all, so that references need not be counted.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Part:
     every: int = 1
     failure: Callable[[int], Exception] | None = None
     vehicle: str = ""
+    trusted: bool = True
 
 
 class Code(NamedTuple):
@@ -101,15 +103,15 @@ def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Cod
     inputs = tuple(InputRows(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
     outputs = tuple(OutputRows(rows[port.name], port.period) for port in part.outputs)
     cell = Cell(Core(part.parameters, part.state, inputs, outputs))
-    return Code(_address(numba.typeof(cell)), cell.memory.pointer, cell)
+    return Code(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
 
 
 @cache
-def _address(cell: types.Type) -> int:
+def _address(cell: types.Type, trusted: bool) -> int:
     """The machine code that advances a part whose `Core` is in a cell of this type."""
-    signature = (cell, types.int64)
-    advance.compile(signature)  # type: ignore[attr-defined]
-    compiled: Any = advance.overloads[signature]  # type: ignore[attr-defined]
+    signature, function = (cell, types.int64), advance if trusted else advance_counted
+    function.compile(signature)  # type: ignore[attr-defined]
+    compiled: Any = function.overloads[signature]  # type: ignore[attr-defined]
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
@@ -164,14 +166,25 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
     return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
-@uncounted
-def advance(memory: Any, tick: int) -> int:
-    """One step of the part whose `Core` is in the cell `memory`; its signal."""
+@leaf
+def _advance(memory: Any, tick: int) -> int:
     core = memory.value
     s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
     _give_all(outputs, core.outputs, tick)
     return signal
+
+
+@uncounted
+def advance(memory: Any, tick: int) -> int:
+    """One step of the part whose `Core` is in the cell `memory`; its signal."""
+    return _advance(memory, tick)
+
+
+@kernel
+def advance_counted(memory: Any, tick: int) -> int:
+    """The same for parts that may put an array in another's place (docs/decisions/0016)."""
+    return _advance(memory, tick)
 
 
 @intrinsic

@@ -11,6 +11,7 @@ from cosim.part import Part, advance
 from cosim.schedule import Port
 from dynamics.cell import Cell, read
 from tests.cosim.parts.arrays import Last, Mean, Sum
+from tests.cosim.parts.exchanged_array import Exchange
 from tests.cosim.parts.new_arrays import Squares
 from tests.cosim.small_graph import graph_of
 
@@ -21,7 +22,8 @@ SUM = Port("sum", Sum(0.0))
 def counts(parameters):
     """Whether the code of the parts of this class counts references."""
     compiled = [found for found in advance.overloads.values() if parameters.__name__ in str(found.signature)]
-    return [b"NRT_incref" in found.library._get_compiled_object() for found in compiled]
+    modules = [found.library._get_module_for_linking() for found in compiled]
+    return [any(function.name == "NRT_incref" for function in module.functions) for module in modules]
 
 
 @pytest.fixture
@@ -66,3 +68,17 @@ def test_a_part_that_makes_arrays_counts_and_frees_them(living):
     assert counts(Squares) == [True]
     del part, graph
     assert living() == owners
+
+
+def test_a_part_that_is_not_trusted_may_put_an_array_in_anothers_place(living):
+    weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
+    before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
+    part = Part("exchange", Exchange(weights), Cell(Last(ticks, 0)), (), (SUM,), trusted=False)
+    graph = graph_of(part)
+    graph.advance(1)
+    assert graph.latest("sum", 0).number == 0.0
+    graph.advance(TICKS)
+    assert graph.latest("sum", TICKS - 1).number == -1.0
+    del part, graph
+    assert living() == owners
+    assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before

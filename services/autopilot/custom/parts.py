@@ -45,7 +45,7 @@ def controller_parts(
     if is_compiled(found):
         own, start = compiled(module, found, vehicle, code.options)
         p = CustomController(common, own, start, code.every, *per_demand, vehicle.voltage_max)
-        return [Part(name, p, Cell(core.start(p)), inputs, outputs)]
+        return [Part(name, p, Cell(core.start(p)), inputs, outputs, trusted=False)]
     construct = constructor(CONTROLLER, module, found, vehicle, code.options)
     asked = AskedController(code, module, construct, inputs[3].port, vehicle)
     p = CustomController(common, FromPort(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)

@@ -1,0 +1,21 @@
+"""A part that puts an array of its parameters into its state."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim.part import GO_ON
+from dynamics.kernel import leaf
+from tests.cosim.parts.arrays import Last, Sum
+
+
+class Exchange(NamedTuple):
+    """The weights, which become what is remembered."""
+
+    weights: np.ndarray  # (n,)
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The first of what is remembered."""
+    return Last(p.weights, s.count + 1), (Sum(s.ticks[0]),), GO_ON
