@@ -13,7 +13,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaWarning
 from numba.core.serialize import dumps
 
-from dynamics.kernel import _files, _sources
+from dynamics.kernel import _files, _sources, _turns
 from dynamics.kernel._key import Key, NotKeptError, key
 from dynamics.kernel._libraries import InnerLibrary
 from dynamics.kernel._pipeline import is_nested, reduced, restored
@@ -36,7 +36,8 @@ def statistics() -> Statistics:
 
 
 def on_compile(listener: Callable[[str], None]) -> None:
-    """Call `listener` with the name of every kernel ("module.function") before it is compiled."""
+    """Call `listener` with the name of every kernel ("module.function") before it is compiled, here or by another
+    process that this one then waits for."""
     _listeners.append(listener)
 
 
@@ -72,13 +73,17 @@ class KernelCache(_Cache):
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """The version for a signature; None if it must be compiled."""
         target_context.refresh()
-        result = self._loaded(sig, target_context) if self._enabled else None
+        found = self._key(sig, target_context.codegen()) if self._enabled else None
+        result = self._loaded(found, sig, target_context)
+        if result is None:
+            for listener in _listeners:
+                listener(self._label)
+            if found:
+                _turns.take(f"{self._folder}/{self._file(found, is_nested())}-{found.sources}")
+                result = self._loaded(found, sig, target_context)
         if result is not None:
             _counted["loaded"] += 1
-            return result
-        for listener in _listeners:
-            listener(self._label)
-        return None
+        return result
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         """Keep a version that has just been compiled."""
@@ -91,8 +96,8 @@ class KernelCache(_Cache):
             name = self._file(found, isinstance(data.library, InnerLibrary))
             _files.write(self._folder, name, found.sources, dumps((found, reduced(data))))
 
-    def _loaded(self, sig: Any, target_context: Any) -> CompileResult | None:
-        found, inner = self._key(sig, target_context.codegen()), is_nested()
+    def _loaded(self, found: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
+        inner = is_nested()
         content = _files.read(self._folder, self._file(found, inner), found.sources) if found else None
         if content is None:
             return None

@@ -22,6 +22,7 @@ from numba.core.typed_passes import NativeLowering
 
 from dynamics.kernel._calls import InnerLower, KernelLower, is_whole, offer
 from dynamics.kernel._libraries import InnerLibrary, KernelLibrary
+from dynamics.kernel._turns import given_back
 
 
 class _Depth(threading.local):
@@ -183,7 +184,8 @@ class KernelDispatcher(CPUDispatcher):
         found = self.overloads.get(tuple(arguments))
         if found is not None and isinstance(found.library, InnerLibrary) and not is_nested():
             del self.overloads[tuple(arguments)]
-        return super().compile(sig)
+        with given_back():
+            return super().compile(sig)
 
     def add_overload(self, cres: CompileResult) -> None:
         """Offer a version to kernels, and to Python if it is emitted."""

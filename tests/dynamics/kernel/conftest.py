@@ -96,6 +96,25 @@ from plant.large import middle
 def outermost(x):
     return middle(x) + 1.0
 """,
+    "plant/slow.py": """
+import os, time
+from dynamics.generate import implements
+from dynamics.kernel import kernel
+
+def held(x):
+    raise NotImplementedError
+
+@implements(held)
+def _held(x):
+    if "BEGUN" in os.environ:
+        open(os.environ["BEGUN"], "w").close()
+        time.sleep(60.0)
+    return lambda x: x + 1.0
+
+@kernel
+def slow(x):
+    return held(x)
+""",
     "run.py": """
 import json, sys
 from dynamics.kernel import on_compile, statistics

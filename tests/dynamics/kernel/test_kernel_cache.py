@@ -2,7 +2,10 @@
 
 import os
 import shutil
+import signal
 import stat
+import subprocess
+import time
 
 import pytest
 
@@ -127,13 +130,48 @@ def test_one_version_that_names_what_is_gone_spoils_no_other(package):
 
 
 def test_several_processes_that_warm_at_once(package):
-    processes = [package.start(ALL) for _ in range(4)]
-    assert [package.end(process)["values"] for process in processes] == [VALUES] * 4
+    alone = package.run(ALL)
+    shutil.rmtree(package.cache)
+    ended = [package.end(process) for process in [package.start(ALL) for _ in range(4)]]
+    assert [run["values"] for run in ended] == [VALUES] * 4
+    assert sum(run["compiled"] for run in ended) == alone["compiled"]  # each kernel by one of them
+    assert not list((package.cache / "compiling").iterdir())
     last = package.run(ALL)
     assert (last["values"], last["compiled"]) == (VALUES, 0)
     assert all(
         path.name.count(".") == path.name.rpartition("-")[0].count(".") for path in files(package)
     )  # all renamed
+
+
+SLOW = "from plant.slow import slow; values['slow'] = slow(2.0)"
+
+
+@pytest.fixture
+def compiling(package):
+    """A process in the midst of compiling `slow`."""
+    begun = package.folder / "begun"
+    process = package.start(SLOW, BEGUN=str(begun))
+    while not begun.exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
+    other = package.start(SLOW)
+    with pytest.raises(subprocess.TimeoutExpired):
+        other.wait(5.0)
+    compiling.kill()
+    ended = package.end(other)
+    assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
+
+
+def test_whoever_is_stopped_while_he_compiles_is_not_waited_for_long(package, compiling):
+    compiling.send_signal(signal.SIGSTOP)
+    ended = package.run(f"from dynamics.kernel import _turns; _turns.PATIENCE = 0.1; {SLOW}")
+    assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 
 def test_where_nothing_can_be_written_all_is_compiled(package):
