@@ -19,6 +19,7 @@ BINS = 10  # of a parameter
 KEYS = 9  # parameters that are drawn
 MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
 PARALLEL = 300  # runs drawn as lines over all parameters
+ENOUGH = 50  # runs for Sobol indices
 _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 
@@ -136,18 +137,20 @@ def success(found: Results) -> Plot:
 def matters(found: Results) -> Plot:
     """Which parameter matters: rank correlations, and Sobol indices where they can be had."""
     keys = _parameters(found)
-    aims = [name for name in ("success", *MATTERS) if name == "success" or name in found.figures]
-    aims = [name for name in aims if np.ptp(found[name].astype(float)) > 0.0]
+    aims = ["success"] if np.ptp(found["success"].astype(float)) > 0.0 else []
+    aims += [name for name in MATTERS if name in found.figures]
     if not aims:
         raise NotRecordedError("every run came to the same")
     x = np.column_stack([found.number(key) for key in keys])
-    kinds = ["rank correlation", *(["first-order Sobol index"] if has_sobol() and len(x) >= 50 else [])]
+    independent = not found.folder.plan.sweep  # which Sobol indices suppose
+    with_sobol = has_sobol() and len(x) >= ENOUGH and independent
+    kinds = ["rank correlation", *(["first-order Sobol index"] if with_sobol else [])]
     panels = []
     for row, aim in enumerate(aims):
         y = found[aim].astype(float)
         there = np.isfinite(y)
         correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
-        indices = sobol(x[there], y[there], keys) if len(kinds) > 1 else []
+        indices = sobol(x[there], y[there], keys) if with_sobol and there.sum() >= ENOUGH else []
         for column, values in enumerate([correlated, indices][: len(kinds)]):
             bars = tuple(
                 Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
@@ -163,8 +166,10 @@ def matters(found: Results) -> Plot:
     caption = f"How each parameter goes with what {len(x)} runs came to: Spearman's rank correlation"
     caption += (
         "; beside it the share of the variance that the parameter explains alone (SALib, RBD-FAST)."
-        if len(kinds) > 1
-        else ". Sobol indices need 50 runs and SALib: pip install lapwing[campaign]."
+        if with_sobol
+        else f". Sobol indices need {ENOUGH} runs and SALib: pip install lapwing[campaign]."
+        if independent
+        else ". Sobol indices need parameters that are drawn independently, which those of a sweep are not."
     )
     height = len(aims) * (1.1 + 0.26 * len(keys)) + 0.6
     return Plot(tuple(panels), caption, height, (1.0,) * len(aims), (1.0,) * len(kinds))

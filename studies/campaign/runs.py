@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -140,7 +140,21 @@ def setup_of(plan: Plan, run: int) -> Setup:
     """
     if not plan.keys:
         return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
-    return campaign_setup(load(scene_of(plan), plan.given(run)))
+    with located(plan):
+        return campaign_setup(load(scene_of(plan), plan.given(run)))
+
+
+@contextlib.contextmanager
+def located(plan: Plan) -> Iterator[None]:
+    """What is found wrong with a key that a run draws is told with the option that lets it vary."""
+    try:
+        yield
+    except SceneError as error:
+        override = (error.source.override or "").partition("=")[0]
+        if option := plan.option(override):
+            source = error.source._replace(option=option)
+            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
+        raise
 
 
 def scene_of(plan: Plan) -> Scene:
