@@ -111,7 +111,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     try:
         setup = setup_of(plan, run)
     except SceneError as error:
-        return {**row, **_of_refused(vehicles(plan)), "told": str(error)}
+        return {**row, **_of_refused(vehicles(plan)), "told": _refusal(error)}
     flights = fly_each(setup, TOPICS, rows)
     row["end_state"] = joint_end_state(flights)
     scene = scene_of(plan)
@@ -123,6 +123,14 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     unmet = scene[Success].unmet(found)
     told = f"{found['told']}; not {', not '.join(unmet)}" if unmet else ""
     return {**row, **found, "success": not unmet, "told": told}
+
+
+def _refusal(error: SceneError) -> str:
+    """What was refused, in the same words wherever Lapwing's own files lie: the table is the same for all workers."""
+    source = error.source
+    if source.path is not None:
+        source = source._replace(path=Path(source.path.name))
+    return str(SceneError(error.key, error.message, error.expected, source))
 
 
 def _of_refused(names: tuple[str, ...]) -> Row:

@@ -13,7 +13,7 @@ from studies.campaign.distributions import choice, normal, uniform
 from studies.campaign.folder import begin, manifest, read
 from studies.campaign.plan import plan
 from studies.campaign.results import Results
-from studies.campaign.runs import first_setup, fly_runs, reference
+from studies.campaign.runs import first_setup, fly_runs, reference, row_of
 from studies.campaign.statistics import interval
 from studies.campaign.study import Count, Ending, campaign
 
@@ -174,6 +174,11 @@ def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
     assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
 
 
+def test_what_is_refused_is_told_alike_wherever_lapwing_is_installed(tmp_path):
+    made = plan(SCENE, SHORT, runs=1, vary={"vehicle.mass": choice(0.1)})
+    assert row_of(made, 0)["told"].startswith("delivery_drone.toml:6: airframe.mass.payload: expected less than total")
+
+
 def test_report_json_and_a_run_flown_again_to_the_bit(flown, tmp_path, monkeypatch):
     folder, digest = flown
     code, said = lapwing(*options(folder.path), "--json", tmp_path / "c.json")
@@ -203,8 +208,14 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     campaign(other, first, local.here)
     code, said = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in said) == (0, True)
+    assert "…" not in said  # 80 columns are enough for all numbers
+    (row,) = [line.split() for line in said.splitlines() if line.split()[:1] == ["energy"]]
+    assert row[:3] == ["energy", "[J]", "*"]
     found = {d["figure"]: d for d in json.loads((tmp_path / "d.json").read_text())["differences"]}
     energy = found["energy"]
+    assert [float(text) for text in row[3:]] == pytest.approx(
+        [energy["one"], energy["other"], *energy["difference"].values()], rel=0.005
+    )
     assert energy["difference"]["value"] == pytest.approx(energy["other"] - energy["one"])
     alone = abs(energy["difference"]["high"] - energy["difference"]["low"])
     assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
