@@ -11,7 +11,6 @@ from studies.campaign.statistics import ellipse, has_sobol, interval, rank_corre
 from studies.figures import FIGURES
 from studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
 from studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
-from studies.report.thin import every
 from studies.tracking import DEGREE
 
 ACROSS = 3  # panels beside each other
@@ -19,7 +18,7 @@ BINS = 10  # of a parameter
 KEYS = 9  # parameters that are drawn
 MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
 PARALLEL = 300  # runs drawn as lines over all parameters
-ENOUGH = 50  # runs for Sobol indices
+ENOUGH, MOST = 50, 10_000  # runs for Sobol indices: at least, and as many as are looked at
 _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 
@@ -150,7 +149,8 @@ def matters(found: Results) -> Plot:
         y = found[aim].astype(float)
         there = np.isfinite(y)
         correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
-        indices = sobol(x[there], y[there], keys) if with_sobol and there.sum() >= ENOUGH else []
+        told = np.flatnonzero(there)[_some(there.sum(), MOST)]
+        indices = sobol(x[told], y[told], keys) if with_sobol and len(told) >= ENOUGH else []
         for column, values in enumerate([correlated, indices][: len(kinds)]):
             bars = tuple(
                 Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
@@ -190,12 +190,17 @@ def parallel(found: Results) -> Plot:
     marks = []
     for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
         if chosen.any():
-            lines = every(rows[chosen], PARALLEL)
+            lines = rows[chosen][_some(chosen.sum(), PARALLEL)]
             broken = np.column_stack([lines, np.full(len(lines), np.nan)])
             x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
             marks.append(Line(x, broken.ravel(), name, colour, 0.7))
     panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
     return Plot((panel,), f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures.", 4.2)
+
+
+def _some(n: int, most: int) -> np.ndarray:
+    """Indices of at most so many of n runs, at random: every k-th would fall in step with the runs of a grid."""
+    return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
 
 
 def _parameters(found: Results) -> list[str]:

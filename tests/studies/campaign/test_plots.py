@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from studies.campaign import plots
 from studies.campaign.distributions import uniform
 from studies.campaign.plan import plan
-from studies.campaign.plots import errors, matters
+from studies.campaign.plots import errors, matters, parallel
 from studies.campaign.results import Results
-from studies.campaign.statistics import has_sobol
+from studies.campaign.statistics import Interval, has_sobol
 from studies.figures import FIGURES
 
 KEYS = ("a", "b")
@@ -62,6 +63,27 @@ def test_sobol_indices_are_not_told_of_what_goes_together(tmp_path):
     plot = matters(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
     assert [panel.x_label for panel in plot.panels] == ["rank correlation"]
     assert "which those of a sweep are not" in plot.caption
+
+
+def test_what_is_left_out_of_many_runs_is_no_value_of_a_grid():
+    lots = table(3000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(3000) % 10  # of which every tenth run has the same
+    (good,) = parallel(lots).panels[0].marks
+    lines = good.y.reshape(-1, 4)[:, :3]
+    assert lines.shape == (300, 3)
+    assert len(np.unique(lines[:, 1])) == 10
+
+
+def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
+    asked = []
+    monkeypatch.setattr(plots, "has_sobol", lambda: True)
+    monkeypatch.setattr(plots, "sobol", lambda x, y, names: asked.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names))
+    monkeypatch.setattr(plots, "MOST", 100)
+    lots = table(2000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(2000) % 10
+    matters(lots)
+    assert asked[0].shape == (100, 2)
+    assert len(np.unique(asked[0][:, 1])) == 10
 
 
 def test_errors_stand_as_shares_beside_what_is_required():
