@@ -11,11 +11,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from cosim.errors import DivergedError, LockStepError
-from cosim.part import END, FAILED, GO_ON, LOOK, Code, Part, bind, run, schedule
+from cosim.part import Code, Part, bind
 from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
+from cosim.turns import Turn, groups
 from cosim.wire import Page, Wire, due_ticks, encode
-from dynamics.cell import Cell
 from dynamics.rows import from_row, to_row, width
 from messages.topics import Topic
 
@@ -103,9 +103,7 @@ class Graph:
         self._codes: list[Code | None] = []
         for part in parts:
             self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Part) else None)
-        every = [getattr(part, "every", 1) for part in parts]
-        self._plan = schedule(self._codes, every, [getattr(part, "vehicle", "") for part in parts])
-        self._schedule = Cell(self._plan)  # the same arrays; a cell is handed over faster
+        self._turns = [Turn(numbers, parts, self._codes) for numbers in groups(parts)]
         for part in parts:
             if not isinstance(part, Part):
                 part.bind(self)
@@ -121,8 +119,8 @@ class Graph:
     def replace(self, part: Part, code: Code) -> None:
         """Put a prepared part in the place of the one of its name; it takes over the state that it was given."""
         k = self._parts.index(self.part(part.name))
-        self._codes[k] = code
-        self._parts[k], self._plan.function[k], self._plan.memory[k] = part, code.function, code.memory
+        self._parts[k], self._codes[k] = part, code
+        next(turn for turn in self._turns if k in turn.parts).replace(k, code)
 
     def advance(self, stop: int) -> None:
         """Run up to before the tick `stop`, or to the end of the run.
@@ -130,23 +128,37 @@ class Graph:
         Raises:
             LockStepError: the state of a part is no longer sound.
         """
-        tick, k = self.tick, 0
-        while not self.ended:
-            tick, k, signal = run(self._schedule, tick, k, stop)
-            self.tick = tick
-            if signal == LOOK:
-                self._plan.next[k] = max(self._parts[k].act(tick), tick + 1)
-                k += 1
-            elif signal == FAILED:
-                raise (self._parts[k].failure or _unsound(self._parts[k].name))(tick)
-            else:
-                self.ended = signal == END
-                if signal == GO_ON:
-                    return
+        if self.ended:
+            return
+        failed: LockStepError | None = None
+        under_way = [turn for turn in self._turns if not turn.over]
+        for turn in under_way:
+            try:
+                turn.advance(stop, self._act, self._failure)
+            except LockStepError as error:
+                failed, stop = error, turn.tick  # the first one, once the others have come as far
+        self.ended = failed is None and all(turn.over for turn in self._turns)
+        if self.ended:
+            stop = max(turn.tick for turn in self._turns)
+        for turn in self._turns:
+            if turn.over and turn.tick < stop:
+                try:
+                    turn.follow(stop, self._act, self._failure)
+                except LockStepError as error:
+                    failed, stop, self.ended = error, turn.tick, False
+        self.tick = max(self.tick, stop)
+        for service in self.services if len(self._turns) > 1 else ():
+            service.messages.sort(key=_tick)
+        if failed is not None:
+            raise failed
 
-    def finish(self) -> None:
-        """Let the present tick be the last; for parts in Python that own time."""
-        self._plan.ended[0] = 1
+    def _act(self, part: int, tick: int) -> int:
+        if len(self._turns) == 1:
+            self.tick = tick
+        return self._parts[part].act(tick)
+
+    def _failure(self, part: int, tick: int) -> Exception:
+        return (self._parts[part].failure or _unsound(self._parts[part].name))(tick)
 
     def has(self, port: str) -> bool:
         """Whether somebody here gives or takes this port."""
@@ -225,6 +237,10 @@ def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.n
         return np.zeros(shape)
     former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # those read before they are written, of ticks before 0
     return former
+
+
+def _tick(message: tuple[Topic, int, bytes]) -> int:
+    return message[1]
 
 
 def _unsound(name: str) -> Any:

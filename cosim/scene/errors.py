@@ -12,10 +12,11 @@ class Source(NamedTuple):
     path: Path | None = None
     line: int | None = None
     override: str | None = None  # its key, or all of it where it is not KEY=VALUE or reaches nothing
+    option: str = "--set"  # by which the override was given
 
     def __str__(self) -> str:
         if self.override is not None:
-            return f"--set {self.override}"
+            return f"{self.option} {self.override}"
         return f"{self.path or ''}{f':{self.line}' if self.line else ''}"
 
 
@@ -33,6 +34,6 @@ class SceneError(KeyedError):
     def __str__(self) -> str:
         override = self.source.override
         if override is not None and f"{self.key}.".startswith(f"{override}."):
-            return f"--set {self.key}: {self.sentence}"
+            return f"{self.source.option} {self.key}: {self.sentence}"
         said = self.sentence if override and override.startswith(f"{self.key}=") else super().__str__()
         return ": ".join(filter(None, (str(self.source), said)))

@@ -82,11 +82,15 @@ def campaign(
         check_report("--report", report)
         screen, varied = console(), {}
         for text in vary or []:
-            key, equals, drawn = text.partition("=")
+            key, equals, drawn = (part.strip() for part in text.partition("="))
+            if not equals or not key:
+                raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
+            if key in varied:
+                raise ValueError(f"--vary {text}: {key} has a distribution already; expected one of each key")
             try:
-                varied[key.strip()] = parse(drawn)
+                varied[key] = parse(drawn)
             except ValueError as fault:
-                raise ValueError(f"--vary {text}: {fault if equals else 'expected KEY=DISTRIBUTION'}") from None
+                raise ValueError(f"--vary {text}: {fault}") from None
         given = plan(str(scene), decided(scene, set_ or []).overrides, runs, seed, varied, sweep, design)
         first = _reference(screen, given)
         about = manifest(given, first)
@@ -172,6 +176,7 @@ def _fly(
     from studies.campaign.study import campaign as study
 
     began, before = time.monotonic(), -1
+    mine = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
     with Countdown(screen, LINES) as countdown:
 
         def say(count: Count) -> None:
@@ -180,6 +185,6 @@ def _fly(
             flown, rate = count.runs - before, (count.runs - before) / max(time.monotonic() - began, 1e-9)
             p = count.failure
             text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
-            countdown.say(text, flown, folder.plan.runs - before)
+            countdown.say(text, flown, mine)
 
         study(folder, first, workers, say, until, part)

@@ -5,7 +5,7 @@ from pathlib import Path
 from cosim.scene import Scene
 from services.table import load
 from studies.campaign.folder import read
-from studies.campaign.runs import REFUSED, scene_of, sources
+from studies.campaign.runs import REFUSED, located, scene_of, sources
 
 
 def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
@@ -27,7 +27,8 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
     for name in sorted({*there, *here}):
         if there.get(name) != here.get(name):
             raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
-    return load(scene_of(plan), plan.given(run))
+    with located(plan):
+        return load(scene_of(plan), plan.given(run))
 
 
 def end_state_of(run: int, folder: Path) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 
 from cosim.launcher import RunFailed
 
-LOST = 3  # workers that a task may lose before it is given up
 PATIENCE = 10.0  # [s] for the scheduler to answer
 
 

@@ -82,17 +82,18 @@ def show(console: Console, found: Comparison) -> None:
     console.print(
         f"  failed in the first only: {found.only_one}, in the second only: {found.only_other}", highlight=False
     )
-    table = Table(title="Means, and the second's less the first's", title_justify="left")
+    title = "Means, and the change from the first to the second with its 95 % interval"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column("figure", no_wrap=True)
-    for head in ("first", "second", "difference", "95 % interval"):
+    for head in ("first", "second", "change", "from", "to"):
         table.add_column(head, justify="right", no_wrap=True)
     for d in found.differences:
         label, scale = ("success [%]", 100.0) if d.figure == "success" else shown(d.figure)
-        low, high = scale * d.difference.low, scale * d.difference.high
-        cells = (f"{scale * d.one:.4g}", f"{scale * d.other:.4g}", f"{scale * d.difference.value:+.3g}")
-        table.add_row(label, *cells, f"{low:+.3g} to {high:+.3g}", style="bold" if d.sure else None)
+        means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
+        changes = (f"{scale * change:+.3g}" for change in d.difference)
+        table.add_row(f"{label}{' *' if d.sure else ''}", *means, *changes)
     console.print(table)
-    console.print("bold: the interval does not hold 0")
+    console.print("*: the interval does not hold 0")
 
 
 def write_json(path: Path, found: Comparison) -> None:

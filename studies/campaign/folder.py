@@ -125,12 +125,17 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
     Raises:
         ValueError: it holds another campaign, or something else, or cannot be written.
     """
-    if (path / MANIFEST).exists():
-        there = read(path).about
-        differing = [name for name in about if name != "path" and there.get(name) != about[name]]
-        if differing:
-            raise ValueError(f"{path}: holds another campaign ({', '.join(differing)} differ); expected a new folder")
-        return Folder(path, plan, about)
+    if not (path / MANIFEST).exists():
+        _make(path, about)
+    there = read(path).about  # perhaps that of another machine, which has begun meanwhile
+    differing = [name for name in about if name != "path" and there.get(name) != about[name]]
+    if differing:
+        raise ValueError(f"{path}: holds another campaign ({', '.join(differing)} differ); expected a new folder")
+    return Folder(path, plan, about)
+
+
+def _make(path: Path, about: dict[str, Any]) -> None:
+    """Make the folder of a campaign."""
     if path.exists() and (not path.is_dir() or any(not _begun(file) for file in path.iterdir())):
         raise ValueError(f"{path}: holds something else; expected a new folder, or one of a campaign")
     try:
@@ -139,12 +144,11 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
             file.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
     except OSError as fault:
         raise ValueError(f"{path}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
-    return Folder(path, plan, about)
 
 
 def _begun(file: Path) -> bool:
     """Whether a file may be that of a campaign which another machine begins at this moment."""
-    return file.name == "shards" or file.name.startswith(f".{MANIFEST}.")
+    return file.name in ("shards", MANIFEST) or file.name.startswith(f".{MANIFEST}.")
 
 
 def read(path: Path) -> Folder:

@@ -20,6 +20,7 @@ from cosim.scene.overrides import value_of
 from studies.campaign.distributions import Distribution
 
 APART = 2**32  # seeds of two campaigns
+SEED = "run.seed"
 
 
 class Plan(NamedTuple):
@@ -38,6 +39,12 @@ class Plan(NamedTuple):
         """The keys that vary."""
         return [*(key for key, _ in self.vary), *(self.sweep[0] if self.sweep else ())]
 
+    def option(self, key: str) -> str:
+        """The option of the command line that lets a key vary; "" of one that does not."""
+        if any(key == varied for varied, _ in self.vary):
+            return "--vary"
+        return "--sweep: column" if key in self.keys else ""
+
     def seed_of(self, run: int) -> int:
         """The seed of all randomness within a run: 1, 2, ... of campaign 1; no two campaigns share one."""
         return (self.seed - 1) * APART + run + 1
@@ -50,7 +57,7 @@ class Plan(NamedTuple):
 
     def given(self, run: int) -> dict[str, Any]:
         """All that a run overrides in the scene of the campaign, its seed included."""
-        return {**self.values(run), "run.seed": self.seed_of(run)}
+        return {**self.values(run), SEED: self.seed_of(run)}
 
 
 def plan(
@@ -80,6 +87,8 @@ def plan(
     varied, swept = tuple(sorted((vary or {}).items())), _read(sweep) if sweep else ()
     if both := sorted(set(vary or {}) & set(swept[0] if swept else ())):
         raise ValueError(f"--vary {both[0]}: the sweep {sweep} varies it, too")
+    if SEED in (found := Plan(path, (), seed, 1, varied, swept)).keys:
+        raise ValueError(f"{found.option(SEED)} {SEED}: every run has a seed of its own; expected --seed")
     if design not in _PLACES:
         raise ValueError(f"--design {design}: expected one of {', '.join(_PLACES)}")
     if design in ("lhs", "sobol") and not varied:

@@ -11,7 +11,6 @@ from studies.campaign.statistics import ellipse, has_sobol, interval, rank_corre
 from studies.figures import FIGURES
 from studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
 from studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
-from studies.report.thin import every
 from studies.tracking import DEGREE
 
 ACROSS = 3  # panels beside each other
@@ -19,6 +18,7 @@ BINS = 10  # of a parameter
 KEYS = 9  # parameters that are drawn
 MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
 PARALLEL = 300  # runs drawn as lines over all parameters
+ENOUGH, MOST = 50, 10_000  # runs for Sobol indices: at least, and as many as are looked at
 _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 
@@ -136,18 +136,21 @@ def success(found: Results) -> Plot:
 def matters(found: Results) -> Plot:
     """Which parameter matters: rank correlations, and Sobol indices where they can be had."""
     keys = _parameters(found)
-    aims = [name for name in ("success", *MATTERS) if name == "success" or name in found.figures]
-    aims = [name for name in aims if np.ptp(found[name].astype(float)) > 0.0]
+    aims = ["success"] if np.ptp(found["success"].astype(float)) > 0.0 else []
+    aims += [name for name in MATTERS if name in found.figures]
     if not aims:
         raise NotRecordedError("every run came to the same")
     x = np.column_stack([found.number(key) for key in keys])
-    kinds = ["rank correlation", *(["first-order Sobol index"] if has_sobol() and len(x) >= 50 else [])]
+    independent = not found.folder.plan.sweep  # which Sobol indices suppose
+    with_sobol = has_sobol() and len(x) >= ENOUGH and independent
+    kinds = ["rank correlation", *(["first-order Sobol index"] if with_sobol else [])]
     panels = []
     for row, aim in enumerate(aims):
         y = found[aim].astype(float)
         there = np.isfinite(y)
         correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
-        indices = sobol(x[there], y[there], keys) if len(kinds) > 1 else []
+        told = np.flatnonzero(there)[_some(there.sum(), MOST)]
+        indices = sobol(x[told], y[told], keys) if with_sobol and len(told) >= ENOUGH else []
         for column, values in enumerate([correlated, indices][: len(kinds)]):
             bars = tuple(
                 Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
@@ -163,8 +166,10 @@ def matters(found: Results) -> Plot:
     caption = f"How each parameter goes with what {len(x)} runs came to: Spearman's rank correlation"
     caption += (
         "; beside it the share of the variance that the parameter explains alone (SALib, RBD-FAST)."
-        if len(kinds) > 1
-        else ". Sobol indices need 50 runs and SALib: pip install lapwing[campaign]."
+        if with_sobol
+        else f". Sobol indices need {ENOUGH} runs and SALib: pip install lapwing[campaign]."
+        if independent
+        else ". Sobol indices need parameters that are drawn independently, which those of a sweep are not."
     )
     height = len(aims) * (1.1 + 0.26 * len(keys)) + 0.6
     return Plot(tuple(panels), caption, height, (1.0,) * len(aims), (1.0,) * len(kinds))
@@ -185,12 +190,17 @@ def parallel(found: Results) -> Plot:
     marks = []
     for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
         if chosen.any():
-            lines = every(rows[chosen], PARALLEL)
+            lines = rows[chosen][_some(chosen.sum(), PARALLEL)]
             broken = np.column_stack([lines, np.full(len(lines), np.nan)])
             x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
             marks.append(Line(x, broken.ravel(), name, colour, 0.7))
     panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
     return Plot((panel,), f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures.", 4.2)
+
+
+def _some(n: int, most: int) -> np.ndarray:
+    """Indices of at most so many of n runs, at random: every k-th would fall in step with the runs of a grid."""
+    return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
 
 
 def _parameters(found: Results) -> list[str]:

@@ -70,7 +70,7 @@ class Results:
         kinds = [(kind, int((self["verdict"] == kind).sum())) for kind in KINDS] + [(REFUSED, len(self.refused["run"]))]
         return ", ".join(f"{n} {kind}" for kind, n in kinds if n)
 
-    @property
+    @cached_property
     def figures(self) -> list[str]:
         """The figures that are numbers and differ between runs."""
         numbers = [name for name in FIGURES if self.folder.kinds[name] is float]

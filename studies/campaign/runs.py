@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -111,7 +111,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     try:
         setup = setup_of(plan, run)
     except SceneError as error:
-        return {**row, **_of_refused(vehicles(plan)), "told": str(error)}
+        return {**row, **_of_refused(vehicles(plan)), "told": _refusal(error)}
     flights = fly_each(setup, TOPICS, rows)
     row["end_state"] = joint_end_state(flights)
     scene = scene_of(plan)
@@ -123,6 +123,14 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     unmet = scene[Success].unmet(found)
     told = f"{found['told']}; not {', not '.join(unmet)}" if unmet else ""
     return {**row, **found, "success": not unmet, "told": told}
+
+
+def _refusal(error: SceneError) -> str:
+    """What was refused, in the same words wherever Lapwing's own files lie: the table is the same for all workers."""
+    source = error.source
+    if source.path is not None:
+        source = source._replace(path=Path(source.path.name))
+    return str(SceneError(error.key, error.message, error.expected, source))
 
 
 def _of_refused(names: tuple[str, ...]) -> Row:
@@ -140,7 +148,21 @@ def setup_of(plan: Plan, run: int) -> Setup:
     """
     if not plan.keys:
         return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
-    return campaign_setup(load(scene_of(plan), plan.given(run)))
+    with located(plan):
+        return campaign_setup(load(scene_of(plan), plan.given(run)))
+
+
+@contextlib.contextmanager
+def located(plan: Plan) -> Iterator[None]:
+    """What is found wrong with a key that a run draws is told with the option that lets it vary."""
+    try:
+        yield
+    except SceneError as error:
+        override = (error.source.override or "").partition("=")[0]
+        if option := plan.option(override):
+            source = error.source._replace(option=option)
+            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
+        raise
 
 
 def scene_of(plan: Plan) -> Scene:

@@ -77,18 +77,23 @@ def has_sobol() -> bool:
 
 
 def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
-    """First-order Sobol indices of the columns of x (n, k) for y (n,), from any sample of independent columns.
+    """First-order Sobol indices of the columns of x (n, k) for y (n,), from any sample of independent columns; NaN of a
+    column that does not vary.
 
     By SALib's RBD-FAST: Plischke, "An effective algorithm for computing global sensitivity indices (EASI)", 2010.
     """
     from SALib.analyze import rbd_fast
 
-    bounds = [[float(low), float(high)] for low, high in zip(x.min(axis=0), x.max(axis=0), strict=True)]
-    problem = {"num_vars": len(names), "names": names, "bounds": bounds}
+    low, high = x.min(axis=0), x.max(axis=0)
+    varying = np.flatnonzero(high > low)
+    bounds = np.column_stack([low, high])[varying].tolist()
+    problem = {"num_vars": len(varying), "names": [names[k] for k in varying], "bounds": bounds}
     with np.errstate(invalid="ignore", divide="ignore"):  # a resample in which every run came to the same
-        found = rbd_fast.analyze(problem, x, y, seed=1, conf_level=SURE)
-    pairs = zip(found["S1"], found["S1_conf"], strict=True)
-    return [Interval(float(s), float(s - c), float(s + c)) for s, c in pairs]
+        found = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=SURE)
+    indices = [Interval(np.nan, np.nan, np.nan)] * len(names)
+    for k, s, c in zip(varying, found["S1"], found["S1_conf"], strict=True):
+        indices[k] = Interval(float(s), float(s - c), float(s + c))
+    return indices
 
 
 def ellipse(points: np.ndarray, share: float, n: int = 90) -> np.ndarray:

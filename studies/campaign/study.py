@@ -1,6 +1,7 @@
 """Flies a campaign, shard by shard, and counts."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from studies.campaign.folder import Folder
@@ -45,10 +46,9 @@ class Count(NamedTuple):
 
 def count(rows: Iterable[Row]) -> Count:
     """Of some rows."""
-    found = Count()
-    for row in rows:
-        found += Count(1, int(row["success"]), ((row["verdict"], 1),))
-    return found
+    kept = list(rows)
+    kinds = Counter(row["verdict"] for row in kept)
+    return Count() + Count(len(kept), sum(row["success"] for row in kept), tuple(kinds.items()))
 
 
 def campaign(
@@ -76,29 +76,42 @@ def campaign(
     absent = set(folder.missing())
     missing = sorted(absent if part is None else absent.intersection(part))
     done = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in absent}
-    if (last := _last(done, until)) is None:
-        progress(sum(done.values(), Count()))
+    total, ending = sum(done.values(), Count()), Ending(until)
+    if not ending.reached(done):
+        progress(total)
         tasks = [(folder.plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
         results = workers(fly_runs, tasks)
         for place, rows in results:
             folder.write(missing[place], rows)
             done[missing[place]] = count(rows)
-            progress(sum(done.values(), Count()))
-            if (last := _last(done, until)) is not None:
+            total += done[missing[place]]
+            progress(total)
+            if ending.reached(done):
                 break
         results.close()  # type: ignore[attr-defined]
-    if last is not None:
-        folder.end_after(last)
-        done = {k: n for k, n in done.items() if k <= last}
-    return sum(done.values(), Count())
+    if ending.reached(done):
+        folder.end_after(ending.shard)
+        return ending.total
+    return total
 
 
-def _last(done: dict[int, Count], until: float | None) -> int | None:
-    """The first shard up to which, all before it being done, the probability of a failure is known well enough."""
-    total, shard = Count(), 0
-    while until is not None and shard in done:
-        total += done[shard]
-        if total.flown and total.failure.half_width <= until:
-            return shard
-        shard += 1
-    return None
+class Ending:
+    """When enough is known: at the first shard up to which, all before it being done, it is.
+
+    Attributes:
+        shard: this one, or the next to be looked at; each is looked at once.
+        total: what the runs up to it came to.
+    """
+
+    def __init__(self, until: float | None):
+        """`until`: how well the probability of a failure is to be known; None for never well enough."""
+        self.shard, self.total = 0, Count()
+        self._until, self._reached = until, False
+
+    def reached(self, done: Mapping[int, Count]) -> bool:
+        """Whether enough is known by these shards."""
+        while self._until is not None and not self._reached and self.shard in done:
+            self.total += done[self.shard]
+            self._reached = self.total.flown > 0 and self.total.failure.half_width <= self._until
+            self.shard += not self._reached
+        return self._reached

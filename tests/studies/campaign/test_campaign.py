@@ -6,14 +6,16 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import studies.campaign.folder
 from lapwing.cli.main import app
 from studies.campaign import local, table
 from studies.campaign.distributions import choice, normal, uniform
 from studies.campaign.folder import begin, manifest, read
 from studies.campaign.plan import plan
 from studies.campaign.results import Results
-from studies.campaign.runs import first_setup, fly_runs, reference
-from studies.campaign.study import campaign
+from studies.campaign.runs import first_setup, fly_runs, reference, row_of
+from studies.campaign.statistics import interval
+from studies.campaign.study import Count, Ending, campaign
 
 SCENE = "delivery_mission"  # the start of it; some of the runs are said to fail
 SHORT = ("run.duration=3.5", 'success.require=["max_tilt < 0.03"]')
@@ -101,6 +103,29 @@ def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_
     assert started(tmp_path / "c")[0].missing()
 
 
+def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
+    make = studies.campaign.folder._make
+
+    def twice(path, about):
+        make(path, about | other)  # another machine is a little faster
+        make(path, about | other)
+
+    monkeypatch.setattr("studies.campaign.folder._make", twice)
+    other = {}
+    assert len(started(tmp_path / "one")[0].missing()) == 20
+    other = {"seed": 2}
+    with pytest.raises(ValueError, match=r"holds another campaign .*seed"):
+        started(tmp_path / "two")
+
+
+def test_a_part_counts_its_own_runs(flown, tmp_path):
+    words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
+    code, said = lapwing(*words, "--shard", "2/2")
+    assert (code, "2 of 2 flights" in said, "3 shards are still missing" in said) == (0, True, True)
+    code, said = lapwing(*words)
+    assert (code, "3 of 3 flights" in said) == (0, True)
+
+
 def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
     folder, _ = flown
     _, first = started(folder.path)
@@ -124,14 +149,34 @@ def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
     assert 0 < counts[0].runs < RUNS
 
 
+def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
+    asked = []
+    monkeypatch.setattr("studies.campaign.study.interval", lambda k, n: asked.append(n) or interval(k, n))
+    ending, done = Ending(1e-9), {}
+    for shard in range(300):
+        done[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, the second first
+        assert not ending.reached(done)
+    assert asked == list(range(10, 3010, 10))
+
+
 def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
     code, said = lapwing(*options(tmp_path / "c", **{"vehicle.mass": choice(10.4, -1.0)}))
     assert code == 0
     found = Results(read(tmp_path / "c"))
     assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
     assert f"{len(found)} timed out, {len(found.refused['run'])} refused" in said
-    assert "vehicle.mass: expected a number above 0 [kg], got -1.0" in found.refused["told"][0]
+    assert found.refused["told"][0] == "--vary vehicle.mass: expected a number above 0 [kg], got -1.0"
+    run = found.refused["run"][0]
+    assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c") == (
+        2,
+        f"lapwing: {found.refused['told'][0]}\n",
+    )
     assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
+
+
+def test_what_is_refused_is_told_alike_wherever_lapwing_is_installed(tmp_path):
+    made = plan(SCENE, SHORT, runs=1, vary={"vehicle.mass": choice(0.1)})
+    assert row_of(made, 0)["told"].startswith("delivery_drone.toml:6: airframe.mass.payload: expected less than total")
 
 
 def test_report_json_and_a_run_flown_again_to_the_bit(flown, tmp_path, monkeypatch):
@@ -163,8 +208,14 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     campaign(other, first, local.here)
     code, said = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in said) == (0, True)
+    assert "…" not in said  # 80 columns are enough for all numbers
+    (row,) = [line.split() for line in said.splitlines() if line.split()[:1] == ["energy"]]
+    assert row[:3] == ["energy", "[J]", "*"]
     found = {d["figure"]: d for d in json.loads((tmp_path / "d.json").read_text())["differences"]}
     energy = found["energy"]
+    assert [float(text) for text in row[3:]] == pytest.approx(
+        [energy["one"], energy["other"], *energy["difference"].values()], rel=0.005
+    )
     assert energy["difference"]["value"] == pytest.approx(energy["other"] - energy["one"])
     alone = abs(energy["difference"]["high"] - energy["difference"]["low"])
     assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
@@ -177,7 +228,19 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
         (["hover", "--runs", "0"], "--runs 0: expected at least 1"),
         (["hover", "--vary", "vehicle.mass"], "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
         (["hover", "--vary", "vehicle.mass=gauss(1)"], "--vary vehicle.mass=gauss(1): expected a distribution"),
-        (["hover", "--vary", "vehicle.mas=normal(10,1)"], "vehicle.mas: unknown key 'mas'; did you mean mass?"),
+        (["hover", "--vary", "vehicle.mas=normal(10,1)"], "--vary vehicle.mas: unknown key 'mas'; did you mean mass?"),
+        (["hover", "--vary", "effects.gravity.0=uniform(0,1)"], "lapwing: --vary effects.gravity.0: "),
+        (["hover", "--vary", "run.title.a=uniform(0,1)"], "lapwing: --vary run.title.a"),
+        (["hover", "--vary", "=uniform(0,1)"], "--vary =uniform(0,1): expected KEY=DISTRIBUTION"),
+        (
+            ["hover", "--vary", "run.seed=choice(1,2)"],
+            "--vary run.seed: every run has a seed of its own; expected --seed",
+        ),
+        (
+            ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
+            "--vary vehicle.mass=uniform(9,10): vehicle.mass has a distribution already",
+        ),
+        (["hover", "--sweep", "{}.csv"], "lapwing: --sweep: column vehicle.mas: unknown key 'mas'"),
         (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
         (["hover", "--report", "c.gif"], "--report c.gif: expected a name that ends in .html, .pdf or .png"),
         (["hover", "--until-ci", "2"], "--until-ci 2: expected a probability between 0 and 1"),
@@ -187,6 +250,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path):
+    (tmp_path / "c.csv").write_text("vehicle.mas,solver.step\n10,0.001\n")
     code, said = lapwing("campaign", *(a.replace("{}", str(tmp_path / "c")) for a in arguments))
     assert code == 2
     assert message in " ".join(said.split())

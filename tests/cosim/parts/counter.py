@@ -1,0 +1,19 @@
+"""A part that counts its steps, ends at one tick and fails at another."""
+
+from typing import NamedTuple
+
+from cosim.part import END, FAILED, GO_ON
+from dynamics.kernel import leaf
+
+
+class Counter(NamedTuple):
+    """When it signals what."""
+
+    last: int  # tick
+    fails: int = 10_000  # tick
+
+
+@leaf
+def step(p, s, tick, inputs):
+    """The steps so far."""
+    return s + 1, (s,), FAILED if tick == p.fails else END if tick >= p.last else GO_ON

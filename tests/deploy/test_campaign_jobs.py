@@ -1,0 +1,60 @@
+"""The job files of a campaign hand every word on as it was given, and fly every part once."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import yaml
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+TOLD = f"""#!{sys.executable}
+import json, os, sys
+with open(os.environ["SAID"], "a") as said:
+    print(json.dumps(sys.argv), file=said)
+"""
+WORDS = [
+    "hover",
+    "--runs",
+    "8",
+    "--set",
+    'success.require=["verdict == \'landed\'", "rmse.z < 0.1"]',
+    "--vary",
+    "a b=$c",
+]
+
+
+def calls(folder, *command, **environment):
+    """What a command calls of `lapwing` and `sbatch`, both of which only tell it; argv of each, in order."""
+    said = folder / "said"
+    said.unlink(missing_ok=True)
+    for name in ("lapwing", "sbatch"):
+        (folder / name).write_text(TOLD + ('print("77")\n' if name == "sbatch" else ""))
+        (folder / name).chmod(0o755)
+    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "SAID": str(said), **environment}
+    subprocess.run(command, env=environment, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    return [[Path(program).name, *words] for program, *words in map(json.loads, said.read_text().splitlines())]
+
+
+def test_slurm_submits_the_parts_and_then_the_table(tmp_path):
+    given = {"PARTS": "3", "DIR": str(tmp_path / "it's here")}
+    array, last = calls(tmp_path, str(DEPLOY / "campaign.slurm"), *WORDS, **given)
+    assert array[:4] == ["sbatch", "--parsable", "--export=ALL", "--array=1-3"]
+    assert last[:4] == ["sbatch", "--export=ALL", "--dependency=afterany:77", "--wrap"]
+    for part in (1, 2, 3):
+        (flown,) = calls(tmp_path, *array[4:], **given, SLURM_ARRAY_TASK_ID=str(part))
+        wanted = ["--out", given["DIR"], "--shard", f"{part}/3", "--workers", "1"]
+        assert flown == ["lapwing", "campaign", *WORDS, *wanted]
+    assert calls(tmp_path, "sh", "-c", last[4]) == [["lapwing", "campaign", *WORDS, "--out", given["DIR"]]]
+
+
+def test_kubernetes_flies_each_part_once(tmp_path):
+    job = yaml.safe_load((DEPLOY / "campaign-job.yaml").read_text())["spec"]
+    (container,) = job["template"]["spec"]["containers"]
+    command = [*container["command"], *container["args"]]
+    shards = set()
+    for index in range(job["completions"]):
+        (flown,) = calls(tmp_path, *command, JOB_COMPLETION_INDEX=str(index))
+        shards.add(flown[flown.index("--shard") + 1])
+    assert shards == {f"{k}/{job['completions']}" for k in range(1, job["completions"] + 1)}

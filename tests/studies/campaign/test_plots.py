@@ -1,0 +1,95 @@
+"""The plots of a campaign's report, of tables that are made up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from studies.campaign import plots
+from studies.campaign.distributions import uniform
+from studies.campaign.plan import plan
+from studies.campaign.plots import errors, matters, parallel
+from studies.campaign.results import Results
+from studies.campaign.statistics import Interval, has_sobol
+from studies.figures import FIGURES
+
+KEYS = ("a", "b")
+
+
+def table(runs, sweep=None, **values):
+    """The results of a campaign over two parameters; figures that are not given are NaN."""
+    made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(KEYS, uniform(0, 1)), sweep=sweep)
+    drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in KEYS}
+    kinds = {"run": int, "seed": int, **dict.fromkeys(KEYS, float), "success": bool}
+    kinds |= {name: str if name in ("verdict", "told") else float for name in FIGURES}
+    found = {name: np.full(runs, np.nan) for name in kinds}
+    found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "verdict": np.full(runs, "landed", object)}
+    about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
+    arrays = found | drawn | {name: of(drawn) for name, of in values.items()}
+    return Results(SimpleNamespace(arrays=lambda: arrays, plan=made, about=about, kinds=kinds))
+
+
+def bars(plot, panel, aim):
+    """Length of the bars of a panel of `matters`, by parameter."""
+    (found,) = [p for p in plot.panels if p.title == aim and p.x_label.startswith(panel)]
+    return {bar.lane: bar.end - bar.start for bar in found.marks}
+
+
+def test_what_some_runs_do_not_tell_matters_for_the_others():
+    def speed(drawn):
+        return np.where(drawn["b"] < 0.5, drawn["a"], np.nan)  # half of the runs never touch down
+
+    plot = matters(table(400, **{"touchdown.speed": speed, "energy": lambda drawn: drawn["b"]}))
+    assert {panel.title for panel in plot.panels} == {"touchdown.speed", "energy"}
+    assert bars(plot, "rank", "touchdown.speed")["a"] == pytest.approx(1.0)
+    assert abs(bars(plot, "rank", "touchdown.speed")["b"]) < 0.2
+    assert bars(plot, "rank", "energy") == pytest.approx({"a": 0.0, "b": 1.0}, abs=0.15)
+
+
+@pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
+def test_a_parameter_that_all_who_tell_have_in_common_has_no_index():
+    def speed(drawn):
+        drawn["b"][:] = np.where(drawn["b"] < 0.5, 0.25, drawn["b"])
+        return np.where(drawn["b"] == 0.25, drawn["a"], np.nan)
+
+    found = bars(matters(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
+    assert set(found) == {"a"}
+    assert found["a"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_sobol_indices_are_not_told_of_what_goes_together(tmp_path):
+    lines = [f"{k / 100},{k / 50}" for k in range(100)]
+    (tmp_path / "s.csv").write_text("\n".join(["a,b", *lines]))
+    plot = matters(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
+    assert [panel.x_label for panel in plot.panels] == ["rank correlation"]
+    assert "which those of a sweep are not" in plot.caption
+
+
+def test_what_is_left_out_of_many_runs_is_no_value_of_a_grid():
+    lots = table(3000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(3000) % 10  # of which every tenth run has the same
+    (good,) = parallel(lots).panels[0].marks
+    lines = good.y.reshape(-1, 4)[:, :3]
+    assert lines.shape == (300, 3)
+    assert len(np.unique(lines[:, 1])) == 10
+
+
+def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
+    asked = []
+    monkeypatch.setattr(plots, "has_sobol", lambda: True)
+    monkeypatch.setattr(plots, "sobol", lambda x, y, names: asked.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names))
+    monkeypatch.setattr(plots, "MOST", 100)
+    lots = table(2000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(2000) % 10
+    matters(lots)
+    assert asked[0].shape == (100, 2)
+    assert len(np.unique(asked[0][:, 1])) == 10
+
+
+def test_errors_stand_as_shares_beside_what_is_required():
+    found = table(11, **{"rmse.x": lambda drawn: np.arange(11.0), "rmse.roll": lambda drawn: np.arange(11.0)})
+    found.folder.about["success"] = ["rmse.roll < 0.1"]
+    roll, x = sorted(errors(found).panels, key=lambda panel: panel.x_label)
+    assert (x.x_label, x.marks[0].x.tolist()) == ("rmse.x [m]", list(range(11)))
+    assert x.marks[0].y[-1] == 1.0
+    assert roll.marks[1].x == pytest.approx(np.degrees([0.1, 0.1]))
