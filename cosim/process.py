@@ -7,13 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from cosim.bus import LEASE_MS, ZenohBus
+from cosim.bus import ZenohBus
 from cosim.errors import LockStepError
 from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
 from cosim.participants import Participants
 from cosim.private import remove
 from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
+from cosim.session_settings import LEASE_MS
 from cosim.setup import Setup
 from cosim.setup_message import pack, unpack
 from cosim.tcp import limit_silence

@@ -4,13 +4,13 @@ import time
 
 from cosim.backlog import AHEAD
 from cosim.bundle import BundleError, Bundles, pack_batch
-from cosim.bus import Subscription
 from cosim.errors import LockStepError
 from cosim.graph import Graph, Service
 from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY, STEP_KEY
 from cosim.process import POLL, Process
 from cosim.restart import Held, Progress, Refilled
 from cosim.schedule import due
+from cosim.subscription import Subscription
 from dynamics.kernel import uncompiled
 from messages.topics import Topic
 
