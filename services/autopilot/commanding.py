@@ -105,6 +105,7 @@ class Commanding:
         self._estimate: Any = None  # that it is shown
         self._shown = -1  # [tick] of it
         self._estimate_every_tick = False
+        self._ordered: Order | None = None  # what stands in the port
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
@@ -150,7 +151,10 @@ class Commanding:
         if self._injection.direct is not None and request.motor_voltage != self._driven:
             self._driven = request.motor_voltage
             write(self._injection.direct, self._direct(request.motor_voltage))
-        graph.put(ORDER, tick, self._order(tick, request, flight))
+        order = self._order(tick, request, flight)
+        if order != self._ordered:
+            graph.put(ORDER, tick, order)
+            self._ordered = order
         self._answer(tick, request)
         return self._next(tick, request.quiet)
 
