@@ -168,6 +168,10 @@ class Graph:
         """Give the value of a port at `tick` as numbers, shape (width,)."""
         self._rows[port][self._index(port, tick)] = row
 
+    def put_rows(self, port: str, ticks: np.ndarray, rows: np.ndarray) -> None:
+        """Give the values of a port at `ticks` (n,) as numbers, shape (n, width)."""
+        self._rows[port][self._index(port, ticks)] = rows
+
     def row(self, port: str, tick: int) -> np.ndarray:
         """The numbers of a port at `tick`, shape (width,)."""
         return self._rows[port][self._index(port, tick)]

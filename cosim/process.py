@@ -84,6 +84,12 @@ class Process:
         signal.signal(signal.SIGTERM, self._stop)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
 
+    @property
+    def bundles_ahead(self) -> bool:
+        """Whether a service that runs ahead hands over several ticks at once (`cosim.spans`); a program of somebody
+        else's takes one at a time, as do services that may be started again, and those of several hosts."""
+        return not (self.restarts or self.participants.external or self.compares)
+
     def _stop(self, *_: object) -> None:
         self.stopping = True
 
