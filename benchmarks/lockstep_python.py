@@ -37,8 +37,8 @@ class Idle:
 
 def prepare(bus, giver, tick, interval_ns):
     """Let the bundle be there that `giver` takes next, if it takes one up to this tick."""
-    due = [width for _, period, width in giver._bundles._ports if tick % period == 0]
-    bus.next = (tick * interval_ns, bytes(8 * sum(due)))
+    rows = sum(width * giver._bundles._rows_of(period, tick) for _, period, width in giver._bundles._ports)
+    bus.next = (tick * interval_ns, bytes(8 * rows))
 
 
 def own(name, cycles):
@@ -48,7 +48,8 @@ def own(name, cycles):
     bus = Idle()
     process = SimpleNamespace(
         setup=setup, name=name, bus=bus, participants=Participants("bench"), key_prefix="bench",
-        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"),
+        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), restarts=False,
+        journal=None, bundles_ahead=True,
     )  # fmt: skip
     service = Service(name, [Constant(name, 2 * cycles)], plant_wires(setup, NONE) if name == "plant" else [])
     graph = Graph(setup, [service], 2 * PAGE)
@@ -63,7 +64,7 @@ def own(name, cycles):
         began = time.thread_time()
         graph.advance(tick + 1)
         stepped = time.thread_time()
-        outlets.publish(tick)
+        outlets.publish(tick, tick + 1)
         taken[1] += stepped - began
         taken[2] += time.thread_time() - stepped
     return [seconds / cycles for seconds in taken]

@@ -2,8 +2,8 @@
 of encoded messages for those who record.
 
 A bundle is the rows of the service's ports that are due at the tick, in the order of its set-up, one after the other:
-little-endian float64, nothing between them. A service that gives nothing at a tick sends none. An empty bundle says
-that there will be no other.
+little-endian float64, nothing between them. One of several ticks (`cosim.spans`) has, port by port, all rows that are
+due in them. A service that gives nothing in these ticks sends none. An empty bundle says that there will be no other.
 
 A batch is the tick before which all messages have been handed over (int64), then pages: length of the topic's
 name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
@@ -15,15 +15,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from cosim.graph import Graph
-from cosim.schedule import Port, due
-from cosim.wire import Page
-from dynamics.kernel import uncompiled
+from cosim.schedule import Port
+from cosim.wire import Page, due_ticks
 from dynamics.rows import width
 from messages.topics import topic_named
 
 _PAGE = struct.Struct("<HII")
 _STOP = struct.Struct("<q")
-_due = uncompiled(due)
 
 
 class BundleError(ValueError):
@@ -31,36 +29,47 @@ class BundleError(ValueError):
 
 
 class Bundles:
-    """The bundles of one service: which rows they hold at which tick."""
+    """The bundles of one service: which rows they hold."""
 
-    def __init__(self, ports: Sequence[Port]):
-        """Of a service that gives these ports, in their order."""
+    def __init__(self, ports: Sequence[Port], ticks: int = 1):
+        """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
         self._ports = [(port.name, port.period, width(port.like)) for port in ports]
+        self._ticks = ticks
 
-    def due(self, tick: int) -> bool:
-        """Whether there is a bundle of this tick."""
-        return any(_due(tick, period, 0) >= 0 for _, period, _ in self._ports)
+    def due(self, first: int) -> bool:
+        """Whether there is a bundle from the tick `first` on."""
+        return any(self._rows_of(period, first) for _, period, _ in self._ports)
 
-    def pack(self, graph: Graph, tick: int) -> bytes:
-        """The bundle of a tick, from the rows of a graph."""
-        return b"".join(graph.row(name, tick).tobytes() for name, period, _ in self._ports if tick % period == 0)
+    def pack(self, graph: Graph, first: int) -> bytes:
+        """The bundle from the tick `first` on, from the rows of a graph."""
+        if self._ticks == 1:
+            return b"".join(graph.row(name, first).tobytes() for name, period, _ in self._ports if first % period == 0)
+        pages = (graph.rows(name, due_ticks(first, first + self._ticks, period)) for name, period, _ in self._ports)
+        return b"".join(page.tobytes() for page in pages)
 
-    def unpack(self, payload: bytes, graph: Graph, tick: int) -> None:
-        """Put the rows of a bundle into those of a graph that uses them.
+    def unpack(self, payload: bytes, graph: Graph, first: int) -> None:
+        """Put the rows of the bundle from the tick `first` on into those of a graph that uses them.
 
         Raises:
-            BundleError: it has not the size of this tick's.
+            BundleError: it has not the size that is due.
         """
-        due_now = [(name, columns) for name, period, columns in self._ports if tick % period == 0]
-        expected = 8 * sum(columns for _, columns in due_now)
+        due_now = [(*port, self._rows_of(port[1], first)) for port in self._ports if self._rows_of(port[1], first)]
+        expected = 8 * sum(n * columns for _, _, columns, n in due_now)
         if len(payload) != expected:
-            raise BundleError(f"a bundle of {len(payload)} bytes at tick {tick}, expected {expected}")
+            raise BundleError(f"a bundle of {len(payload)} bytes at tick {first}, expected {expected}")
         numbers = np.frombuffer(payload, "<f8")
-        first = 0
-        for name, columns in due_now:
-            if graph.has(name):
-                graph.put_row(name, tick, numbers[first : first + columns])
-            first += columns
+        place = 0
+        for name, period, columns, n in due_now:
+            rows = numbers[place : place + n * columns]
+            place += n * columns
+            if graph.has(name) and self._ticks == 1:
+                graph.put_row(name, first, rows)
+            elif graph.has(name):
+                graph.put_rows(name, due_ticks(first, first + self._ticks, period), rows.reshape(n, columns))
+
+    def _rows_of(self, period: int, first: int) -> int:
+        """How many rows of a port of this period a bundle has."""
+        return (first + self._ticks - 1) // period - (first - 1) // period
 
 
 def pack_batch(pages: Iterable[Page], stop: int) -> bytes:

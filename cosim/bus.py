@@ -14,6 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 from cosim.errors import BusError
+from cosim.session_settings import session_settings
+from cosim.subscription import Message, Subscription
 from messages.attachment import pack, time_and_gid
 
 # One runtime thread instead of six: the largest single gain in latency (see docs/benchmarks.md).
@@ -21,36 +23,6 @@ _RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handove
 os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
-
-LEASE_MS = 10_000  # after this long without a sign of life a peer counts as gone; the launcher finds out sooner
-OPEN_MS = 2_000  # for one attempt to reach a peer; others follow, and closing a session waits for the one under way
-LARGEST = 1 << 26  # [bytes] of a message that is put together from fragments; a set-up or a batch has less
-
-
-def _configuration(
-    listen: Iterable[str], connect: Iterable[str], mode: str, security: Mapping[str, Any], awaits: bool
-) -> zenoh.Config:
-    config = zenoh.Config()
-    for key, value in {
-        "mode": mode,
-        "listen/endpoints": list(listen),
-        "connect/endpoints": list(connect),
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 1.5},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "open/return_conditions/connect_scouted": awaits,
-        "transport/shared_memory/enabled": False,
-        "transport/unicast/open_timeout": OPEN_MS,
-        "transport/link/tx/lease": LEASE_MS,
-        # as long for one that takes nothing: after a cut of 2 s, TCP may wait for 3 s more before it tries again
-        "transport/link/tx/queue/congestion_control/block/wait_before_close": 1000 * LEASE_MS,
-        "transport/link/rx/max_message_size": LARGEST,
-        **security,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
-
 
 _opened = False
 
@@ -93,7 +65,7 @@ class ZenohBus:
         _opened = True
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configuration(listen, connect, mode, security, awaits))
+            self._session = zenoh.open(_configured({**session_settings(listen, connect, mode, awaits), **security}))
         except zenoh.ZError as error:
             tried = connect if mode == "client" else listen
             endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
@@ -136,20 +108,20 @@ class ZenohBus:
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
-    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> "Subscription":
+    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> Subscription:
         """Receive what whoever publishes on any of the keys, in order of arrival.
 
         `notify` is called from another thread after each arrival, for those who wait for other things besides.
         """
         return self._receive(key_expressions, None, notify)
 
-    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> "Subscription":
+    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
         """The same of known senders: by key the mark that a message must carry, None for that of the first."""
         return self._receive(senders, dict(senders), notify)
 
     def _receive(
         self, keys: Iterable[str], senders: dict[str, bytes | None] | None, notify: Callable[[], None] | None
-    ) -> "Subscription":
+    ) -> Subscription:
         arrived: queue.SimpleQueue = queue.SimpleQueue()
 
         def put_and_notify(sample: zenoh.Sample) -> None:
@@ -159,7 +131,7 @@ class ZenohBus:
         # Python code in Zenoh's thread costs some 15 us a message: without it the queue is filled by Zenoh alone
         handler = zenoh.handlers.Callback(put_and_notify if notify else arrived.put, indirect=False)
         self._held.extend(self._session.declare_subscriber(key, handler) for key in keys)
-        return Subscription(arrived, senders, self._refuse)
+        return Subscription(arrived, _message, senders, self._refuse)
 
     def _refuse(self) -> None:
         self.refused += 1
@@ -240,51 +212,15 @@ class ZenohBus:
         self.close()
 
 
-class Subscription:
-    """What has arrived on some keys and was not taken yet; who takes it leaves out what is not of its sender."""
-
-    def __init__(self, arrived: queue.SimpleQueue, senders: dict[str, bytes | None] | None, refuse: Callable[[], None]):
-        """Of the samples in `arrived`; `senders` as of `ZenohBus.receive`, None for anybody."""
-        self._arrived, self._senders, self._refuse = arrived, senders, refuse
-        self._only_mark = next(iter(senders.values())) if senders and len(senders) == 1 else None
-
-    def get(self, timeout: float) -> tuple[int, bytes] | None:
-        """Simulation time [ns] and payload of the next message, None after `timeout` seconds."""
-        found = self._next(timeout)
-        return found and found[1:]
-
-    def get_with_key(self, timeout: float) -> tuple[str, int, bytes] | None:
-        """The same with the message's key in front."""
-        found = self._next(timeout)
-        return found and (str(found[0].key_expr), *found[1:])
-
-    def _next(self, timeout: float) -> tuple[zenoh.Sample, int, bytes] | None:
-        """The next message of its sender, its time and its payload."""
-        until = None
-        while True:
-            try:
-                sample = self._arrived.get(timeout=timeout)
-            except queue.Empty:
-                return None
-            message = _message(sample)
-            if message is not None and self._is_of_its_sender(sample, message[1]):
-                return sample, message[0], message[2]
-            self._refuse()
-            until = until or time.monotonic() + timeout
-            timeout = max(0.0, until - time.monotonic())
-
-    def _is_of_its_sender(self, sample: zenoh.Sample, mark: bytes) -> bool:
-        if self._only_mark or self._senders is None:  # the text of a key takes longer than all else
-            return self._only_mark in (None, mark)
-        key = str(sample.key_expr)
-        expected = self._senders.get(key, b"")
-        if expected is None:
-            expected = self._senders[key] = mark
-        return expected == mark
+def _configured(settings: Mapping[str, Any]) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
 
 
-def _message(sample: zenoh.Sample) -> tuple[int, bytes, bytes] | None:
-    """Time [ns], mark and payload of a sample; None where it has no sound attachment, or deletes a key."""
+def _message(sample: zenoh.Sample) -> Message | None:
+    """What a sample says; None where it has no sound attachment, or deletes a key."""
     attachment = sample.attachment
     if attachment is None:
         return None

@@ -4,7 +4,7 @@ All executors run a graph: a process one with the parts of its own service, the 
 the parts of all.
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -16,7 +16,7 @@ from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
 from cosim.turns import Turn, groups
 from cosim.wire import Page, Wire, due_ticks, encode
-from dynamics.rows import from_row, to_row, width
+from dynamics.rows import reader, to_row, width
 from messages.topics import Topic
 
 NEVER = 2**62  # [tick]
@@ -99,6 +99,7 @@ class Graph:
         self._rows = {} if rows is None else rows
         for name in sorted(used):
             self._rows[name] = _ring(self.ports[name], kept[name], delays.get(name, 0), self._rows.get(name))
+        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # of the ports that somebody has asked for
         self._parts = parts
         self._codes: list[Code | None] = []
         for part in parts:
@@ -167,7 +168,9 @@ class Graph:
     def latest(self, port: str, tick: int) -> Any:
         """The value of a port at the last tick not after `tick` at which one was due."""
         period = max(1, self.ports[port].period)
-        return from_row(self.ports[port].like, self._rows[port][self._index(port, tick - tick % period)])
+        if port not in self._readers:
+            self._readers[port] = reader(self.ports[port].like)
+        return self._readers[port](self._rows[port][self._index(port, tick - tick % period)])
 
     def put(self, port: str, tick: int, value: Any) -> None:
         """Give the value of a port at `tick`."""
@@ -176,6 +179,10 @@ class Graph:
     def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
         """Give the value of a port at `tick` as numbers, shape (width,)."""
         self._rows[port][self._index(port, tick)] = row
+
+    def put_rows(self, port: str, ticks: np.ndarray, rows: np.ndarray) -> None:
+        """Give the values of a port at `ticks` (n,) as numbers, shape (n, width)."""
+        self._rows[port][self._index(port, ticks)] = rows
 
     def row(self, port: str, tick: int) -> np.ndarray:
         """The numbers of a port at `tick`, shape (width,)."""

@@ -16,6 +16,7 @@ from cosim.keys import ALIVE_KEY
 from cosim.participants import Participants
 from cosim.private import private_endpoints
 from cosim.restarts import Restarts
+from cosim.starvation import Starvation
 from cosim.watch import STALL, WATCHER, Watch
 
 GRACE = 1.5  # [s] a process gets to end after SIGTERM
@@ -108,6 +109,7 @@ def _follow(
 ) -> None:
     ended_at = None
     stopped: dict[str, float] = {}  # since when
+    starvation = Starvation()
     while any(everybody[name].poll() is None for name in needed - external):
         children = {name: child for name, child in everybody.items() if name in needed}
         watch.poll(LAST_NEWS if watch.ended else 0.2)
@@ -126,7 +128,8 @@ def _follow(
         if not watch.ended and (lost := sorted(watch.gone & external)) and not _grace(watch):
             raise RunFailed(f"{', '.join(lost)}: gone {_at(watch)}")
         _note_stopped(children, stopped)
-        culprit = watch.frozen(needed) if needed <= watch.present else None
+        starvation.look({name: child.pid for name, child in children.items()}, time.monotonic() - watch.last_news)
+        culprit = watch.frozen(needed, starvation.of) if needed <= watch.present else None
         if stopped and (culprit or time.monotonic() - min(stopped.values()) > STALL):
             if not restarts.may(stopped):
                 raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")

@@ -11,6 +11,7 @@ from cosim.graph import NEVER, Graph, Service
 from cosim.keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
 from cosim.process import Process, Stopped
 from cosim.schedule import Port
+from cosim.spans import ticks_at_once
 from cosim.transfer import PAGE, EndOfRun, Outlets, Source, sources
 
 
@@ -47,6 +48,7 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
     if process.realtime:
         realtime.enter()
     allowed = setup.interval / process.speed if process.speed is not None else None
+    at_once = ticks_at_once(setup, process.name) if process.bundles_ahead else 1
     deadlines = Deadlines()
     started = time.perf_counter() - graph.tick * (allowed or 0.0)
     try:
@@ -54,17 +56,16 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
             if process.stopping:
                 raise Stopped
             tick = graph.tick
-            for giver in givers:
-                giver.take(tick)
+            known = min([giver.take(tick) for giver in givers], default=tick + 1)
             if backlog:
                 backlog.hold(tick)
             if allowed is not None and owns_time:
                 deadlines.note(_pace(started + tick * allowed))
             begun = time.perf_counter()
-            graph.advance(tick + 1)
-            outlets.publish(tick)
+            graph.advance(min(known, tick + at_once))
+            outlets.publish(tick, graph.tick)
             if allowed is not None and not owns_time:
-                deadlines.note(time.perf_counter() - begun - allowed)
+                deadlines.note(time.perf_counter() - begun - allowed * (graph.tick - tick))
         if owns_time:
             process.say(ENDED_KEY)
     except EndOfRun as end:
@@ -137,7 +138,7 @@ def run_encoder(process: Process, service: Service) -> None:
             tick = graph.tick
             giver.take(tick)
             graph.advance(tick + 1)
-            outlets.publish(tick)
+            outlets.publish(tick, tick + 1)
     except EndOfRun:
         return
     finally:

@@ -7,13 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from cosim.bus import LEASE_MS, ZenohBus
+from cosim.bus import ZenohBus
 from cosim.errors import LockStepError
 from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
 from cosim.participants import Participants
 from cosim.private import remove
 from cosim.restart import Journal
 from cosim.serialise import first_difference, from_json, to_json
+from cosim.session_settings import LEASE_MS
 from cosim.setup import Setup
 from cosim.setup_message import pack, unpack
 from cosim.tcp import limit_silence
@@ -82,6 +83,12 @@ class Process:
         on_compile(self._tell_of_compiling)
         signal.signal(signal.SIGTERM, self._stop)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
+
+    @property
+    def bundles_ahead(self) -> bool:
+        """Whether a service that runs ahead hands over several ticks at once (`cosim.spans`); a program of somebody
+        else's takes one at a time, as do services that may be started again, and those of several hosts."""
+        return not (self.restarts or self.participants.external or self.compares)
 
     def _stop(self, *_: object) -> None:
         self.stopping = True

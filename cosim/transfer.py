@@ -1,16 +1,19 @@
 """What a process takes from the bus and gives to it, tick by tick."""
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from cosim.backlog import AHEAD
 from cosim.bundle import BundleError, Bundles, pack_batch
-from cosim.bus import Subscription
 from cosim.errors import LockStepError
 from cosim.graph import Graph, Service
-from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY, STEP_KEY
+from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY
 from cosim.process import POLL, Process
 from cosim.restart import Held, Progress, Refilled
 from cosim.schedule import due
+from cosim.spans import span, spans, step_key
+from cosim.subscription import Subscription
 from dynamics.kernel import uncompiled
 from messages.topics import Topic
 
@@ -31,13 +34,16 @@ class Source:
     def __init__(self, process: Process, name: str, taken: list[tuple[str, int, int]], graph: Graph):
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
-        self._bundles = Bundles(process.setup.services[name].ports)
-        self._subscription: Subscription = process.bus.receive(process.participants.senders(STEP_KEY, [name]))
+        self._span = span(process.setup, name, process.name) if process.bundles_ahead else 1
+        self._bundles = Bundles(process.setup.services[name].ports, self._span)
+        key = step_key(self._span)
+        self._subscription: Subscription = process.bus.receive(process.participants.senders(key, [name]))
         self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
-        self._newest = -1  # tick of the newest bundle taken
+        self._delay = min(delay for _, _, delay in taken)
+        self._newest = -1  # tick up to which bundles are taken
 
-    def take(self, tick: int) -> None:
-        """Take bundles up to the newest that is needed at `tick`.
+    def take(self, tick: int) -> int:
+        """Take bundles up to the newest that is needed at `tick`; the tick before which nothing more is needed.
 
         Raises:
             EndOfRun: the producer has ended.
@@ -47,7 +53,7 @@ class Source:
         while self._newest < needed:
             stamp = self._newest + 1
             while not self._bundles.due(stamp):
-                stamp += 1
+                stamp += self._span
             due_ns = stamp * self._process.setup.interval_ns
             time_ns, payload = self._next(due_ns, needed)
             if not payload:
@@ -58,7 +64,8 @@ class Source:
                 self._bundles.unpack(payload, self._graph, stamp)
             except BundleError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
-            self._newest = stamp
+            self._newest = stamp + self._span - 1
+        return max(tick, self._newest + self._delay) + 1
 
     def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
         """Time and payload of the next bundle, or of what comes in its place."""
@@ -89,15 +96,28 @@ def sources(process: Process, graph: Graph) -> list[Source]:
     return [Source(process, producer, ports, graph) for producer, ports in sorted(taken.items())]
 
 
+@dataclass
+class _Way:
+    """Of bundles of so many ticks, to the consumers that take these."""
+
+    ticks: int
+    bundles: Bundles
+    put: Callable[[bytes, int], None]
+    given: int = 0  # tick before which all has gone
+
+
 class Outlets:
-    """What a service publishes: a bundle a tick to its consumers, batches to recorders, topics to those who listen."""
+    """What a service publishes: bundles to its consumers, batches to recorders, topics to those who listen."""
 
     def __init__(self, process: Process, service: Service, graph: Graph, hands_over: bool = True):
         """Declare the publishers; the bundles are somebody else's where it does not hand over."""
         key_prefix, bus = process.key_prefix, process.bus
         self._process, self._service, self._graph = process, service, graph
-        self._bundles = Bundles(process.setup.services[service.name].ports if hands_over else ())
-        self._put_bundle = bus.publisher(f"{key_prefix}/{STEP_KEY}/{service.name}") if hands_over else None
+        self._ways = []
+        if hands_over:
+            for ticks in spans(process.setup, service.name) if process.bundles_ahead else {1}:
+                put = bus.publisher(f"{key_prefix}/{step_key(ticks)}/{service.name}")
+                self._ways.append(_Way(ticks, Bundles(process.setup.services[service.name].ports, ticks), put))
         self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
         self._puts = {topic: bus.publisher(key) for topic, key in self._topics.items()}
@@ -117,36 +137,40 @@ class Outlets:
 
     def repeat(self, tick: int) -> None:
         """Go once more through a tick whose bundle was published; only those who have missed it will hear of it."""
-        self._note(tick)
+        for way in self._ways:
+            self._next(way)
         if tick < self._handed:
             self._service.messages.clear()
         elif tick + 1 - self._handed >= PAGE:
             self._hand_over(tick + 1)
 
-    def _note(self, tick: int) -> bytes:
-        """The bundle of a tick, empty if there is none; it is in the journal and held before it is published."""
-        bundle = self._bundles.pack(self._graph, tick) if self._bundles.due(tick) else b""
+    def _next(self, way: _Way) -> bytes:
+        """The next bundle, empty if there is none; it is in the journal and held before it is published."""
+        first = way.given
+        bundle = way.bundles.pack(self._graph, first) if way.bundles.due(first) else b""
         if self._journal:
-            self._journal.write(tick, bundle)
+            self._journal.write(first, bundle)
         if self._held and bundle:
-            self._held.add(bundle, tick * self._interval_ns)
+            self._held.add(bundle, first * self._interval_ns)
+        way.given += way.ticks
         return bundle
 
     def look(self) -> None:
         """See which topics somebody listens to."""
         self._listened = {topic for topic, key in self._topics.items() if self._process.bus.has_audience([key])}
 
-    def publish(self, tick: int) -> None:
-        """Hand over what the graph gives at `tick`."""
-        bundle = self._note(tick)
-        if bundle and self._put_bundle:
-            self._put_bundle(bundle, tick * self._interval_ns)
+    def publish(self, first: int, stop: int) -> None:
+        """Hand over what the graph gives at the ticks [first, stop)."""
+        for way in self._ways:
+            while (following := way.given + way.ticks) <= stop:
+                if bundle := self._next(way):
+                    way.put(bundle, (following - way.ticks) * self._interval_ns)
         if self._listened:
-            for page in self._graph.pages(tick, tick + 1, self._listened, keep=True):
+            for page in self._graph.pages(first, stop, self._listened, keep=True):
                 for at, payload in zip(page.ticks, page.payloads, strict=True):
                     self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
-        if tick + 1 - self._handed >= PAGE or time.monotonic() > self._due:
-            self._hand_over(tick + 1)
+        if stop - self._handed >= PAGE or time.monotonic() > self._due:
+            self._hand_over(stop)
             self._process.tell_of_refused()
             self.look()
 
@@ -168,7 +192,6 @@ class Outlets:
         time_ns = stop * self._interval_ns
         if self._held:
             self._held.add(b"", time_ns)
-        if self._put_bundle and not self._process.abandoned:
-            self._put_bundle(b"", time_ns)
-        for put in (self._put_batch, *self._puts.values()):
+        ways = [] if self._process.abandoned else [way.put for way in self._ways]
+        for put in (*ways, self._put_batch, *self._puts.values()):
             put(b"", time_ns)

@@ -21,6 +21,7 @@ from cosim.wire import Page, later
 from messages.topics import Topic
 
 STALL = 2.5  # [s] without any message after which somebody is held to be frozen
+LONGEST = 60.0  # [s] the same where processes wait for a processor
 WATCHER = "mission"  # whoever watches, among the participants
 HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
 
@@ -136,11 +137,20 @@ class Watch:
         why = f": {self.outcome}" if self.outcome else ""
         return f"the run ended before its time, at t = {self.time_ns * 1e-9:.3f} s{why}"
 
-    def frozen(self, names: Iterable[str]) -> str | None:
-        """A sentence that names who holds up the run, None while it goes on."""
-        if self.ended or time.monotonic() - self.last_news < self._patience:
+    def frozen(self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0) -> str | None:
+        """A sentence that names who holds up the run, None while it goes on.
+
+        Args:
+            names: of the participants without whom it does not.
+            starved: how long [s] those of some names have waited for a processor since the last news; that is not held
+                against them.
+        """
+        silence = time.monotonic() - self.last_news
+        if self.ended or silence < self._patience:
             return None
         silent = sorted(set(names) - set(self.waiting))
+        if silence < LONGEST and silence - starved(silent or names) < self._patience:
+            return None
         where = f"at t = {self.time_ns * 1e-9:.3f} s"
         if silent:
             return f"{', '.join(silent)}: no answer for {self._patience:g} s, {where}"

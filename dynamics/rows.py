@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any
 
+import numba
 import numpy as np
 from numba.core import types
 from numba.core.errors import TypingError
@@ -39,17 +40,11 @@ def to_row(tree: Any) -> np.ndarray:
     return np.array(flat)
 
 
-def from_row(like: Any, row: np.ndarray) -> Any:
-    """The tree of the shape and types of `like` whose numbers stand in `row`."""
-    numbers = iter(row.tolist())
-
-    def walk(part: Any) -> Any:
-        if isinstance(part, tuple):
-            items = [walk(item) for item in part]
-            return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
-        return type(part)(next(numbers))
-
-    return walk(like)
+def reader(like: Any) -> Callable[[np.ndarray], Any]:
+    """A function from a row (width,) to the tree of the shape and types of `like` whose numbers stand in it."""
+    result, names = construction(numba.typeof(like), lambda column: f"numbers[{column}]")
+    read = define("read(numbers)", names, f"return {result}")
+    return lambda row: read(row.tolist())
 
 
 def columns(like: Any, rows: np.ndarray) -> Any:

@@ -10,10 +10,9 @@ LOOK_EVERY = 5  # ticks between two looks of the commander at the estimate
 
 
 class Attention(NamedTuple):
-    """What does not change, and the battery's thresholds, which may."""
+    """What the conditions depend on."""
 
-    autonomous: bool  # nothing but a failsafe can end the flight along the scene's trajectory
-    thresholds: Any  # cell of `BatteryThresholds`
+    thresholds: Any  # cell of `BatteryThresholds`, which an operator may change
 
 
 @leaf
@@ -21,7 +20,7 @@ def attention_due(p: Attention, tick: int, health: int, battery: Received, fligh
     """Whether the commander has a say at `tick`; battery and flight as they were received."""
     charge = battery.value.charge if battery.due else 1.0
     failed = flight.value.failed_motor if flight.due else 0
-    return needs_attention(p.autonomous, p.thresholds.value, health, charge, failed, tick % LOOK_EVERY == 0)
+    return needs_attention(p.thresholds.value, health, charge, failed, tick % LOOK_EVERY == 0)
 
 
 @leaf

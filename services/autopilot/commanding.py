@@ -1,4 +1,7 @@
-"""The commander as a part of the graph that stays in Python: acts when it is called, at every tick while it steers."""
+"""The commander as a part of the graph that stays in Python: acts when it is called, at every tick while it steers.
+
+Along the scene's trajectory it is asked only at the ticks at which something may change (`commander.attention`).
+"""
 
 import math
 from collections.abc import Callable, Iterable
@@ -98,8 +101,11 @@ class Commanding:
         self._battery = injection.received(ports.BATTERY)
         self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
         self._driven: tuple[float, ...] | None = None  # voltages from outside that hold
-        self._estimate: Any = None
+        self._asked = -1  # [tick] at which the commander was asked last
+        self._estimate: Any = None  # that it is shown
+        self._shown = -1  # [tick] of it
         self._estimate_every_tick = False
+        self._ordered: Order | None = None  # what stands in the port
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
@@ -111,15 +117,18 @@ class Commanding:
     def act(self, tick: int) -> int:
         """Ask the commander at `tick`."""
         graph = self._graph
+        if self._given.operator and tick - self._asked > 1:
+            self._skip(range(self._asked + 1, tick))
+        self._asked = tick
         elapsed = 0.0
         looked = tick - tick % LOOK_EVERY
         if tick == looked or self._estimate_every_tick:
             elapsed = self._interval * (1 if self._estimate_every_tick else LOOK_EVERY)
             looked = tick
-        if elapsed or self._estimate is None:
-            self._estimate = graph.latest(ports.ESTIMATE, looked)
-        flight = graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
-        followed = _setpoint(graph.latest(ports.TRAJECTORY, tick)) if self._given.phases else None
+        if looked > self._shown:
+            self._estimate, self._shown = graph.latest(ports.ESTIMATE, looked), looked
+        flight = self._flight(tick)
+        followed = self._followed(tick) if self._given.phases else None
         request = self._commander.step(
             View(
                 self._interval,
@@ -142,9 +151,36 @@ class Commanding:
         if self._injection.direct is not None and request.motor_voltage != self._driven:
             self._driven = request.motor_voltage
             write(self._injection.direct, self._direct(request.motor_voltage))
-        graph.put(ORDER, tick, self._order(tick, request, flight))
+        order = self._order(tick, request, flight)
+        if order != self._ordered:
+            graph.put(ORDER, tick, order)
+            self._ordered = order
         self._answer(tick, request)
-        return NEVER if request.quiet else tick + 1
+        return self._next(tick, request.quiet)
+
+    def _next(self, tick: int, quiet: float) -> int:
+        """The tick of the next say, after a request at `tick` that is quiet for so long [s]."""
+        ticks = int(quiet / self._interval) if quiet < math.inf else NEVER
+        if self._given.operator:
+            ticks = min(ticks, *[every - tick % every for every in (LOOK_EVERY, self._given.answers_every)])
+        return min(tick + max(1, ticks), NEVER)
+
+    def _skip(self, missed: range) -> None:
+        """Let the commander take in the ticks since it was asked, in which its request was quiet."""
+        flew = next((tick for tick in reversed(missed) if self._flies(tick)), None)
+        setpoint = None if flew is None else self._followed(flew)
+        self._commander.skip(len(missed), self._interval, flew == missed[-1], setpoint)
+
+    def _flies(self, tick: int) -> bool:
+        """Whether the vehicle flies along the trajectory, as the commander sees it."""
+        return self._thrust(tick) > 0.0 and self._flight(tick).stage != LANDED
+
+    def _flight(self, tick: int) -> Flight:
+        found: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
+        return found
+
+    def _followed(self, tick: int) -> Setpoint:
+        return _setpoint(self._graph.latest(ports.TRAJECTORY, tick))
 
     def _direct(self, volts: tuple[float, ...] | None) -> Direct:
         """Voltages from outside within what the motors take; None: the controller's."""

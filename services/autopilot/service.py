@@ -42,7 +42,7 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     outputs = {port.name: port for port in setup.services[NAME].ports}
     values = {p.name: p.default for p in given.parameters}
     law, thresholds = Cell(controller(given, values)), Cell(battery_thresholds(values))
-    attention = Attention(bool(given.phases) and not given.operator, thresholds)
+    attention = Attention(thresholds)
     service = Service(NAME, [], [])
 
     def speak(tick: int) -> list[Any]:

@@ -5,8 +5,9 @@ import re
 from collections.abc import Callable
 from typing import Any, Self
 
-from cosim.bus import Subscription, ZenohBus
+from cosim.bus import ZenohBus
 from cosim.errors import BusError
+from cosim.subscription import Subscription
 from messages import TYPES
 from services.ros2.names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 

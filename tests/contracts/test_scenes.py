@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-import cosim.graph
+import cosim.turns
 from cosim.graph import Graph
 from cosim.log import LogReader
 from cosim.part import run
@@ -49,7 +49,7 @@ def test_no_part_makes_arrays(scene, monkeypatch):
         made += rtsys.get_allocation_stats().mi_alloc - before
         return stopped
 
-    monkeypatch.setattr(cosim.graph, "run", watched)
+    monkeypatch.setattr(cosim.turns, "run", watched)
     setup = resolve(load(scene))
     _nrt_python.memsys_enable_stats()
     Graph(setup, create_all(setup, nobody), 1).advance(250)

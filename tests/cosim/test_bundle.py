@@ -82,6 +82,40 @@ def test_a_service_has_no_bundle_where_none_of_its_ports_is_due():
     assert not Bundles(()).due(0)
 
 
+def run_of(ticks):
+    """A graph whose ports have values at each of the ticks [0, ticks) at which they are due."""
+    found = graph("pair", "slow", "slower")
+    for port in PORTS:
+        for tick in range(0, ticks, port.period):
+            found.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+    return found
+
+
+@pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
+def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
+    giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
+    for ports in (PORTS, PORTS[1:]):
+        single, several = Bundles(ports), Bundles(ports, ticks)
+        for first in range(0, 15 - ticks, ticks):
+            each = [tick for tick in range(first, first + ticks) if single.due(tick)]
+            assert several.due(first) == bool(each)
+            for tick in each:
+                single.unpack(single.pack(giver, tick), one_by_one, tick)
+            if each:
+                payload = several.pack(giver, first)
+                assert len(payload) == sum(len(single.pack(giver, tick)) for tick in each)
+                several.unpack(payload, at_once, first)
+        for port in ports[:-1]:
+            for tick in range(0, first + ticks, port.period):
+                assert at_once.row(port.name, tick).tolist() == one_by_one.row(port.name, tick).tolist()
+
+
+@pytest.mark.parametrize("size", [0, 64, 72, 81])
+def test_a_bundle_of_several_ticks_of_the_wrong_size_is_refused(size):
+    with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
+        Bundles(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
+
+
 @pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
 def test_a_bundle_of_the_wrong_size_is_refused(size):
     with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):

@@ -10,7 +10,7 @@ import pytest
 from cosim.fleet import members
 from cosim.schedule import Port
 from cosim.wire import Wire, due_ticks, encode
-from dynamics.rows import from_row, to_row
+from dynamics.rows import reader, to_row
 from messages import Setpoint, header
 from messages.records import stamp_columns
 from messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, of_all
@@ -101,7 +101,7 @@ def check_every_topic(setup, random):
         found = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
         assert sum(len(page.ticks) for page in pages) == len(found) == len(ticks)
         for tick, value in zip(ticks, values, strict=True):
-            assert from_row(port.like, to_row(value)) == value
+            assert reader(port.like)(to_row(value)) == value
             expected = BUILDERS[wire.topic](given, int(tick) * setup.interval_ns, value)
             assert found[tick] == expected.encode(), wire.topic.name
 

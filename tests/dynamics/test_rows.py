@@ -1,13 +1,14 @@
 """Trees as rows, and the columns of many rows."""
 
 import gc
+import math
 import weakref
 from typing import NamedTuple
 
 import numpy as np
 
 from dynamics.lie.quaternion import Quaternion
-from dynamics.rows import columns, from_row, to_row, width
+from dynamics.rows import columns, reader, to_row, width
 
 
 class Inner(NamedTuple):
@@ -36,7 +37,15 @@ def test_columns_are_the_numbers_of_each_part():
     assert found.inner.on.tolist() == [1.0, 10.0]
     assert [part.tolist() for part in found.several] == [[[5.0, 6.0], [50.0, 60.0]], [[7.0, 8.0], [70.0, 80.0]]]
     assert found.none.shape == (2, 0)
-    assert from_row(LIKE, rows[0]) == LIKE
+
+
+def test_a_row_is_read_as_the_tree_that_it_was_made_of():
+    tree = LIKE._replace(time=0.1, inner=Inner((1e-300, -0.0, math.inf), False))
+    read = reader(LIKE)(to_row(tree))
+    assert repr(read) == repr(tree)
+    several = ((1, True), (2.5,), ())
+    assert repr(reader(several)(to_row(several))) == repr(several)
+    assert reader(3)(to_row(2**53)) == 2**53
 
 
 def test_rows_are_let_go_with_their_columns():

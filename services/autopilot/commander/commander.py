@@ -13,7 +13,7 @@ from services.autopilot.commander import (  # noqa: F401 (two declare their hand
     failure_handlers,
     plan_handlers,
 )
-from services.autopilot.commander.attention import battery_thresholds, needs_attention
+from services.autopilot.commander.attention import quiet_time
 from services.autopilot.commander.command_handlers import handle
 from services.autopilot.commander.request import Outbox, Request, Status
 from services.autopilot.commander.state import State, initial
@@ -42,11 +42,25 @@ class Commander:
         view = View(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
         return status(self.constants, view, self.state)
 
-    def step(self, view: View) -> Request:
-        """What is asked for at this tick; after a quiet request it needs to be called only where attention is needed.
+    def skip(self, ticks: int, dt: float, flying: bool, setpoint: Setpoint | None) -> None:
+        """Take in ticks of a quiet request at which it was not called.
 
-        Between two calls after a quiet request all would be as in that request, and later requests do not depend on
-        whether it was called: `guidance` is made anew from the view before anything reads it.
+        Args:
+            ticks: how many.
+            dt: length of each [s].
+            flying: whether the vehicle flew at the last of them.
+            setpoint: of the scene's trajectory at the last of them at which it flew, None if it did at none.
+        """
+        guidance = self.state.guidance
+        for _ in range(ticks):
+            guidance.inputs.age(dt)
+        guidance.flying = guidance.armed = flying
+        if setpoint is not None:
+            guidance.follow(setpoint)
+
+    def step(self, view: View) -> Request:
+        """What is asked for at this tick. While a request is quiet it needs to be called only where something may
+        change (`quiet_time`); with an operator, whose commands see what `guidance` was before, `skip` comes first.
         """
         constants, state = self.constants, self.state
         context = Context(constants, view, state, Outbox())
@@ -68,17 +82,8 @@ class Commander:
             estimate_every_tick=from_estimate,
             motor_voltage=volts,
             status=status(constants, view, state),
-            quiet=_is_quiet(context),
+            quiet=quiet_time(context),
         )
-
-
-def _is_quiet(context: Context) -> bool:
-    """Whether the scene's trajectory is followed, and no failsafe condition holds or is being counted."""
-    constants, view, state, _ = context
-    if not constants.autonomous or not state.on_trajectory or state.failsafe_timers:
-        return False
-    thresholds = battery_thresholds(state.guidance.parameters)
-    return not needs_attention(True, thresholds, view.estimate.health, view.battery_charge, view.failed_motor, True)
 
 
 def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:

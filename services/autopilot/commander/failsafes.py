@@ -77,6 +77,12 @@ def update(context: Context) -> None:
         state.failsafe_timers[failsafe.reason] = FailsafeTimer(elapsed, acted)
 
 
+def any_holds(context: Context) -> bool:
+    """Whether some condition holds, counted or not, or was counted and is not known to be over."""
+    view, state = context.view, context.state
+    return bool(state.failsafe_timers) or any(failsafe.holds(view, state) for failsafe in FAILSAFES)
+
+
 def _act(context: Context, reason: str, mode: str | None) -> bool:
     """Do what is to be done; whether that was possible in the present mode."""
     state = context.state

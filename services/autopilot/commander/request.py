@@ -42,7 +42,7 @@ class Request(NamedTuple):
         tuple[float, ...] | None
     )  # of each motor, in the place of the controller's [V]; None: the controller's
     status: Status
-    quiet: bool  # nothing to do until `attention.needs_attention`: up to then, every request would be this one
+    quiet: float  # [s] from this tick on in which every request would be this one (`attention.quiet_time`)
 
 
 @dataclass

@@ -23,11 +23,6 @@ class Constants(NamedTuple):
     failing: tuple[str, ...] = ()  # units whose failures may be injected
     rotors: int = 4
 
-    @property
-    def autonomous(self) -> bool:
-        """Whether nothing but a failsafe can end the flight along the scene's trajectory."""
-        return self.has_trajectory and not self.has_operator
-
 
 class View(NamedTuple):
     """All that the commander is told at one tick."""

@@ -1,0 +1,41 @@
+"""How long processes have waited for a processor: one that gets none is silent, but it is not frozen.
+
+Linux counts for each thread how long it was ready to run and did not (`/proc/PID/task/TID/schedstat`, second number
+[ns]); that of a thread that is stopped, sleeps or runs does not grow.
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+QUIET = 0.5  # [s] without news from which on it is measured
+
+
+def waited(pid: int) -> float:
+    """Time [s] that the threads of a process have waited for a processor; 0 where the system does not tell."""
+    total = 0
+    try:
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            total += int((thread / "schedstat").read_text().split()[1])
+    except (OSError, IndexError, ValueError):  # it has ended, or a system that has not got this
+        return 0.0
+    return total * 1e-9
+
+
+class Starvation:
+    """What processes of this machine have waited for a processor since there was news."""
+
+    def __init__(self) -> None:
+        self._before: dict[str, float] = {}
+        self._pids: Mapping[str, int] = {}
+
+    def look(self, pids: Mapping[str, int], silence: float) -> None:
+        """Look at processes, by name, of which there was no news for `silence` [s]."""
+        self._pids = pids
+        if silence < QUIET:
+            self._before = {}
+        elif not self._before:
+            self._before = {name: waited(pid) for name, pid in pids.items()}
+
+    def of(self, names: Iterable[str]) -> float:
+        """Time [s] that those of these names have waited since then, together."""
+        return sum(max(0.0, waited(self._pids[name]) - self._before[name]) for name in names if name in self._before)
