@@ -9,6 +9,7 @@ from cosim.certificates import tls
 from cosim.keys import ENCODER
 from cosim.setup import Setup
 from cosim.watch import WATCHER
+from messages.topics import EVENTS
 from services.processes import PROCESSES, create
 
 
@@ -21,6 +22,7 @@ def names() -> list[str]:
 def says(setup: Setup, key_prefix: str) -> dict[str, list[str]]:
     """The key expressions that each may publish on, by name."""
     found = {name: [f"{key_prefix}/*/{name}"] for name in names()}
+    found[WATCHER] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
     for name in setup.services:
         topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
         found[name] += topics
