@@ -141,25 +141,22 @@ class ZenohBus:
 
         `notify` is called from another thread after each arrival, for those who wait for other things besides.
         """
-        return self._receive(key_expressions, None, notify)
+        return self._receive(key_expressions, Subscription(None, self._refuse, notify))
 
-    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> "Subscription":
-        """The same of known senders: by key the mark that a message must carry, None for that of the first."""
-        return self._receive(senders, dict(senders), notify)
-
-    def _receive(
-        self, keys: Iterable[str], senders: dict[str, bytes | None] | None, notify: Callable[[], None] | None
+    def receive(
+        self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None, few: bool = False
     ) -> "Subscription":
-        arrived: queue.SimpleQueue = queue.SimpleQueue()
+        """The same of known senders: by key the mark that a message must carry, None for that of the first.
 
-        def put_and_notify(sample: zenoh.Sample) -> None:
-            arrived.put(sample)
-            notify()  # type: ignore[misc]
+        `few`: messages are taken soon after they come, and stay as they are until then. That spares Zenoh's thread some
+        15 us each; but each keeps the 64 kB alive into which it was read, and such memory is not given back.
+        """
+        return self._receive(senders, Subscription(dict(senders), self._refuse, notify, few))
 
-        # Python code in Zenoh's thread costs some 15 us a message: without it the queue is filled by Zenoh alone
-        handler = zenoh.handlers.Callback(put_and_notify if notify else arrived.put, indirect=False)
+    def _receive(self, keys: Iterable[str], subscription: "Subscription") -> "Subscription":
+        handler = zenoh.handlers.Callback(subscription.arrive, indirect=False)
         self._held.extend(self._session.declare_subscriber(key, handler) for key in keys)
-        return Subscription(arrived, senders, self._refuse)
+        return subscription
 
     def _refuse(self) -> None:
         self.refused += 1
@@ -241,12 +238,21 @@ class ZenohBus:
 
 
 class Subscription:
-    """What has arrived on some keys and was not taken yet; who takes it leaves out what is not of its sender."""
+    """What has arrived on some keys and was not taken yet; what is not of its sender is left out."""
 
-    def __init__(self, arrived: queue.SimpleQueue, senders: dict[str, bytes | None] | None, refuse: Callable[[], None]):
-        """Of the samples in `arrived`; `senders` as of `ZenohBus.receive`, None for anybody."""
-        self._arrived, self._senders, self._refuse = arrived, senders, refuse
+    def __init__(
+        self,
+        senders: dict[str, bytes | None] | None,
+        refuse: Callable[[], None],
+        notify: Callable[[], None] | None = None,
+        few: bool = False,
+    ):
+        """`senders`, `notify` and `few` as of `ZenohBus.receive`, without senders for anybody's."""
+        self._senders, self._refuse, self._notify = senders, refuse, notify
         self._only_mark = next(iter(senders.values())) if senders and len(senders) == 1 else None
+        self._arrived: queue.SimpleQueue = queue.SimpleQueue()  # samples where there are few, else key, time, payload
+        self._few = few
+        self.arrive: Callable[[zenoh.Sample], None] = self._arrived.put if few else self._copy  # in Zenoh's thread
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
         """Simulation time [ns] and payload of the next message, None after `timeout` seconds."""
@@ -256,22 +262,34 @@ class Subscription:
     def get_with_key(self, timeout: float) -> tuple[str, int, bytes] | None:
         """The same with the message's key in front."""
         found = self._next(timeout)
-        return found and (str(found[0].key_expr), *found[1:])
+        return found and (str(found[0]), *found[1:])
 
-    def _next(self, timeout: float) -> tuple[zenoh.Sample, int, bytes] | None:
-        """The next message of its sender, its time and its payload."""
+    def _next(self, timeout: float) -> tuple[Any, int, bytes] | None:
+        """The next message of its sender: its key, its time and its payload."""
         until = None
         while True:
             try:
-                sample = self._arrived.get(timeout=timeout)
+                found = self._arrived.get(timeout=timeout)
             except queue.Empty:
                 return None
-            message = _message(sample)
-            if message is not None and self._is_of_its_sender(sample, message[1]):
-                return sample, message[0], message[2]
-            self._refuse()
+            if not self._few or (found := self._checked(found)):
+                return found
             until = until or time.monotonic() + timeout
             timeout = max(0.0, until - time.monotonic())
+
+    def _copy(self, sample: zenoh.Sample) -> None:
+        if found := self._checked(sample):
+            self._arrived.put((str(found[0]), *found[1:]))
+            if self._notify:
+                self._notify()
+
+    def _checked(self, sample: zenoh.Sample) -> tuple[Any, int, bytes] | None:
+        """Key, time and payload of a message of its sender; any other is refused."""
+        message = _message(sample)
+        if message is None or not self._is_of_its_sender(sample, message[1]):
+            self._refuse()
+            return None
+        return sample.key_expr, message[0], message[2]
 
     def _is_of_its_sender(self, sample: zenoh.Sample, mark: bytes) -> bool:
         if self._only_mark or self._senders is None:  # the text of a key takes longer than all else
