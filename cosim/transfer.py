@@ -32,7 +32,7 @@ class Source:
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
         self._bundles = Bundles(process.setup.services[name].ports)
-        self._subscription: Subscription = process.bus.receive(process.participants.senders(STEP_KEY, [name]))
+        self._subscription: Subscription = process.bus.receive(process.participants.senders(STEP_KEY, [name]), few=True)
         self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
         self._newest = -1  # tick of the newest bundle taken
 
@@ -100,7 +100,7 @@ class Outlets:
         self._put_bundle = bus.publisher(f"{key_prefix}/{STEP_KEY}/{service.name}") if hands_over else None
         self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
-        self._puts = {topic: bus.publisher(key) for topic, key in self._topics.items()}
+        self._puts = {topic: bus.publisher(key, drops=True) for topic, key in self._topics.items()}
         self._listened: set[Topic] = set()
         self._handed = 0  # tick before which all is handed over
         self._due = 0.0

@@ -2,9 +2,11 @@
 
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
+import zenoh
 
 from cosim.access import VIEWER
 from cosim.bus import ZenohBus
@@ -69,3 +71,28 @@ def test_a_door_without_certificates_is_for_reading_too(tmp_path):
     heard, said = visit(command(tmp_path, door, "--insecure"), door)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
     assert "refused" not in said
+
+
+def test_a_viewer_who_stops_reading_holds_nobody_up(tmp_path):
+    (door,) = loopback_endpoints(["door"]).values()
+    words = command(tmp_path, door, "--insecure", "--set", "run.duration=12")
+    released, keys = threading.Event(), set()
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
+        viewer = None
+        while viewer is None and run.poll() is None:
+            try:
+                viewer = ZenohBus(connect=[door], mode="client")
+            except BusError:  # nobody listens yet
+                time.sleep(0.1)
+        arrived = viewer.subscribe(f"{PREFIX}/**")
+        while len(keys) < 5 and run.poll() is None:
+            keys |= {message[0] for _ in range(50) if (message := arrived.get_with_key(timeout=0.1))}
+        # one that holds Zenoh's only thread: nothing is read any more
+        frozen = zenoh.handlers.Callback(lambda sample: released.wait(), indirect=False)
+        viewer._held.append(viewer._session.declare_subscriber(f"{PREFIX}/**", frozen))
+        said = run.communicate(timeout=200)[0]
+        released.set()
+        viewer.close()
+    assert run.returncode == 0, said
+    assert f"{PREFIX}/drone1/pose" in keys
+    assert not [key for key in keys if key.startswith(f"{PREFIX}/_")]  # whose senders wait for all who read them
