@@ -121,10 +121,17 @@ until address=$(docker port "$(container foxglove)" 8765 2> /dev/null) && grep -
 done
 [ "${address%:*}" = 127.0.0.1 ] || fail "foxglove is published at $address"
 (cd "$ROOT" && "$(dirname "$LAPWING")/python" - "${address##*:}") > shown.txt 2>&1 << 'CLIENT' || fail "$(tail -1 shown.txt)"
-import sys
+import sys, time
 from tests.services.foxglove.client import Client
 
-client, shown = Client(int(sys.argv[1])), 0
+client, shown, tries = None, 0, 60
+while client is None:
+    try:
+        client = Client(int(sys.argv[1]))
+    except (ConnectionError, EOFError):  # the engine listens before the container does
+        tries -= 1
+        assert tries, "foxglove does not listen"
+        time.sleep(1.0)
 client.subscribe("/drone1/truth")
 while (message := client.next()) is not None:
     shown += isinstance(message, bytes) and message[0] == 1
