@@ -48,6 +48,12 @@ def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
     return _settings([*rules, _withheld(key_prefix)], [inside, outside], [*policies, _VIEWING])
 
 
+def withholding(key_prefix: str) -> dict[str, Any]:
+    """Zenoh's settings for a router that cannot tell viewers from participants, who are joined without it."""
+    policies = [{"rules": ["withhold"], "subjects": ["anybody"]}]
+    return _settings([_withheld(key_prefix)], [{"id": "anybody"}], policies, default="allow")
+
+
 def _reading(key: str) -> list[dict[str, Any]]:
     return [_rule("receive", _ALL, "egress", [key]), _rule("listen", _LISTEN, "ingress", [key])]
 
@@ -61,6 +67,6 @@ def _rule(name: str, messages: list[str], flow: str, keys: Iterable[str]) -> dic
     return {"id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": list(keys)}
 
 
-def _settings(rules: list, subjects: list, policies: list) -> dict[str, Any]:
-    settings = {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects}
+def _settings(rules: list, subjects: list, policies: list, default: str = "deny") -> dict[str, Any]:
+    settings = {"enabled": True, "default_permission": default, "rules": rules, "subjects": subjects}
     return {"access_control": {**settings, "policies": policies}}

@@ -9,13 +9,15 @@ import pytest
 import zenoh
 
 from cosim.access import VIEWER
-from cosim.bus import ZenohBus
+from cosim.bus import ZenohBus, mesh
 from cosim.certificates import make, tls
 from cosim.errors import BusError
-from cosim.keys import DIVERGED_KEY, STEP_KEY
+from cosim.keys import BATCH_KEY, DIVERGED_KEY, STEP_KEY
 from messages import PoseStamped
 from services.common.operator import OPERATOR_KEY
 from services.processes import ROUTER
+from services.security import settings
+from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 
 PREFIX = "test-router"
@@ -71,6 +73,26 @@ def test_a_door_without_certificates_is_for_reading_too(tmp_path):
     heard, said = visit(command(tmp_path, door, "--insecure"), door)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
     assert "refused" not in said
+
+
+def test_who_comes_in_where_nobody_has_a_certificate_is_not_told_the_lock_step():
+    ends = loopback_endpoints(["plant", ROUTER, "door"])
+    peers = {name: ends[name] for name in ("plant", ROUTER)}
+    security = settings(resolve(load("hover")), ROUTER, PREFIX, "")
+    listen, connect = mesh(ROUTER, peers)
+    with (
+        ZenohBus(*mesh("plant", peers)) as plant,
+        ZenohBus([*listen, ends["door"]], connect, "router", security=security),
+        ZenohBus(connect=[ends["door"]], mode="client") as viewer,
+    ):
+        arrived = viewer.subscribe(f"{PREFIX}/**")
+        pose, batch = (plant.publisher(f"{PREFIX}/{key}") for key in ("drone1/pose", f"{BATCH_KEY}/plant"))
+        keys: list[str] = []
+        while keys.count(f"{PREFIX}/drone1/pose") < 10:
+            batch(b"batch", 0)
+            pose(b"pose", 0)
+            keys += [message[0] for message in [arrived.get_with_key(timeout=0.1)] if message]
+        assert set(keys) == {f"{PREFIX}/drone1/pose"}
 
 
 def test_a_viewer_who_stops_reading_holds_nobody_up(tmp_path):
