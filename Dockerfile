@@ -1,4 +1,5 @@
-# Lapwing's images: `runtime` (every service, the launcher, replay), `cluster` (campaigns on Dask) and `tests`.
+# Lapwing's images: `runtime` (every service, the launcher, replay), `foxglove` (shows a flight), `cluster` (campaigns on
+# Dask) and `tests`.
 #
 #   make docker-build            also where no image can be pulled and no package index is reached from a container
 #   docker compose build         where both can
@@ -20,7 +21,7 @@ ARG PIP_INDEX_URL
 ARG PIP_EXTRA_INDEX_URL
 ARG PIP_TRUSTED_HOST
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
-COPY deploy/requirements.lock deploy/requirements-cluster.lock deploy/requirements-tests.lock /build/
+COPY deploy/requirements*.lock /build/
 COPY deploy/slim.py deploy/install.sh build/wheel[s] /build/
 RUN /build/install.sh
 
@@ -69,6 +70,13 @@ FROM packages AS cluster
 USER lapwing
 COPY --from=dependencies /opt/lapwing-cluster /opt/lapwing-cluster
 ENV PYTHONPATH=/opt/lapwing-cluster
+COPY --from=built /image/ /
+
+
+FROM packages AS foxglove
+USER lapwing
+COPY --from=dependencies /opt/lapwing-foxglove /opt/lapwing-foxglove
+ENV PYTHONPATH=/opt/lapwing-foxglove
 COPY --from=built /image/ /
 
 

@@ -57,22 +57,23 @@ $(VENV)/.bench: $(VENV)/.installed
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
 
-# What is installed, for those who must know: a bill of materials in CycloneDX's form, and the known faults of it (asks
-# a database on the network).
+# What images ship, for those who must know: a bill of materials in CycloneDX's form, and the known faults of it (asks a
+# database on the network).
+SHIPPED := $(filter-out %-tests.lock,$(wildcard deploy/requirements*.lock))
 $(VENV)/audit/bin/pip-audit:
 	$(PYTHON) -m venv $(VENV)/audit
 	$(VENV)/audit/bin/python -m pip install --quiet --disable-pip-version-check "cyclonedx-bom>=7" "pip-audit>=2.9"
 
 sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
 	mkdir -p build
-	$(VENV)/audit/bin/cyclonedx-py requirements deploy/requirements.lock --pyproject pyproject.toml \
+	cat $(SHIPPED) | $(VENV)/audit/bin/cyclonedx-py requirements - --pyproject pyproject.toml \
 		--output-reproducible --output-format JSON --output-file build/sbom.json
 
 DATABASE := https://pypi.org/pypi/pip/25.0/json
 audit: $(VENV)/audit/bin/pip-audit
 	@$(VENV)/audit/bin/python -c "from urllib.request import urlopen; urlopen('$(DATABASE)', timeout=15)" 2> /dev/null || \
 		{ echo "audit: $(DATABASE) gives no answer: known faults cannot be looked up from here" >&2; exit 2; }
-	$(VENV)/audit/bin/pip-audit --strict --require-hashes --disable-pip --requirement deploy/requirements.lock
+	$(VENV)/audit/bin/pip-audit --strict --require-hashes --disable-pip $(addprefix --requirement ,$(SHIPPED))
 
 docker-build:
 	PYTHON=$(PYTHON) deploy/build.sh

@@ -10,6 +10,7 @@ VIEWER = "viewer"  # whose certificate reads, and says nothing
 
 _LISTEN = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _SAY = ["put", "liveliness_token", "declare_queryable", "reply"]
+_VIEWING = {"rules": ["receive", "listen", "withhold"], "subjects": [VIEWER]}
 _ALL = [*_LISTEN, *_SAY, "query", "delete"]
 
 
@@ -28,7 +29,7 @@ def by_certificate(key_prefix: str, says: Mapping[str, Iterable[str]]) -> dict[s
     ]
     subjects = [{"id": name, "cert_common_names": [name]} for name in [*says, VIEWER]]
     policies = [{"rules": ["receive", "listen", "ask", f"say {name}"], "subjects": [name]} for name in says]
-    return _settings(rules, subjects, [*policies, {"rules": ["receive", "listen"], "subjects": [VIEWER]}])
+    return _settings([*rules, _withheld(key_prefix)], subjects, [*policies, _VIEWING])
 
 
 def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
@@ -44,17 +45,28 @@ def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
         outside = {"id": VIEWER, "link_protocols": ["tcp", "udp", "ws", "quic"]}
     rules = [*_reading(f"{key_prefix}/**"), _rule("all", _ALL, "ingress", ["**"]), _rule("any", _ALL, "egress", ["**"])]
     policies = [{"rules": ["all", "any"], "subjects": ["inside"]}]
-    return _settings(rules, [inside, outside], [*policies, {"rules": ["receive", "listen"], "subjects": [VIEWER]}])
+    return _settings([*rules, _withheld(key_prefix)], [inside, outside], [*policies, _VIEWING])
+
+
+def withholding(key_prefix: str) -> dict[str, Any]:
+    """Zenoh's settings for a router that cannot tell viewers from participants, who are joined without it."""
+    policies = [{"rules": ["withhold"], "subjects": ["anybody"]}]
+    return _settings([_withheld(key_prefix)], [{"id": "anybody"}], policies, default="allow")
 
 
 def _reading(key: str) -> list[dict[str, Any]]:
     return [_rule("receive", _ALL, "egress", [key]), _rule("listen", _LISTEN, "ingress", [key])]
 
 
+def _withheld(key_prefix: str) -> dict[str, Any]:
+    """Of the lock step a viewer is told nothing: its sender waits for all who read it, one who stops reading too."""
+    return _rule("withhold", ["put", "delete"], "egress", [f"{key_prefix}/_$*/**"]) | {"permission": "deny"}
+
+
 def _rule(name: str, messages: list[str], flow: str, keys: Iterable[str]) -> dict[str, Any]:
     return {"id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": list(keys)}
 
 
-def _settings(rules: list, subjects: list, policies: list) -> dict[str, Any]:
-    settings = {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects}
+def _settings(rules: list, subjects: list, policies: list, default: str = "deny") -> dict[str, Any]:
+    settings = {"enabled": True, "default_permission": default, "rules": rules, "subjects": subjects}
     return {"access_control": {**settings, "policies": policies}}

@@ -37,7 +37,7 @@ class Source:
         self._span = span(process.setup, name, process.name) if process.bundles_ahead else 1
         self._bundles = Bundles(process.setup.services[name].ports, self._span)
         key = step_key(self._span)
-        self._subscription: Subscription = process.bus.receive(process.participants.senders(key, [name]))
+        self._subscription: Subscription = process.bus.receive(process.participants.senders(key, [name]), few=True)
         self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
         self._delay = min(delay for _, _, delay in taken)
         self._newest = -1  # tick up to which bundles are taken
@@ -120,7 +120,7 @@ class Outlets:
                 self._ways.append(_Way(ticks, Bundles(process.setup.services[service.name].ports, ticks), put))
         self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
-        self._puts = {topic: bus.publisher(key) for topic, key in self._topics.items()}
+        self._puts = {topic: bus.publisher(key, drops=True) for topic, key in self._topics.items()}
         self._listened: set[Topic] = set()
         self._handed = 0  # tick before which all is handed over
         self._due = 0.0

@@ -118,7 +118,7 @@ class Watch:
 
     def publish(self, key: str, time_ns: int, payload: bytes) -> None:
         """Say something to the run's viewers, on a key behind the run's prefix."""
-        self._bus.publisher(f"{self._key_prefix}/{key}")(payload, time_ns)
+        self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
 
     @property
     def spoken(self) -> set[str]:

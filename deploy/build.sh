@@ -1,5 +1,6 @@
 #!/bin/sh
-# Builds the images lapwing, lapwing-cluster and lapwing-tests (`make docker-build`), also where no image can be pulled.
+# Builds the images lapwing, lapwing-foxglove, lapwing-cluster and lapwing-tests (`make docker-build`), also where no image
+# can be pulled.
 #
 #   [BASE=IMAGE] [IMAGE=NAME] [PYTHON=python3] deploy/build.sh
 set -eu
@@ -32,5 +33,5 @@ export PREVIOUS
 if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then deploy/wheels.sh; fi
 
 mkdir -p build
-$COMPOSE build mission campaign tests > build/docker-build.log 2>&1 || { tail -30 build/docker-build.log >&2; exit 1; }
-docker image ls --format '{{.Repository}}:{{.Tag}} {{.Size}}' | grep "^${IMAGE:-lapwing}\(-cluster\|-tests\)\?:latest " | sort
+$COMPOSE build mission foxglove campaign tests > build/docker-build.log 2>&1 || { tail -30 build/docker-build.log >&2; exit 1; }
+docker image ls --format '{{.Repository}}:{{.Tag}} {{.Size}}' | grep "^${IMAGE:-lapwing}\(-foxglove\|-cluster\|-tests\)\?:latest " | sort

@@ -12,13 +12,15 @@ skip() { echo "docker-test: skipped: $*"; exit 0; }
 docker info > /dev/null 2>&1 || skip "no Docker engine answers"
 $COMPOSE version > /dev/null 2>&1 || skip "no docker compose"
 
+ROOT=$PWD
 LAPWING=$(realpath --no-symlinks "${LAPWING:-.venv/bin/lapwing}")
 SCENE=scenes/delivery_mission.toml
 IMAGE=${IMAGE:-lapwing}
 LIMIT=700000000 # [bytes] of an image
 TIMEOUT=300     # [s] for the mission to begin, fly and end
 PORT=${PORT:-0}   # any free one
-export SCENE IMAGE PORT
+FOXGLOVE_PORT=${FOXGLOVE_PORT:-0}
+export SCENE IMAGE PORT FOXGLOVE_PORT
 
 deploy/build.sh
 
@@ -41,7 +43,7 @@ fail() {
 }
 passed() { echo "docker-test: $*"; }
 
-for image in "$IMAGE" "$IMAGE-cluster" "$IMAGE-tests"; do
+for image in "$IMAGE" "$IMAGE-foxglove" "$IMAGE-cluster" "$IMAGE-tests"; do
     size=$(docker image inspect --format '{{.Size}}' "$image")
     [ "$size" -lt $LIMIT ] || fail "$image has $size bytes, allowed are $LIMIT"
     [ "$(docker run --rm --network none "$image" id -u)" -ne 0 ] || fail "$image runs as root"
@@ -49,7 +51,7 @@ for image in "$IMAGE" "$IMAGE-cluster" "$IMAGE-tests"; do
 done
 
 # A user's folder; where that can be tried it belongs to somebody who is neither root nor known to the image.
-cp -r docker-compose.yml scenes "$work/"
+cp -r docker-compose.yml docker-compose.keys.yml scenes "$work/"
 mkdir "$work/recordings"
 if [ "$(id -u)" -eq 0 ]; then chown 4321:4321 "$work/recordings"; fi
 owner=$(stat -c %u:%g "$work/recordings")
@@ -94,13 +96,59 @@ RUNS=4 timeout $TIMEOUT $COMPOSE --profile cluster up --no-build --exit-code-fro
 cmp recordings/campaign/runs.csv campaign/runs.csv || fail "the campaign has another table than the local one"
 passed "a campaign on two workers: the local one's table"
 
-# One that is killed in flight ends them all, by name; what runs cannot write to its image, and is healthy while it flies.
-before=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")
-# shellcheck disable=SC2086
-docker rm --force $before > /dev/null
-: > compose.log # now: what is looked for below must not be found in the first flight's lines
 container() { docker ps --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" \
     --filter "label=com.docker.compose.service=$1"; }
+remove_containers() {
+    # shellcheck disable=SC2046
+    docker rm --force $(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME") > /dev/null
+}
+
+# A flight live in Foxglove, each container with its own certificate alone: a client on this host is shown it to its end.
+remove_containers
+"$LAPWING" keys keys > local.log || fail "no certificates: $(cat local.log)"
+chown -R "$owner" keys
+(
+    export COMPOSE_FILE=docker-compose.yml:docker-compose.keys.yml SCHEME=tls LINKS=--keys=keys USER_ID="${owner%:*}"
+    SPEED=2 LOG=recordings/shown.mcap JSON=recordings/shown.json \
+        exec timeout $TIMEOUT $COMPOSE --profile view up --no-build > compose.log 2>&1 < /dev/null
+) &
+up=$!
+waited=0
+until address=$(docker port "$(container foxglove)" 8765 2> /dev/null) && grep -q "t = " compose.log; do
+    sleep 1
+    waited=$((waited + 1))
+    [ $waited -lt $TIMEOUT ] || fail "the mission to be shown has not begun"
+done
+[ "${address%:*}" = 127.0.0.1 ] || fail "foxglove is published at $address"
+(cd "$ROOT" && "$(dirname "$LAPWING")/python" - "${address##*:}") > shown.txt 2>&1 << 'CLIENT' || fail "$(tail -1 shown.txt)"
+import sys, time
+from tests.services.foxglove.client import Client
+
+client, shown, tries = None, 0, 60
+while client is None:
+    try:
+        client = Client(int(sys.argv[1]))
+    except (ConnectionError, EOFError):  # the engine listens before the container does
+        tries -= 1
+        assert tries, "foxglove does not listen"
+        time.sleep(1.0)
+client.subscribe("/drone1/truth")
+while (message := client.next()) is not None:
+    shown += isinstance(message, bytes) and message[0] == 1
+assert shown > 100, f"{shown} messages"
+print(shown)
+CLIENT
+wait $up || fail "compose --profile view up ended with exit code $?"
+for container in $(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME"); do
+    code=$(docker inspect --format '{{.State.ExitCode}}' "$container")
+    [ "$code" -eq 0 ] || { docker logs --tail 20 "$container" >&2; fail "a container of the view ended with exit code $code"; }
+done
+[ "$(field recordings/shown.json digest)" = "$here" ] || fail "with certificates the flight has another digest"
+passed "with certificates: the same digest; a client of ws://$address was shown $(cat shown.txt) states, to the end"
+
+# One that is killed in flight ends them all, by name; what runs cannot write to its image, and is healthy while it flies.
+remove_containers
+: > compose.log # now: what is looked for below must not be found in an earlier flight's lines
 # shellcheck disable=SC2086
 SPEED=1 LOG=recordings/killed.mcap JSON=recordings/killed.json $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null &
 up=$!

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what workers of a cluster and the tests need besides
-# to /opt/lapwing-cluster and /opt/lapwing-tests.
+# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what some images have besides to /opt/lapwing-NAME,
+# from each requirements-NAME.lock.
 set -eu
 cd /build
 
@@ -10,7 +10,8 @@ if ls ./*.whl > /dev/null 2>&1; then export PIP_NO_INDEX=1 PIP_FIND_LINKS=/build
 # The environment gets no pip of its own: the base's serves, and nothing is installed at run time.
 python3 -m venv --without-pip /opt/lapwing
 pip --python /opt/lapwing/bin/python install --no-deps -r requirements.lock
-for more in cluster tests; do
-    pip --python /opt/lapwing/bin/python install --no-deps --target /opt/lapwing-$more -r requirements-$more.lock
+for lock in requirements-*.lock; do
+    more=${lock#requirements-}
+    pip --python /opt/lapwing/bin/python install --no-deps --target "/opt/lapwing-${more%.lock}" -r "$lock"
 done
-python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-cluster /opt/lapwing-tests
+python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-*

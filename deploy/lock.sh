@@ -3,12 +3,13 @@
 #
 #   deploy/lock.sh [PACKAGE]     all anew, or only PACKAGE to its newest version
 #
-# Writes requirements.lock (what the runtime image holds, and the build backend), requirements-cluster.lock and
-# requirements-tests.lock (what a Dask cluster and the tests need on top of it), each with the hashes of all files of that
-# version, for every platform. pip refuses what has another hash. A local environment gets the same versions by
-# `pip install --constraint`.
+# Writes requirements.lock (what the runtime image holds, and the build backend) and for each of $MORE what it needs on top
+# of it (a Dask cluster, the server for Foxglove, the tests), each with the hashes of all files of that version, for every
+# platform. pip refuses what has another hash. A local environment gets the same versions by `pip install --constraint`.
 set -eu
 cd "$(dirname "$0")/.."
+
+MORE="cluster foxglove tests"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -23,11 +24,11 @@ upgrade=--upgrade
 
 if [ "$upgrade" != --upgrade ]; then
     cp deploy/requirements.lock "$work/runtime"
-    for more in cluster tests; do cat deploy/requirements.lock deploy/requirements-$more.lock > "$work/$more"; done
+    for more in $MORE; do cat deploy/requirements.lock deploy/requirements-$more.lock > "$work/$more"; done
 fi
 echo 'setuptools>=77' > "$work/backend.in"
 pin "$upgrade" --output-file "$work/runtime" pyproject.toml "$work/backend.in" > /dev/null
-for more in cluster tests; do
+for more in $MORE; do
     pin "$upgrade" --output-file "$work/$more" --extra ${more%s} --constraint "$work/runtime" \
         pyproject.toml "$work/backend.in" > /dev/null
 done
@@ -37,7 +38,7 @@ lines() { sed -e :again -e '/\\$/{N; s/ *\\\n */ /; b again' -e '}' "$1" | LC_AL
 hashes() { sed 's/ --hash/ \\\n    --hash/g'; }
 lines "$work/runtime" > "$work/runtime.lines"
 hashes < "$work/runtime.lines" > deploy/requirements.lock
-for more in cluster tests; do
+for more in $MORE; do
     lines "$work/$more" | LC_ALL=C comm -13 "$work/runtime.lines" - | hashes > deploy/requirements-$more.lock
 done
 grep -c == deploy/requirements*.lock

@@ -22,6 +22,6 @@ mkdir -p "$wheels"
 ${PYTHON:-python3} -m pip download --quiet --disable-pip-version-check --no-deps --only-binary :all: --dest "$wheels" \
     --python-version 3.11 --implementation cp --abi cp311 --abi abi3 --abi none \
     $platforms --platform "manylinux2014_$machine" --platform "manylinux1_$machine" \
-    -r deploy/requirements.lock -r deploy/requirements-cluster.lock -r deploy/requirements-tests.lock
+    $(printf -- '-r %s ' deploy/requirements*.lock)
 echo "$stamp" > build/wheels.stamp
 du -sh "$wheels"

@@ -4,12 +4,13 @@ of its links that follow."""
 from pathlib import Path
 from typing import Any
 
-from cosim.access import by_certificate, door
+from cosim.access import by_certificate, door, withholding
 from cosim.certificates import tls
 from cosim.keys import ENCODER
 from cosim.setup import Setup
 from cosim.watch import WATCHER
-from services.processes import PROCESSES, create
+from messages.topics import EVENTS
+from services.processes import PROCESSES, ROUTER, create
 
 
 def names() -> list[str]:
@@ -21,6 +22,7 @@ def names() -> list[str]:
 def says(setup: Setup, key_prefix: str) -> dict[str, list[str]]:
     """The key expressions that each may publish on, by name."""
     found = {name: [f"{key_prefix}/*/{name}"] for name in names()}
+    found[WATCHER] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
     for name in setup.services:
         topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
         found[name] += topics
@@ -29,13 +31,15 @@ def says(setup: Setup, key_prefix: str) -> dict[str, list[str]]:
 
 
 def settings(setup: Setup, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
-    """Zenoh's settings for the links of a participant of a run on several hosts; none without a folder of certificates.
+    """Zenoh's settings for the links of a participant of a run on several hosts.
+
+    Without a folder of certificates there are none, but that a router withholds the lock step from whom it lets in.
 
     Raises:
         ValueError: its certificate cannot be used.
     """
     if not keys:
-        return {}
+        return withholding(key_prefix) if name == ROUTER else {}
     return {**tls(Path(keys), name), **by_certificate(key_prefix, says(setup, key_prefix))}
 
 

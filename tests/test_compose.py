@@ -3,6 +3,7 @@
 import math
 import re
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -12,10 +13,12 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from cosim.certificates import make
 from cosim.watch import WATCHER
 from lapwing.runs.joined import parse_peers
-from services import processes
+from services import processes, security
 from services.table import load, resolve
+from tests.services.foxglove.client import patient
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
@@ -23,10 +26,10 @@ ROOT = Path(__file__).parent.parent
 SET = {"SCENE": "scenes/groundstation.toml", "SPEED": "2"}
 
 
-def compose():
+def compose(**given):
     """The services of the file, its variables set."""
     text = (ROOT / "docker-compose.yml").read_text()
-    text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: SET.get(m[1], m[2]), text)
+    text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: (SET | given).get(m[1], m[2]), text)
     return yaml.safe_load(text)["services"]
 
 
@@ -64,10 +67,21 @@ def test_a_profile_starts_all_that_it_needs_and_nothing_else():
         assert service["profiles"], name  # one without starts with every profile
         for needed in service.get("depends_on", ()):
             assert set(service["profiles"]) <= set(services[needed]["profiles"]), f"{name} needs {needed}"
-    of = {p: {n for n, s in services.items() if p in s["profiles"]} for p in ("cluster", "mission", "groundstation")}
+    profiles = ("cluster", "mission", "groundstation", "view")
+    of = {p: {n for n, s in services.items() if p in s["profiles"]} for p in profiles}
     assert of["cluster"] == {"scheduler", "worker", "campaign"}
     assert of["mission"] == {"mission", *services["mission"]["depends_on"]}
     assert of["groundstation"] == {*of["mission"], "groundstation"}
+    assert of["view"] == {*of["mission"], "foxglove"}
+
+
+def test_every_image_is_built_and_what_it_has_besides_is_locked():
+    stages = set(re.findall(r"^FROM \S+ AS (\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
+    images = {(service["image"], service["build"]["target"]) for service in compose().values()}
+    assert {target for _, target in images} <= stages
+    assert images == {("lapwing" if t == "runtime" else f"lapwing-{t}", t) for _, t in images}
+    locks = {path.stem.removeprefix("requirements-") for path in (ROOT / "deploy").glob("requirements-*.lock")}
+    assert locks == {target for _, target in images} - {"runtime"}
 
 
 def test_with_certificates_every_service_is_given_its_own_and_no_other():
@@ -86,9 +100,8 @@ def test_containers_are_closed():
         assert service["security_opt"] == ["no-new-privileges:true"], name
         assert all(port.startswith("127.0.0.1:") for port in service.get("ports", ())), name
         assert not {"privileged", "network_mode"} & {*service}, name
-        if name != "tests":
-            assert service["read_only"], name
-            assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
+        assert service["read_only"], name
+        assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
         # who starts as root has what is needed to become another, and no more (deploy/entrypoint.sh)
         added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder", "campaign") else []
         assert service.get("cap_add", []) == added, name
@@ -138,25 +151,49 @@ def test_a_cluster_flies_a_campaign(tmp_path):
         assert "Register worker" in (tmp_path / "scheduler.txt").read_text()
 
 
-def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
-    services, ports = compose(), {}
+@contextmanager
+def flying(services, name, folder, *more):
+    """The processes of the containers that `name` needs, by name, and the ports here for theirs; `more` for each."""
+    ports = {}
 
     def here(word):
-        """A container's address as one of this machine."""
-        for pattern, kind in ((r"(?<==)tcp/[a-z]+:7447", 1), (r"tcp/0\.0\.0\.0:7448", 1), (r"0\.0\.0\.0:\d+", None)):
-            for found in re.findall(pattern, word):
-                datagrams = kind is None and word.startswith("udp")
-                port = ports.setdefault(found, free_port(socket.SOCK_DGRAM if datagrams else socket.SOCK_STREAM))
-                prefix = "tcp/" if kind else ""
-                word = word.replace(found, f"{prefix}127.0.0.1:{port}")
-        return word.replace("recordings/", f"{tmp_path}/")
+        """A container's addresses as some of this machine."""
+        kind = socket.SOCK_DGRAM if word.startswith("udp") else socket.SOCK_STREAM
+        addresses = r"(?<=/)[a-z0-9]+:7447|0\.0\.0\.0:\d+"
+        word = re.sub(addresses, lambda m: f"127.0.0.1:{ports.setdefault(m[0], free_port(kind))}", word)
+        return word.replace("recordings/", f"{folder}/")
 
-    names = [*services["groundstation"]["depends_on"], "groundstation"]
-    with ended_after(30) as running:
-        for name in names:
-            command = [sys.executable, "-m", "lapwing", *map(here, services[name]["command"][1:])]
-            with (tmp_path / f"{name}.txt").open("w") as said:
-                running.append(subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT))
+    running = {}
+    with ended_after(30) as processes:
+        for each in [*services[name]["depends_on"], name]:
+            command = [sys.executable, "-m", "lapwing", *map(here, services[each]["command"][1:]), *more]
+            with (folder / f"{each}.txt").open("w") as said:
+                running[each] = subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
+            processes.append(running[each])
+        yield running, ports
+
+
+def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(tmp_path):
+    pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
+    keys = tmp_path / "keys"
+    make(keys, security.names(), 1)
+    services = compose(SCENE="scenes/hover.toml", SPEED="1", SCHEME="tls", LINKS=f"--keys={keys}")
+    with flying(services, "foxglove", tmp_path, "--set", "run.duration=6") as (running, ports):
+        client = patient(ports["0.0.0.0:8765"], running["foxglove"])
+        client.subscribe("/drone1/truth", "/drone1/events")
+        seen = {0: 0, 1: 0}  # messages by subscription
+        while (message := client.next()) is not None:
+            if isinstance(message, bytes) and message[0] == 1:
+                seen[struct.unpack_from("<I", message, 1)[0]] += 1
+        ends = {name: process.wait(timeout=60) for name, process in running.items()}
+    assert ends == dict.fromkeys(ends, 0), {name: (tmp_path / f"{name}.txt").read_text() for name in ends}
+    assert seen[0] > 100
+    assert seen[1] > 0
+
+
+def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
+    services = compose()
+    with flying(services, "groundstation", tmp_path) as (_, ports):
         port = ports["0.0.0.0:5760"]
         station = None
         for _ in range(120):

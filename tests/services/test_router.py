@@ -2,18 +2,22 @@
 
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
+import zenoh
 
 from cosim.access import VIEWER
-from cosim.bus import ZenohBus
+from cosim.bus import ZenohBus, mesh
 from cosim.certificates import make, tls
 from cosim.errors import BusError
-from cosim.keys import DIVERGED_KEY, STEP_KEY
+from cosim.keys import BATCH_KEY, DIVERGED_KEY, STEP_KEY
 from messages import PoseStamped
 from services.common.operator import OPERATOR_KEY
 from services.processes import ROUTER
+from services.security import settings
+from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 
 PREFIX = "test-router"
@@ -69,3 +73,48 @@ def test_a_door_without_certificates_is_for_reading_too(tmp_path):
     heard, said = visit(command(tmp_path, door, "--insecure"), door)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
     assert "refused" not in said
+
+
+def test_who_comes_in_where_nobody_has_a_certificate_is_not_told_the_lock_step():
+    ends = loopback_endpoints(["plant", ROUTER, "door"])
+    peers = {name: ends[name] for name in ("plant", ROUTER)}
+    security = settings(resolve(load("hover")), ROUTER, PREFIX, "")
+    listen, connect = mesh(ROUTER, peers)
+    with (
+        ZenohBus(*mesh("plant", peers)) as plant,
+        ZenohBus([*listen, ends["door"]], connect, "router", security=security),
+        ZenohBus(connect=[ends["door"]], mode="client") as viewer,
+    ):
+        arrived = viewer.subscribe(f"{PREFIX}/**")
+        pose, batch = (plant.publisher(f"{PREFIX}/{key}") for key in ("drone1/pose", f"{BATCH_KEY}/plant"))
+        keys: list[str] = []
+        while keys.count(f"{PREFIX}/drone1/pose") < 10:
+            batch(b"batch", 0)
+            pose(b"pose", 0)
+            keys += [message[0] for message in [arrived.get_with_key(timeout=0.1)] if message]
+        assert set(keys) == {f"{PREFIX}/drone1/pose"}
+
+
+def test_a_viewer_who_stops_reading_holds_nobody_up(tmp_path):
+    (door,) = loopback_endpoints(["door"]).values()
+    words = command(tmp_path, door, "--insecure", "--set", "run.duration=12")
+    released, keys = threading.Event(), set()
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
+        viewer = None
+        while viewer is None and run.poll() is None:
+            try:
+                viewer = ZenohBus(connect=[door], mode="client")
+            except BusError:  # nobody listens yet
+                time.sleep(0.1)
+        arrived = viewer.subscribe(f"{PREFIX}/**")
+        while len(keys) < 5 and run.poll() is None:
+            keys |= {message[0] for _ in range(50) if (message := arrived.get_with_key(timeout=0.1))}
+        # one that holds Zenoh's only thread: nothing is read any more
+        frozen = zenoh.handlers.Callback(lambda sample: released.wait(), indirect=False)
+        viewer._held.append(viewer._session.declare_subscriber(f"{PREFIX}/**", frozen))
+        said = run.communicate(timeout=200)[0]
+        released.set()
+        viewer.close()
+    assert run.returncode == 0, said
+    assert f"{PREFIX}/drone1/pose" in keys
+    assert not [key for key in keys if key.startswith(f"{PREFIX}/_")]  # whose senders wait for all who read them

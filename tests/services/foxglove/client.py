@@ -4,18 +4,19 @@ import base64
 import json
 import os
 import socket
+from contextlib import suppress
 
 CLOSE, PONG = 8, 10  # kinds of frames
-PING = bytes([0x89, 0x80, *bytes(4)])
 PATIENCE = 0.05  # [s] for a pong, which a server does not give that waits for the rest of a frame
 
 
 class Client:
     """As small a client as will do (RFC 6455; no message of ours is fragmented)."""
 
-    def __init__(self, port):
-        self._socket = socket.create_connection(("127.0.0.1", port), timeout=30.0)
+    def __init__(self, port, timeout=30.0):
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=timeout)
         self._received = b""  # and not yet read
+        self._pings = 0
         key = base64.b64encode(os.urandom(16)).decode()
         lines = ["GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade"]
         lines += [f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Protocol: foxglove.sdk.v1"]
@@ -50,13 +51,32 @@ class Client:
         """Whether a ping is answered before the server closes, or waits for more."""
         self._socket.settimeout(PATIENCE)
         try:
-            self.send(PING)
-            while (kind := self._frame()[0]) != PONG:
-                if kind == CLOSE:
+            return self.outlives(b"")
+        except TimeoutError:
+            return False
+
+    def outlives(self, data):
+        """Whether a ping behind these bytes is answered; not where the server closes instead."""
+        self._pings += 1
+        number = self._pings.to_bytes(4, "big")
+        try:
+            self.send(data + bytes([0x89, 0x84, *bytes(4)]) + number)
+            if hasattr(socket, "TCP_QUICKACK"):  # else a second answer waits 40 ms for the first one's confirmation
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+            while (frame := self._frame()) != (PONG, number):
+                if frame[0] == CLOSE:
                     return False
-        except (EOFError, OSError):
+        except (EOFError, ConnectionError):
             return False
         return True
+
+    def end(self, data):
+        """Send these bytes and no more, and read until the server closes, too."""
+        with suppress(EOFError, ConnectionError):
+            self.send(data)
+            self._socket.shutdown(socket.SHUT_WR)
+            while True:
+                self._frame()
 
     def close(self):
         self._socket.close()
@@ -93,10 +113,10 @@ class Client:
 
 
 def patient(port, process):
-    """A client of a process that may not listen yet."""
+    """A client of a process that may not listen yet, and may wait for kernels that are compiled."""
     while process.poll() is None:
         try:
-            return Client(port)
+            return Client(port, timeout=300.0)
         except ConnectionRefusedError:
             continue
     raise AssertionError("the replay has ended")

@@ -1,0 +1,18 @@
+"""What images ship is in the bill of materials, and audited."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.skipif(not shutil.which("make"), reason="needs make")
+@pytest.mark.parametrize("target", ["sbom", "audit"])
+def test_every_lock_of_an_image_that_ships_is_read(target):
+    said = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    locks = {f"deploy/{path.name}" for path in (ROOT / "deploy").glob("requirements*.lock")}
+    command = said.splitlines()[-1] if target == "audit" else next(line for line in said.splitlines() if "cat " in line)
+    assert {word for word in command.split() if word in locks} == locks - {"deploy/requirements-tests.lock"}
