@@ -6,6 +6,7 @@ import sys
 from dynamics.effects import _hooks as hooks
 from dynamics.generate import each, implements
 from dynamics.integrators import SHORTEST, shorter
+from dynamics.kernel import apart as never_inlined
 from dynamics.kernel import kernel, leaf
 from dynamics.tree import apart, finite
 from dynamics.vehicles.multirotor_equations import FORMS, MultirotorDrive, MultirotorParameters, evaluate, seen
@@ -40,7 +41,7 @@ def _airborne(p, body, memory, voltage):
     return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, kept, voltage)
 
 
-@kernel
+@never_inlined  # four calls: LLVM would optimise each of the four copies again in every function above
 def _awake_step(method, drive, t, x, h):
     """(state's form, memory) a step later with every effect taking part."""
     x = _step(method, drive, t, x, h)
