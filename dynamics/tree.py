@@ -136,8 +136,14 @@ def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
 
 
 def _apart(tree: types.Type, names: dict[str, Any]) -> str:
-    numbers = _number_paths(tree, "x")
-    return f"max(0.0, 0.0, {', '.join(f'abs({n} - y{n[1:]}) / (1.0 + abs({n}))' for n in numbers)})"
+    names["of_part"] = apart
+    found = []
+    for i, part in enumerate(tree.types):  # calls for tuples: the same ones come again and again
+        if isinstance(part, types.BaseTuple):
+            found.append(f"of_part(x[{i}], y[{i}])")
+        else:
+            found += [f"abs({n} - y{n[1:]}) / (1.0 + abs({n}))" for n in _number_paths(part, f"x[{i}]")]
+    return f"max(0.0, 0.0, {', '.join(found)})"
 
 
 def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """Tree operations: shapes, values against hand-written ones, compiled against uncompiled."""
 
+import math
 import random
 from typing import NamedTuple
 
@@ -90,3 +91,19 @@ def test_apart_is_the_largest_difference_relative_to_size():
     y = X._replace(rotors=(X.rotors[0] + 0.3, X.rotors[1]), one=(X.one[0] - 0.01,))
     assert tree.apart(X, y) == pytest.approx(0.3 / (1.0 + X.rotors[0]))
     assert tree.apart(X, X) == tree.apart((), ()) == 0.0
+
+
+@kernel
+def compiled_apart(x, y):
+    return tree.apart(x, y)
+
+
+def test_apart_of_nested_tuples_is_that_of_their_numbers():
+    """Bit by bit, whatever tuples hold them; what is NaN does not count."""
+    numbers = random.Random(1)
+    for nan in (False, True):
+        x, y = ([numbers.uniform(-9.0, 9.0) for _ in range(9)] for _ in range(2))
+        y[4] = math.nan if nan else y[4]
+        flat = max(abs(a - b) / (1.0 + abs(a)) for a, b in zip(x, y, strict=True) if not math.isnan(b))
+        nested_x, nested_y = (((), (n[:3], n[3:6]), (n[6], (n[7],)), n[8]) for n in (tuple(x), tuple(y)))
+        assert tree.apart(nested_x, nested_y) == compiled_apart(nested_x, nested_y) == flat
