@@ -37,8 +37,7 @@ class Idle:
 
 def prepare(bus, giver, tick, interval_ns):
     """Let the bundle be there that `giver` takes next, if it takes one up to this tick."""
-    rows = sum(width * giver._bundles._rows_of(period, tick) for _, period, width in giver._bundles._ports)
-    bus.next = (tick * interval_ns, bytes(8 * rows))
+    bus.next = (tick * interval_ns, bytes(giver._bundles.size(tick)))
 
 
 def own(name, cycles):

@@ -11,6 +11,7 @@ name (uint16), number of messages and size of a payload (uint32 each), the name,
 
 import struct
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,24 +29,39 @@ class BundleError(ValueError):
     """Bytes that are no bundle or batch of this run."""
 
 
+class _Rows(NamedTuple):
+    """The rows of a port that a bundle holds."""
+
+    port: str
+    period: int
+    number: int
+    place: slice  # among the numbers of the bundle
+
+
 class Bundles:
     """The bundles of one service: which rows they hold."""
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
         """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
         self._ports = [(port.name, port.period, width(port.like)) for port in ports]
+        self._periods = sorted({port.period for port in ports})
         self._ticks = ticks
+        self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # by the number of rows for each period
 
     def due(self, first: int) -> bool:
         """Whether there is a bundle from the tick `first` on."""
-        return any(self._rows_of(period, first) for _, period, _ in self._ports)
+        return bool(self._rows(first))
+
+    def size(self, first: int) -> int:
+        """Bytes of the bundle from the tick `first` on."""
+        rows = self._rows(first)
+        return 8 * rows[-1].place.stop if rows else 0
 
     def pack(self, graph: Graph, first: int) -> bytes:
         """The bundle from the tick `first` on, from the rows of a graph."""
         if self._ticks == 1:
-            return b"".join(graph.row(name, first).tobytes() for name, period, _ in self._ports if first % period == 0)
-        pages = (graph.rows(name, due_ticks(first, first + self._ticks, period)) for name, period, _ in self._ports)
-        return b"".join(page.tobytes() for page in pages)
+            return b"".join([graph.row(rows.port, first).tobytes() for rows in self._rows(first)])
+        return b"".join([graph.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
 
     def unpack(self, payload: bytes, graph: Graph, first: int) -> None:
         """Put the rows of the bundle from the tick `first` on into those of a graph that uses them.
@@ -53,23 +69,32 @@ class Bundles:
         Raises:
             BundleError: it has not the size that is due.
         """
-        due_now = [(*port, self._rows_of(port[1], first)) for port in self._ports if self._rows_of(port[1], first)]
-        expected = 8 * sum(n * columns for _, _, columns, n in due_now)
-        if len(payload) != expected:
-            raise BundleError(f"a bundle of {len(payload)} bytes at tick {first}, expected {expected}")
+        if len(payload) != self.size(first):
+            raise BundleError(f"a bundle of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
         numbers = np.frombuffer(payload, "<f8")
-        place = 0
-        for name, period, columns, n in due_now:
-            rows = numbers[place : place + n * columns]
-            place += n * columns
-            if graph.has(name) and self._ticks == 1:
-                graph.put_row(name, first, rows)
-            elif graph.has(name):
-                graph.put_rows(name, due_ticks(first, first + self._ticks, period), rows.reshape(n, columns))
+        for rows in self._rows(first):
+            if not graph.has(rows.port):
+                continue
+            if self._ticks == 1:
+                graph.put_row(rows.port, first, numbers[rows.place])
+            else:
+                graph.put_rows(rows.port, self._due(rows, first), numbers[rows.place].reshape(rows.number, -1))
 
-    def _rows_of(self, period: int, first: int) -> int:
-        """How many rows of a port of this period a bundle has."""
-        return (first + self._ticks - 1) // period - (first - 1) // period
+    def _due(self, rows: _Rows, first: int) -> np.ndarray:
+        return due_ticks(first, first + self._ticks, rows.period)
+
+    def _rows(self, first: int) -> tuple[_Rows, ...]:
+        last = first + self._ticks - 1
+        numbers = tuple([last // period - (first - 1) // period for period in self._periods])
+        if numbers not in self._known:
+            by_period = dict(zip(self._periods, numbers, strict=True))
+            found, place = [], 0
+            for name, period, columns in self._ports:
+                if number := by_period[period]:
+                    found.append(_Rows(name, period, number, slice(place, place + number * columns)))
+                    place += number * columns
+            self._known[numbers] = tuple(found)
+        return self._known[numbers]
 
 
 def pack_batch(pages: Iterable[Page], stop: int) -> bytes:

@@ -39,7 +39,8 @@ class Source:
         key = step_key(self._span)
         self._subscription: Subscription = process.bus.receive(process.participants.senders(key, [name]), few=True)
         self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
-        self._delay = min(delay for _, _, delay in taken)
+        self._needs = {(period, delay) for _, period, delay in taken}
+        self._delay = min(delay for _, delay in self._needs)
         self._newest = -1  # tick up to which bundles are taken
 
     def take(self, tick: int) -> int:
@@ -49,7 +50,7 @@ class Source:
             EndOfRun: the producer has ended.
             LockStepError: another bundle came than the one that is due.
         """
-        needed = max(_due(tick, period, delay) for _, period, delay in self._taken)
+        needed = max([_due(tick, period, delay) for period, delay in self._needs])
         while self._newest < needed:
             stamp = self._newest + 1
             while not self._bundles.due(stamp):
