@@ -160,18 +160,21 @@ def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
 
 
 def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
-    code, said = lapwing(*options(tmp_path / "c", **{"vehicle.mass": choice(10.4, -1.0)}))
+    code, said = lapwing(*options(tmp_path / "c d", **{"vehicle.mass": choice(10.4, -1.0)}))
     assert code == 0
-    found = Results(read(tmp_path / "c"))
+    found = Results(read(tmp_path / "c d"))
     assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
     assert f"{len(found)} timed out, {len(found.refused['run'])} refused" in said
     assert found.refused["told"][0] == "--vary vehicle.mass: expected a number above 0 [kg], got -1.0"
     run = found.refused["run"][0]
-    assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c") == (
+    assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c d") == (
         2,
         f"lapwing: {found.refused['told'][0]}\n",
     )
-    assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
+    assert "the scene does not take" in (tmp_path / "c d" / "report.html").read_text()
+    assert (
+        f"--campaign &#39;{tmp_path}/c d&#39;" in (tmp_path / "c d" / "report.html").read_text()
+    )  # as a shell reads it
 
 
 def test_what_is_refused_is_told_alike_wherever_lapwing_is_installed(tmp_path):
