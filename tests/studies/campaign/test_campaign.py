@@ -1,12 +1,15 @@
 """A campaign of short flights: its folder, a stop, other workers, a run flown again, two beside each other."""
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 import studies.campaign.folder
+import studies.campaign.table
 from lapwing.cli.main import app
 from studies.campaign import local, table
 from studies.campaign.distributions import choice, normal, uniform
@@ -133,6 +136,24 @@ def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
         fly_runs(folder.plan, first._replace(versions={**first.versions, "numpy": "0.1"}), 0, 1)
     with pytest.raises(ValueError, match="run 0 goes another way there"):
         fly_runs(folder.plan, first._replace(end_state="00"), 0, 1)
+
+
+def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkeypatch):
+    write = studies.campaign.table.write_csv
+
+    def full(path, *arguments):
+        if "00002" in path.name:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(path, *arguments)
+
+    words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
+    monkeypatch.setattr("studies.campaign.table.write_csv", full)
+    code, said = lapwing(*words)
+    expected = "00002.csv: cannot be written: no space left on device; the same command goes on where it stopped"
+    assert (code, expected in said, len(read(tmp_path / "c").missing())) == (1, True, 3)
+    monkeypatch.undo()
+    code, said = lapwing(*words)
+    assert (code, "3 of 3 flights" in said) == (0, True)
 
 
 def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
