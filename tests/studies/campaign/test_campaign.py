@@ -125,6 +125,10 @@ def test_a_part_counts_its_own_runs(flown, tmp_path):
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
     code, said = lapwing(*words, "--shard", "2/2")
     assert (code, "2 of 2 flights" in said, "3 shards are still missing" in said) == (0, True, True)
+    again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single"]
+    told = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
+    assert f"run 0 of {tmp_path / 'c'}: it has not been flown there yet" in told[0]
+    assert f"run 1 of {tmp_path / 'c'}: the same end, to the bit" in told[1]
     code, said = lapwing(*words)
     assert (code, "3 of 3 flights" in said) == (0, True)
 
