@@ -14,7 +14,7 @@ from cosim.errors import DivergedError, LockStepError
 from cosim.part import Code, Part, bind
 from cosim.schedule import KEPT, Port
 from cosim.setup import Setup
-from cosim.turns import Turn, groups
+from cosim.turns import Turn, advance_all, groups
 from cosim.wire import Page, Wire, due_ticks, encode
 from dynamics.rows import reader, to_row, width
 from messages.topics import Topic
@@ -131,22 +131,7 @@ class Graph:
         """
         if self.ended:
             return
-        failed: LockStepError | None = None
-        under_way = [turn for turn in self._turns if not turn.over]
-        for turn in under_way:
-            try:
-                turn.advance(stop, self._act, self._failure)
-            except LockStepError as error:
-                failed, stop = error, turn.tick  # the first one, once the others have come as far
-        self.ended = failed is None and all(turn.over for turn in self._turns)
-        if self.ended:
-            stop = max(turn.tick for turn in self._turns)
-        for turn in self._turns:
-            if turn.over and turn.tick < stop:
-                try:
-                    turn.follow(stop, self._act, self._failure)
-                except LockStepError as error:
-                    failed, stop, self.ended = error, turn.tick, False
+        stop, self.ended, failed = advance_all(self._turns, stop, self._act, self._failure)
         self.tick = max(self.tick, stop)
         for service in self.services if len(self._turns) > 1 else ():
             service.messages.sort(key=_tick)

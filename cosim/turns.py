@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.errors import LockStepError
 from cosim.part import END, FAILED, GO_ON, LOOK, Code, run, schedule
 from dynamics.cell import Cell
 
@@ -74,3 +75,29 @@ class Turn:
         """Let other code step a part from now on."""
         k = self.parts.index(part)
         self._plan.function[k], self._plan.memory[k] = code.function, code.memory
+
+
+def advance_all(
+    turns: Sequence[Turn], stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]
+) -> tuple[int, bool, LockStepError | None]:
+    """Run all up to before the tick `stop`, or until the last of them is over; arguments as of `Turn.advance`.
+
+    Returns:
+        The tick that all have come to, those that were over before the last one, too; whether the run is over; the
+        first failure, which ends the run at its tick.
+    """
+    failed: LockStepError | None = None
+    for turn in [turn for turn in turns if not turn.over]:
+        try:
+            turn.advance(stop, act, failure)
+        except LockStepError as error:
+            failed, stop = error, turn.tick
+    ended = failed is None and all(turn.over for turn in turns)
+    if ended:
+        stop = max(turn.tick for turn in turns)
+    for turn in [turn for turn in turns if turn.over and turn.tick < stop]:
+        try:
+            turn.follow(stop, act, failure)
+        except LockStepError as error:
+            failed, stop, ended = error, turn.tick, False
+    return stop, ended, failed

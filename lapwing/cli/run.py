@@ -187,8 +187,9 @@ def run(
         if flights and run_ is not None and campaign is not None:
             from studies.campaign import again
 
-            same = joint_end_state(flights) == again.end_state_of(run_, campaign)
-            typer.echo(f"run {run_} of {campaign}: {'the same end, to the bit' if same else 'ends in another state'}")
+            there = again.end_state_of(run_, campaign)
+            same = "the same end, to the bit" if there == joint_end_state(flights) else "ends in another state"
+            typer.echo(f"run {run_} of {campaign}: {same if there else 'it has not been flown there yet'}")
         for flown, flier in zip(flights, loaded.vehicles or (loaded,), strict=False):
             if unmet := flier[Success].unmet(figures(flown)):
                 of = f" of {flown.vehicle}" if loaded.vehicles else ""

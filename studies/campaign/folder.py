@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.errors import RunFailed
 from services.common.sections import Published
 from services.common.success import Success
 from studies.campaign import table
@@ -54,8 +55,8 @@ class Folder:
         return [k for k in range(len(self.shards)) if not self._shard(k).exists()]
 
     def write(self, shard: int, rows: list[Row]) -> None:
-        """Keep the rows of a shard: whole, or not at all."""
-        with _whole(self._shard(shard)) as file:
+        """Keep the rows of a shard: whole, or not at all. RunFailed where they cannot be written."""
+        with _kept(self._shard(shard)) as file:
             table.write_csv(file, self.kinds, [rows])
 
     def rows(self, shard: int) -> list[Row]:
@@ -79,17 +80,21 @@ class Folder:
             self._shard(later).unlink(missing_ok=True)
 
     def finish(self, csv: bool = False) -> str:
-        """Write the table, with `csv` as CSV too; its digest, which no number, kind or order of workers changes."""
+        """Write the table, with `csv` as CSV too; its digest, which no number, kind or order of workers changes.
+
+        Raises:
+            RunFailed: it cannot be written.
+        """
         digest = hashlib.blake2b(digest_size=16)
         for page in self.pages():
             for line in table.bits(self.kinds, page):
                 digest.update(line)
         if table.has_parquet():
             about = {name: v if isinstance(v, str) else json.dumps(v) for name, v in self.about.items()}
-            with _whole(self.path / "runs.parquet") as file:
+            with _kept(self.path / "runs.parquet") as file:
                 table.write_parquet(file, self.kinds, self.pages(), about | {"digest": digest.hexdigest()})
         if csv or not table.has_parquet():
-            with _whole(self.path / "runs.csv") as file:
+            with _kept(self.path / "runs.csv") as file:
                 table.write_csv(file, self.kinds, self.pages())
         return digest.hexdigest()
 
@@ -165,6 +170,17 @@ def read(path: Path) -> Folder:
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{path}: no campaign there; expected the folder of one, with {MANIFEST}") from None
     return Folder(path, plan, about)
+
+
+@contextlib.contextmanager
+def _kept(path: Path) -> Iterator[Path]:
+    """`_whole` of what was flown; RunFailed where it cannot be written."""
+    try:
+        with _whole(path) as file:
+            yield file
+    except OSError as fault:
+        reason = (fault.strerror or str(fault)).lower()
+        raise RunFailed(f"{path}: cannot be written: {reason}; the same command goes on where it stopped") from None
 
 
 @contextlib.contextmanager

@@ -18,6 +18,7 @@ BINS = 10  # of a parameter
 KEYS = 9  # parameters that are drawn
 MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
 PARALLEL = 300  # runs drawn as lines over all parameters
+LETTERS = 12  # of a line below an axis
 ENOUGH, MOST = 50, 10_000  # runs for Sobol indices: at least, and as many as are looked at
 _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
@@ -185,7 +186,7 @@ def parallel(found: Results) -> Plot:
         columns.append((values - low) / (high - low if high > low else 1.0))
         texts = _texts(found, name)
         ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
-        ticks.append(f"{label}\n{ends[0]} to {ends[1]}")
+        ticks.append(f"{_broken(label)}\n{ends[0]}\nto {ends[1]}")
     rows, good = np.column_stack(columns), found["success"].astype(bool)
     marks = []
     for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
@@ -225,6 +226,16 @@ def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
 def _texts(found: Results, name: str) -> tuple[str, ...]:
     """The values of a parameter of texts, in the order of their numbers."""
     return tuple(np.unique(found[name])) if found[name].dtype == object else ()
+
+
+def _broken(key: str) -> str:
+    """A dotted key on several lines, so that it stands beside others."""
+    lines = [""]
+    for part in re.findall(r"[^.]+\.?", key):
+        if len(lines[-1] + part) > LETTERS and lines[-1]:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
 
 
 def _dots(points: np.ndarray, name: str, colour: str) -> Line:

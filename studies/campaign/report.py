@@ -1,5 +1,6 @@
 """The report of a campaign: a page for a browser, or its plots on paper."""
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,7 +67,9 @@ def _page(found: Results, sections: list[Section]) -> str:
             "told": row["told"] or row["verdict"],
             "parameters": ", ".join(f"{key} {_short(row[key])}" for key in plan.keys),
             "figures": [f"{scale * row[name]:.3g}" for name, (_, scale) in zip(LISTED, heads, strict=True)],
-            "command": f"lapwing run {plan.path} --run {int(row['run'])} --campaign {found.folder.path}",
+            "command": shlex.join(
+                ["lapwing", "run", plan.path, "--run", str(row["run"]), "--campaign", str(found.folder.path)]
+            ),
         }
         for row in found.worst(WORST)
     ]

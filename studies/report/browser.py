@@ -92,6 +92,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
         x["range"] = list(np.log10(panel.x_range) if panel.log_x else panel.x_range)
     if panel.x_ticks:
         x |= {"tickvals": list(range(len(panel.x_ticks))), "ticktext": [text_of(text) for text in panel.x_ticks]}
+        x["automargin"] = True  # a text may have several lines
     if panel.equal:
         y |= {"scaleanchor": f"x{number}", "scaleratio": 1}
         x["constrain"] = y["constrain"] = "domain" if panel.x_range else "range"

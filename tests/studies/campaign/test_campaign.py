@@ -1,12 +1,15 @@
 """A campaign of short flights: its folder, a stop, other workers, a run flown again, two beside each other."""
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 import studies.campaign.folder
+import studies.campaign.table
 from lapwing.cli.main import app
 from studies.campaign import local, table
 from studies.campaign.distributions import choice, normal, uniform
@@ -122,6 +125,10 @@ def test_a_part_counts_its_own_runs(flown, tmp_path):
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
     code, said = lapwing(*words, "--shard", "2/2")
     assert (code, "2 of 2 flights" in said, "3 shards are still missing" in said) == (0, True, True)
+    again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single"]
+    told = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
+    assert f"run 0 of {tmp_path / 'c'}: it has not been flown there yet" in told[0]
+    assert f"run 1 of {tmp_path / 'c'}: the same end, to the bit" in told[1]
     code, said = lapwing(*words)
     assert (code, "3 of 3 flights" in said) == (0, True)
 
@@ -133,6 +140,24 @@ def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
         fly_runs(folder.plan, first._replace(versions={**first.versions, "numpy": "0.1"}), 0, 1)
     with pytest.raises(ValueError, match="run 0 goes another way there"):
         fly_runs(folder.plan, first._replace(end_state="00"), 0, 1)
+
+
+def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkeypatch):
+    write = studies.campaign.table.write_csv
+
+    def full(path, *arguments):
+        if "00002" in path.name:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(path, *arguments)
+
+    words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
+    monkeypatch.setattr("studies.campaign.table.write_csv", full)
+    code, said = lapwing(*words)
+    expected = "00002.csv: cannot be written: no space left on device; the same command goes on where it stopped"
+    assert (code, expected in said, len(read(tmp_path / "c").missing())) == (1, True, 3)
+    monkeypatch.undo()
+    code, said = lapwing(*words)
+    assert (code, "3 of 3 flights" in said) == (0, True)
 
 
 def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
@@ -160,18 +185,21 @@ def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
 
 
 def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
-    code, said = lapwing(*options(tmp_path / "c", **{"vehicle.mass": choice(10.4, -1.0)}))
+    code, said = lapwing(*options(tmp_path / "c d", **{"vehicle.mass": choice(10.4, -1.0)}))
     assert code == 0
-    found = Results(read(tmp_path / "c"))
+    found = Results(read(tmp_path / "c d"))
     assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
     assert f"{len(found)} timed out, {len(found.refused['run'])} refused" in said
     assert found.refused["told"][0] == "--vary vehicle.mass: expected a number above 0 [kg], got -1.0"
     run = found.refused["run"][0]
-    assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c") == (
+    assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c d") == (
         2,
         f"lapwing: {found.refused['told'][0]}\n",
     )
-    assert "the scene does not take" in (tmp_path / "c" / "report.html").read_text()
+    assert "the scene does not take" in (tmp_path / "c d" / "report.html").read_text()
+    assert (
+        f"--campaign &#39;{tmp_path}/c d&#39;" in (tmp_path / "c d" / "report.html").read_text()
+    )  # as a shell reads it
 
 
 def test_what_is_refused_is_told_alike_wherever_lapwing_is_installed(tmp_path):

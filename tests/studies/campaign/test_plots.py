@@ -86,6 +86,12 @@ def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
     assert len(np.unique(asked[0][:, 1])) == 10
 
 
+def test_long_keys_stand_beside_each_other():
+    assert plots._broken("effects.wind_random.mean.0") == "effects.\nwind_random.\nmean.0"
+    assert plots._broken("vehicle.mass") == "vehicle.mass"
+    assert plots._broken("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
+
+
 def test_errors_stand_as_shares_beside_what_is_required():
     found = table(11, **{"rmse.x": lambda drawn: np.arange(11.0), "rmse.roll": lambda drawn: np.arange(11.0)})
     found.folder.about["success"] = ["rmse.roll < 0.1"]
