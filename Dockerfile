@@ -88,7 +88,8 @@ USER lapwing
 COPY benchmarks benchmarks
 COPY deploy deploy
 COPY docs docs
-COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose.yml ./
+COPY examples examples
+COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose*.yml ./
 COPY tests tests
 
 

@@ -6,7 +6,8 @@ from cosim.bus import ZenohBus
 from cosim.keys import RECORDED_KEY
 from cosim.process import Process
 
-AHEAD = 8192  # ticks that the run may be ahead of its log
+AHEAD = 8192  # ticks that the run of one vehicle may be ahead of its log: some 20 MB; of several fewer
+LEAST = 2048  # ticks, of however many vehicles
 LOOK = 256  # ticks between two looks
 _PROGRESS = struct.Struct("<q?")  # tick before which all is recorded, whether the disk is waited for
 
@@ -42,6 +43,7 @@ class Backlog:
         self._process = process
         self._get = process.bus.receive(process.participants.senders(RECORDED_KEY, [recorder])).get
         self._recorded: int | None = None
+        self._ahead = max(LEAST, AHEAD // len(process.setup.vehicles))
 
     def resume(self, recorded: int) -> None:
         """All before this tick is recorded: hold the run from the first progress on that is not told any more."""
@@ -57,6 +59,6 @@ class Backlog:
             return
         while news := self._get(0.0):
             self._recorded = _PROGRESS.unpack(news[1])[0]
-        while self._recorded is not None and tick - self._recorded >= AHEAD:
+        while self._recorded is not None and tick - self._recorded >= self._ahead:
             news = self._process.patient(self._get, lambda: f"the log, recorded up to tick {self._recorded}")
             self._recorded = _PROGRESS.unpack(news[1])[0]

@@ -2,11 +2,16 @@
 
 import struct
 import threading
+from types import SimpleNamespace
+
+import pytest
 
 from cosim import backlog
-from cosim.backlog import AHEAD, LOOK, Backlog, Teller, waits_for_disk
+from cosim.backlog import AHEAD, LEAST, LOOK, Backlog, Teller, waits_for_disk
 from cosim.log import LogWriter
 from cosim.participants import Participants
+from cosim.recording import SHORTEST
+from cosim.transfer import PAGE
 from messages import Clock, stamp
 
 
@@ -31,8 +36,9 @@ class Process:
 
     participants = Participants("test")
 
-    def __init__(self):
+    def __init__(self, vehicles=1):
         self.bus, self.waits = Bus(), []
+        self.setup = SimpleNamespace(vehicles=["drone"] * vehicles)
 
     def patient(self, get, waiting_for):
         self.waits.append(waiting_for())
@@ -52,6 +58,21 @@ def test_a_run_is_held_until_its_log_has_come_nearer():
     assert process.waits == ["the log, recorded up to tick 0"]
     held.hold(AHEAD + 6144)
     assert process.waits[1:] == ["the log, recorded up to tick 3000", "the log, recorded up to tick 6000"]
+
+
+@pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
+def test_the_more_vehicles_a_run_has_the_fewer_ticks_wait_for_its_log(vehicles, ahead):
+    process = Process(vehicles)
+    held, teller = Backlog(process, "recorder"), Teller(process.bus, "test", "recorder")
+    teller.recorded(0)
+    held.hold(ahead - LOOK)
+    assert process.waits == []
+    held.hold(ahead)
+    assert process.waits
+
+
+def test_who_waits_has_been_handed_all_that_the_log_needs_to_come_nearer():
+    assert LEAST >= PAGE + LOOK + SHORTEST  # a batch that is not yet handed over, and a chunk that is not yet full
 
 
 def test_progress_says_whether_the_disk_is_waited_for():
