@@ -139,12 +139,16 @@ class Graph:
             raise failed
 
     def _act(self, part: int, tick: int) -> int:
-        if len(self._turns) == 1:
-            self.tick = tick
+        self._come_to(tick)
         return self._parts[part].act(tick)
 
     def _failure(self, part: int, tick: int) -> Exception:
+        self._come_to(tick)
         return (self._parts[part].failure or _unsound(self._parts[part].name))(tick)
+
+    def _come_to(self, tick: int) -> None:
+        if len(self._turns) == 1:
+            self.tick = tick
 
     def has(self, port: str) -> bool:
         """Whether somebody here gives or takes this port."""

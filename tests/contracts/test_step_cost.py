@@ -10,6 +10,6 @@ def test_a_step_with_the_catalogue_costs_what_one_written_by_hand_costs():
 
 
 def test_a_batch_steps_several_vehicles_in_the_time_of_one():
-    """By 2.3 to 2.9 in vector registers, which the processor's other thread may want as well (1.4); without them 0.8."""
+    """By 2.3 to 2.9 in vector registers, 1.4 where the processor's other thread has much to do; without them 0.8."""
     _, together, alone = batch.rates("delivery_mission")
     assert together > 1.15 * alone
