@@ -4,7 +4,7 @@ The caller fills `memory.row` with one row of the measurement matrix. Correction
 the rows of one reading are all taken about the same estimate.
 """
 
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import apart, kernel, leaf
 from dynamics.lanes import load, spread, store
 from dynamics.vector import Mat3, Vec3
 from services.autopilot.estimator.state import ACCELEROMETER, SIZE, THETA, Memory
@@ -18,7 +18,7 @@ def clear(m: Memory) -> None:
     m.row[:] = 0.0
 
 
-@kernel
+@apart
 def innovation_variance(m: Memory, variance: float) -> float:
     """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
     for i in range(0, SIZE, 4):
@@ -41,7 +41,7 @@ def fuse(m: Memory, innovation: float, variance: float) -> float:
     return absorb(m, innovation, innovation_variance(m, variance))
 
 
-@kernel
+@apart
 def absorb(m: Memory, innovation: float, s: float) -> float:
     """`fuse` with the innovation's variance s, and its covariance with the error in `m.product`."""
     y = innovation

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import apart, leaf
 from dynamics.vector import Mat3, Vec3, dot
 from services.autopilot.estimator.fuse import FLOOR, acceleration_row, clear, innovation_variance
 from services.autopilot.estimator.state import POSITION, SIZE, VELOCITY, WANDER, Memory
@@ -39,7 +39,7 @@ def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
     acceleration_row(m, force_world, r, axis, -delay)
 
 
-@kernel
+@apart
 def late_innovation_variances(
     m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
 ) -> tuple[float, float]:
