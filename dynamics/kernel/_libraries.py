@@ -17,6 +17,8 @@ FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._disp
 
 ALLOCATES = ("NRT_Allocate", "NRT_MemInfo_alloc", "NRT_MemInfo_new", "NRT_MemInfo_varsize_alloc")
 _COUNTING = ("NRT_incref", "NRT_decref")
+_SHARED = (binding.Linkage.linkonce_odr, binding.Linkage.weak_odr)
+_UNCOUNTED = ".uncounted"
 # In place of numba's: inlined, and gone. Weak, since what is linked later must stand before what is there.
 _NOTHING = "".join(f"define weak_odr void @{name}(ptr %0) alwaysinline {{ ret void }}\n" for name in _COUNTING)
 
@@ -26,10 +28,15 @@ def _allocates(module: Any) -> bool:
 
 
 def _without_counting(module: Any) -> None:
-    """Let the code count no references, once functions are inlined."""
+    """Let the code count no references, once functions are inlined.
+
+    Its inner functions get names of their own: of those of one name in several modules, whatever their linkage, the
+    first that is loaded counts for all, also for who relies on its counting.
+    """
     module.link_in(binding.parse_assembly(_NOTHING))
-    for name in _COUNTING:
-        module.get_function(name).linkage = "internal"
+    for function in module.functions:
+        if not function.is_declaration and function.linkage in _SHARED and not function.name.endswith(_UNCOUNTED):
+            function.name, function.linkage = function.name + _UNCOUNTED, "linkonce_odr"
 
 
 class KernelLibrary(JITCodeLibrary):

@@ -10,7 +10,7 @@ from numba.core.runtime import _nrt_python, rtsys
 from cosim.part import Part, advance
 from cosim.schedule import Port
 from dynamics.cell import Cell, read
-from tests.cosim.parts.arrays import Last, Mean, Sum
+from tests.cosim.parts.arrays import Last, Mean, Sum, weighted
 from tests.cosim.parts.exchanged_array import Exchange
 from tests.cosim.parts.new_arrays import Squares
 from tests.cosim.small_graph import graph_of
@@ -53,6 +53,18 @@ def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(liv
     del part, graph
     assert living() == owners
     assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before
+
+
+def test_a_function_that_python_calls_counts_also_where_a_part_has_it():
+    """Code has it by its name: that of a part, which does not count, must not be taken for it."""
+    p, s = Mean(np.linspace(-1.0, 2.0, 5)), Last(np.arange(5.0), 0)
+    graph = graph_of(Part("mean", p, Cell(s), (), (SUM,)))
+    graph.advance(TICKS)
+    before = sys.getrefcount(s.ticks)
+    for _ in range(10):
+        total, _ = weighted(p, s)
+    assert sys.getrefcount(s.ticks) == before + 1  # of `_`
+    assert total == pytest.approx(p.weights @ s.ticks)
 
 
 def test_a_part_that_makes_arrays_counts_and_frees_them(living):

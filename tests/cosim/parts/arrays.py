@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim.part import GO_ON
-from dynamics.kernel import apart, leaf
+from dynamics.kernel import apart, kernel, leaf
 
 
 class Mean(NamedTuple):
@@ -41,3 +41,9 @@ def step(p, s, tick, inputs):
     s.ticks[tick % len(s.ticks)] = tick
     total, s = _weighted(p, s)
     return Last(s.ticks, s.count + 1), (Sum(total),), GO_ON
+
+
+@kernel
+def weighted(p, s):
+    """The sum and the state, for Python: by a function that parts call, too."""
+    return _weighted(p, s)
