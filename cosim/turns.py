@@ -71,6 +71,10 @@ class Turn:
         self.advance(stop, act, failure)
         self.over = True
 
+    def finish(self) -> None:
+        """Let the present tick be the last."""
+        self._plan.ended[0] = 1
+
     def replace(self, part: int, code: Code) -> None:
         """Let other code step a part from now on."""
         k = self.parts.index(part)

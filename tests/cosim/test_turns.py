@@ -104,3 +104,27 @@ def test_what_is_said_is_in_the_order_of_ticks(together):
     graph.advance(6)
     graph.advance(12)
     assert said == [(name, tick, b"") for tick in (0, 3, 6, 9) for name in "ab"]
+
+
+class Clock:
+    """A part in Python that owns time."""
+
+    name, outputs = "clock", ()
+
+    def __init__(self, last):
+        self._last = last
+
+    def bind(self, graph):
+        self._graph = graph
+
+    def act(self, tick):
+        if tick == self._last:
+            self._graph.finish()
+        return tick + 1
+
+
+def test_a_part_in_python_that_owns_time_ends_the_run():
+    graph = graph_of(Clock(3), Part("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
+    graph.advance(100)
+    assert (graph.ended, graph.tick) == (True, 4)
+    assert graph.latest("a", 3) == 3
