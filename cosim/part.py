@@ -166,8 +166,9 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
     return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
-@leaf
-def _advance(memory: Any, tick: int) -> int:
+@uncounted
+def advance(memory: Any, tick: int) -> int:
+    """One step of the part whose `Core` is in the cell `memory`; its signal."""
     core = memory.value
     s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
@@ -175,16 +176,10 @@ def _advance(memory: Any, tick: int) -> int:
     return signal
 
 
-@uncounted
-def advance(memory: Any, tick: int) -> int:
-    """One step of the part whose `Core` is in the cell `memory`; its signal."""
-    return _advance(memory, tick)
-
-
 @kernel
 def advance_counted(memory: Any, tick: int) -> int:
     """The same for parts that may put an array in another's place (docs/decisions/0017)."""
-    return _advance(memory, tick)
+    return advance(memory, tick)
 
 
 @intrinsic
