@@ -117,7 +117,7 @@ class KernelLower(Lower):
     def setup_function(self, fndesc: Any) -> None:
         """Begin the function."""
         super().setup_function(fndesc)
-        if hasattr(self.func_ir.func_id.func, "__vectorised__"):
+        if self.library.vectorises:
             set.add(self.function.attributes, WIDEST)  # which llvmlite would refuse as unknown
 
     def incref(self, typ: types.Type, val: Any) -> None:

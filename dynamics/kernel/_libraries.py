@@ -15,7 +15,7 @@ from numba.core.environment import lookup_environment
 FunctionPassManager._dispose = ModulePassManager._dispose = NewPassManager._dispose
 
 
-ALLOCATES = ("NRT_Allocate", "NRT_MemInfo_alloc", "NRT_MemInfo_new", "NRT_MemInfo_varsize_alloc")
+_ALLOCATES = ("NRT_Allocate", "NRT_MemInfo_alloc", "NRT_MemInfo_new", "NRT_MemInfo_varsize_alloc")
 _COUNTING = ("NRT_incref", "NRT_decref")
 _SHARED = (binding.Linkage.linkonce_odr, binding.Linkage.weak_odr)
 _UNCOUNTED = ".uncounted"
@@ -24,7 +24,7 @@ _NOTHING = "".join(f"define weak_odr void @{name}(ptr %0) alwaysinline {{ ret vo
 
 
 def _allocates(module: Any) -> bool:
-    return any(function.name.startswith(ALLOCATES) for function in module.functions)
+    return any(function.name.startswith(_ALLOCATES) for function in module.functions)
 
 
 def _without_counting(module: Any) -> None:

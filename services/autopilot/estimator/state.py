@@ -95,33 +95,31 @@ def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaterni
 
 def new_memory() -> Memory:
     """Memory for a state."""
-    count = WATCHED
     return Memory(
         np.zeros((SIZE, SIZE)),
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros((HISTORY, 8)),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros((count, 6)),
-        np.zeros(count),
+        np.zeros(WATCHED, np.int64),
+        np.zeros(WATCHED, np.int64),
+        np.zeros(WATCHED, np.int64),
+        np.zeros((WATCHED, 6)),
+        np.zeros(WATCHED),
     )
 
 
 @kernel
-def initial(p: Estimator, memory: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
+def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
     """State of a vehicle that stands still.
 
     Args:
         p: `Estimator`.
-        memory: of the state, as `new_memory` makes it or of a state that is no longer used; it is written over.
+        m: memory of the state, as `new_memory` makes it or of a state that is no longer used; it is written over.
         position_world: [m] where it is thought to stand, good to `p.start_std`.
         specific_force_body: [m/s^2] a reading of the accelerometers, or a mean of several.
         field_body: [T] the same of the magnetometer.
     """
-    m = memory
     covariance = m.covariance
     covariance[:] = 0.0
     for i in range(3):
