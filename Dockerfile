@@ -10,19 +10,26 @@
 ARG BASE=python:3.11-slim-bookworm
 # An earlier image, whose kernels are taken where nothing of them has changed; deploy/build.sh names it.
 ARG PREVIOUS
+# An image with the pinned wheels in /wheels (deploy/wheels.sh): in the context they would be sent again for each image.
+ARG WHEELS
 
 
 FROM ${PREVIOUS:-${BASE}} AS previous
 
 
+FROM ${WHEELS:-${BASE}} AS wheels
+
+
 FROM ${BASE} AS dependencies
-# Where pip looks, when there are no wheels in build/wheels; only in this stage, of which no layer is shipped.
+# Where pip looks, without such wheels; only in this stage, of which no layer is shipped.
 ARG PIP_INDEX_URL
 ARG PIP_EXTRA_INDEX_URL
 ARG PIP_TRUSTED_HOST
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
 COPY deploy/requirements*.lock /build/
-COPY deploy/slim.py deploy/install.sh build/wheel[s] /build/
+COPY deploy/slim.py deploy/install.sh /build/
+# The first file is in every image: one that has no wheels is no error.
+COPY --from=wheels /etc/debian_version /wheel[s] /build/
 RUN /build/install.sh
 
 
@@ -47,18 +54,10 @@ CMD ["lapwing", "--help"]
 
 
 FROM packages AS built
-COPY deploy/entrypoint.sh deploy/built.sh deploy/warm.py /build/
-COPY pyproject.toml README.md ./
-COPY scenes scenes
-COPY messages messages
-COPY dynamics dynamics
-COPY cosim cosim
-COPY services services
-COPY studies studies
-COPY lapwing lapwing
-# The first file is in every image: one that has no kernels is no error.
+COPY . /build/
+# Likewise where there are no kernels.
 COPY --from=previous /etc/debian_version /var/cache/lapwin[g] /var/cache/lapwing/
-RUN /build/built.sh
+RUN /build/deploy/built.sh
 
 
 FROM packages AS runtime

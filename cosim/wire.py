@@ -17,7 +17,7 @@ from dynamics.rows import columns
 from messages.records import Record
 from messages.topics import Topic
 
-Fields = Mapping[str, Any]  # column of shape (n,) or (n, k), or a scalar, by the name of the message's field
+Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a scalar, or a function that gives one
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,12 @@ docker tag "${IMAGE:-lapwing}" "$PREVIOUS" 2> /dev/null || PREVIOUS=
 export PREVIOUS
 
 # With the host's pip the wheels are fetched by its settings; without, pip in the build asks the index itself.
-if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then deploy/wheels.sh; fi
+WHEELS=
+if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then
+    WHEELS=${IMAGE:-lapwing}-wheels
+    deploy/wheels.sh "$BASE" "$WHEELS"
+fi
+export WHEELS
 
 mkdir -p build
 $COMPOSE build mission foxglove campaign tests > build/docker-build.log 2>&1 || { tail -30 build/docker-build.log >&2; exit 1; }

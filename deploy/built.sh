@@ -3,13 +3,16 @@
 set -eu
 
 mkdir -p /image/app/recordings /image/opt/lapwing /image/var/cache
-cp -rp /app/. /image/app/
+for name in pyproject.toml README.md scenes messages dynamics cosim services studies lapwing; do
+    cp -rp "/build/$name" /image/app/
+done
 chmod 777 /image/app/recordings
+cp -rp /image/app/. /app/
 
 pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing \
     --no-deps --no-build-isolation --no-index --no-cache-dir --no-warn-script-location --editable /app
-cp /build/entrypoint.sh /image/opt/lapwing/bin/
+cp /build/deploy/entrypoint.sh /image/opt/lapwing/bin/
 
 cp -rp /image/opt/lapwing/. /opt/lapwing/
-python /build/warm.py
+python /build/deploy/warm.py
 cp -rp "$LAPWING_CACHE" /image/var/cache/

@@ -4,13 +4,15 @@ Handing a NamedTuple of a hundred numbers to a compiled function costs ten micro
 made, read and written without compiling anything (`dynamics.memory`).
 """
 
-from collections.abc import Hashable
-from typing import Any, NamedTuple
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numba
 from numba import types
 from numba.experimental import structref
 
+from dynamics.flatten import Flattener, leaves
 from dynamics.memory import Layout, Memory, layout
 from dynamics.structure import UnknownError, structure
 
@@ -40,30 +42,41 @@ class CellType(types.StructRef):
     _hash: int | None = None
 
 
-class _Form(NamedTuple):
+@dataclass
+class _Form:
     """What cells of one structure share."""
 
     kind: types.Type  # of the value
     cell: CellType
     layout: Layout
+    flattener: Flattener | None = None  # once there is more than one such cell: it is written for them
 
 
-_forms: dict[Hashable, _Form] = {}
+_forms: dict[Hashable, _Form] = {}  # by structure
+_by_classes: dict[Hashable, list[_Form]] = {}  # by the classes at the top, which are found at once
 
 
-def _form(value: Any) -> _Form:
-    """That of a cell of this value."""
+def _form(value: Any) -> tuple[_Form, Sequence[Any]]:
+    """That of a cell of this value, and the value's leaves."""
+    top: Any = (type(value), *map(type, value)) if isinstance(value, tuple) else type(value)
+    for form in _by_classes.get(top, ()):
+        assert form.flattener is not None
+        if (found := form.flattener.leaves(value)) is not None:
+            return form, found
     try:
         key: Hashable = structure(value)
     except UnknownError:
         key = None
-    found = _forms.get(key)
-    if found is None:
-        kind = numba.typeof(value)
-        found = _Form(kind, CellType([("value", kind)]), layout(kind))
-        if key is not None:
-            _forms[key] = found
-    return found
+    known = _forms.get(key)
+    if known is not None:
+        known.flattener = Flattener(value)
+        _by_classes.setdefault(top, []).append(known)
+        return known, leaves(value)
+    kind = numba.typeof(value)
+    form = _Form(kind, CellType([("value", kind)]), layout(kind))
+    if key is not None:
+        _forms[key] = form
+    return form, leaves(value)
 
 
 class Cell(structref.StructRefProxy):
@@ -78,8 +91,8 @@ class Cell(structref.StructRefProxy):
     def __new__(cls, value: Any) -> "Cell":
         """A cell that holds `value`: a number, an array or another cell, or a NamedTuple or tuple of such."""
         # numba's own constructor would be compiled in every process, and for every type of value
-        form = _form(value)
-        memory = Memory(form.kind, value, form.layout)
+        form, parts = _form(value)
+        memory = Memory(form.kind, parts, form.layout)
         cell = cls._numba_box_(form.cell, memory.count)
         cell.memory = memory
         return cell

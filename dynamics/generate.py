@@ -84,6 +84,19 @@ def _each(function, common, a, b):
     return define("each(function, common, a, b)", {}, f"return ({calls})")
 
 
+def fold(function: Callable, common: Any, value: Any, a: tuple, b: tuple) -> Any:
+    """The value after value = function(common, value, a[0], b[0]), then with a[1] and b[1], and so on."""
+    for x, y in zip(a, b, strict=True):
+        value = function(common, value, x, y)
+    return value
+
+
+@implements(fold, inline=True)
+def _fold(function, common, value, a, b):
+    calls = [f"value = function(common, value, a[{i}], b[{i}])" for i in range(len(a))]
+    return define("fold(function, common, value, a, b)", {}, *calls, "return value")
+
+
 def any_of(found: tuple) -> bool:
     """Whether any entry of a tuple is true."""
     return any(found)

@@ -133,6 +133,24 @@ def where(context, flag, a, b):
     return signature(LANES, LANES, a, b), chosen
 
 
+@leaf
+def choose(flag, a, b):
+    """The vector a where flag is above zero, else b."""
+    return (where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]))
+
+
+@intrinsic
+def any_above(context, x):
+    """Is any lane above zero?"""
+
+    def asked(context, builder, sig, args):
+        above = builder.fcmp_ordered(">", args[0], ir.Constant(VECTOR, [0.0] * 4))
+        four = builder.bitcast(above, ir.IntType(4))
+        return builder.icmp_unsigned("!=", four, four.type(0))
+
+    return signature(types.boolean, LANES), asked
+
+
 def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> Any:
     data = context.make_array(array)(context, builder, value).data
     return builder.bitcast(builder.gep(data, [start]), VECTOR.as_pointer())

@@ -9,7 +9,7 @@ such a count from the beginning (numba's `MemInfo`), and holds a count of its ow
 
 import ctypes
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -19,6 +19,8 @@ from numba.core import types
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python as counted
 from numba.np.numpy_support import as_dtype
+
+from dynamics.flatten import leaves
 
 ARRAY, CELL = "PPqqP", "P"  # of an array before its shape and strides: count, owner, items, size of one, place; a count
 
@@ -30,6 +32,8 @@ class Layout(NamedTuple):
     alignment: int  # [bytes]
     counted: tuple[int, ...]  # of the values in the format, those that are pointers to counts
     values: int  # how many there are
+    leaves: int  # of the value
+    others: tuple[int, ...]  # of the leaves, those that are no numbers
 
 
 @cache
@@ -40,28 +44,31 @@ def layout(kind: types.Type) -> Layout:
         TypeError: Python cannot put such a value there.
     """
     if isinstance(kind, types.Boolean):
-        return Layout("?", 1, (), 1)
+        return Layout("?", 1, (), 1, 1, ())
     if isinstance(kind, types.Integer):
         code = {8: "b", 16: "h", 32: "i", 64: "q"}[kind.bitwidth]
-        return Layout(code if kind.signed else code.upper(), kind.bitwidth // 8, (), 1)
+        return Layout(code if kind.signed else code.upper(), kind.bitwidth // 8, (), 1, 1, ())
     if isinstance(kind, types.Float):
-        return Layout("d" if kind.bitwidth == 64 else "f", kind.bitwidth // 8, (), 1)
+        return Layout("d" if kind.bitwidth == 64 else "f", kind.bitwidth // 8, (), 1, 1, ())
     if isinstance(kind, types.NoneType):
-        return Layout("P", 8, (), 1)
+        return Layout("P", 8, (), 1, 1, (0,))
     if isinstance(kind, types.StructRef):
-        return Layout(CELL, 8, (0,), 1)
+        return Layout(CELL, 8, (0,), 1, 1, (0,))
     if isinstance(kind, types.Array):
-        return Layout(f"{ARRAY}{2 * kind.ndim}q", 8, (0,), len(ARRAY) + 2 * kind.ndim)
+        return Layout(f"{ARRAY}{2 * kind.ndim}q", 8, (0,), len(ARRAY) + 2 * kind.ndim, 1, (0,))
     if not isinstance(kind, types.BaseTuple):
         raise TypeError(f"compiled code is handed numbers, arrays, tuples and NamedTuples only, not {kind}")
     parts = [layout(part) for part in kind]
     alignment = max((part.alignment for part in parts), default=1)
     align = {1: "", 2: "0h", 4: "0i", 8: "0q"}[alignment]
-    pointers, values = [], 0
+    pointers, others, values, leaves = [], [], 0, 0
     for part in parts:
         pointers += [values + i for i in part.counted]
+        others += [leaves + i for i in part.others]
         values += part.values
-    return Layout(align + "".join(part.format for part in parts) + align, alignment, tuple(pointers), values)
+        leaves += part.leaves
+    written = align + "".join(part.format for part in parts) + align
+    return Layout(written, alignment, tuple(pointers), values, leaves, tuple(others))
 
 
 @cache
@@ -78,10 +85,10 @@ class Memory:
         count: the same for numba; as long as it is there, the memory is.
     """
 
-    def __init__(self, kind: types.Type, value: Any, lies: Layout):
-        """Of a value of a type with this layout."""
+    def __init__(self, kind: types.Type, leaves: Sequence[Any], lies: Layout):
+        """Of the leaves of a value of a type with this layout."""
         _make_ready()
-        self._block = _Block(kind, lies, value)
+        self._block = _Block(kind, lies, leaves)
         self.pointer: int = counted.meminfo_new(self._block.address, self._block)
         self.count = counted._MemInfo(self.pointer)
 
@@ -98,23 +105,24 @@ class Memory:
         if numba.typeof(value) != self._block.kind:
             raise TypeError(f"expected a value of type {self._block.kind}, got {numba.typeof(value)}")
         self._block.release()
-        self._block.put(value)
+        self._block.put(leaves(value))
 
 
 class _Block:
     """The memory itself; it lets go of what in it is counted when compiled code lets go of it."""
 
-    def __init__(self, kind: types.Type, lies: Layout, value: Any):
+    def __init__(self, kind: types.Type, lies: Layout, leaves: Sequence[Any]):
         self.kind, self._layout = kind, lies
         self._struct = struct.Struct(lies.format)
         self._place = (ctypes.c_int64 * (1 + self._struct.size // 8))()
         self.address = ctypes.addressof(self._place)
-        self.put(value)
+        self.put(leaves)
 
-    def put(self, value: Any) -> None:
+    def put(self, leaves: Sequence[Any]) -> None:
         """Fill it."""
-        numbers: list[Any] = []
-        _flatten(value, numbers)
+        numbers = list(leaves)
+        for k in reversed(self._layout.others):
+            numbers[k : k + 1] = _in_memory(leaves[k])
         self._struct.pack_into(self._place, 0, *numbers)
 
     def numbers(self) -> tuple:
@@ -134,21 +142,16 @@ class _Block:
         self.release()
 
 
-def _flatten(value: Any, numbers: list) -> None:
-    if isinstance(value, tuple):
-        for item in value:
-            if type(item) is float:
-                numbers.append(item)
-            else:
-                _flatten(item, numbers)
-    elif isinstance(value, np.ndarray):
-        count = counted.meminfo_new(value.ctypes.data, value)
-        numbers += (count, id(value), value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
-    elif (memory := getattr(value, "memory", None)) is not None:  # of a cell
-        memory.count.acquire()
-        numbers.append(memory.pointer)
-    else:
-        numbers.append(0 if value is None else value)
+def _in_memory(leaf: Any) -> tuple[int, ...]:
+    """What stands in memory for an array, a cell or None."""
+    if leaf is None:
+        return (0,)
+    if isinstance(leaf, np.ndarray):
+        place = leaf.ctypes.data
+        count = counted.meminfo_new(place, leaf)
+        return count, id(leaf), leaf.size, leaf.itemsize, place, *leaf.shape, *leaf.strides
+    leaf.memory.count.acquire()  # a cell's
+    return (leaf.memory.pointer,)
 
 
 def _read(kind: types.Type, numbers: Iterator[Any]) -> Any:

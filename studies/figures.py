@@ -13,7 +13,7 @@ from services.common.success import Success
 from studies.flight import Flight
 from studies.saturation import limits, saturation
 from studies.touches import touches
-from studies.tracking import AXES, Reference, errors, plain, strided, total, tracking
+from studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided, total
 
 SURE = 3.0  # standard deviations of its own that the estimate is given
 
@@ -64,9 +64,9 @@ def figures(flight: Flight) -> dict[str, Any]:
         found["saturation"] = limits.share(limits.lasted)
     if not armed.any():
         return found
-    tracked = flight.tracking(truth)
-    found |= {f"rmse.{axis}": value for axis, value in tracked.rmse.items()}
-    found |= {"max_distance": tracked.distance, "overshoot": max(0.0, tracked.beyond)}
+    distance, beyond = flight.reach
+    found |= {f"rmse.{axis}": value for axis, value in flight.rmse.items()}
+    found |= {"max_distance": distance, "overshoot": max(0.0, beyond)}
     return found | _of_estimate(flight, armed)
 
 
@@ -74,7 +74,8 @@ def compile_ahead() -> None:
     """Compile what figures are made by, which is the same for every flight."""
     rows, armed = np.zeros((2, 4)), np.ones(2, bool)  # of a single row numpy does not say how it lies
     errors(np.zeros((2, 6)), rows, rows, armed)
-    tracking(Reference(rows, rows, rows[:, 0]), rows, rows, armed)
+    rmse(Reference(rows, rows, rows[:, 0]), rows, roll_pitch_yaw(rows), armed)
+    reach(rows, rows, armed)
     total(rows)
     limits(rows, armed, 1.0)
     _inside(strided(rows), strided(rows), strided(rows), plain(armed, bool))
@@ -93,7 +94,7 @@ def _of_estimate(flight: Flight, armed: np.ndarray) -> dict[str, float]:
     estimate, truth = flight.estimate, flight.truth
     places = strided(estimate.position[:n]), strided(truth.position[:n]), strided(estimate.position_std[:n])
     return {
-        **{f"rmse_estimate.{axis}": value for axis, value in flight.tracking(estimate).rmse.items()},
+        **{f"rmse_estimate.{axis}": value for axis, value in flight.rmse_of(estimate).items()},
         **{f"inside.{a}": share for a, share in zip("xyz", _inside(*places, plain(armed, bool)), strict=True)},
     }
 

@@ -271,15 +271,21 @@ class Flight:
         found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
         return dict(zip(AXES, found.T, strict=True))
 
-    def tracking(self, of: TopicView) -> tracking.Tracking:
-        """What the errors of the pose that a topic tells come to; of a flight with a reference."""
+    def rmse_of(self, pose: TopicView) -> dict[str, float]:
+        """Root-mean-square error of each axis [m], [rad] of the pose of a topic; of a flight with a reference."""
         n = self._tracked
-        return tracking.tracking(self._reference, of.position[:n], of.attitude[:n], self.armed)
+        return tracking.rmse(self._reference, pose.position[:n], pose.attitude[:n], self.armed)
+
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """Greatest distance from the reference, and how far beyond its extremes [m]; for a flight with a reference."""
+        n = self._tracked
+        return tracking.reach(self.setpoint.position[:n], self.truth.position[:n], self.armed)
 
     @cached_property
     def rmse(self) -> dict[str, float]:
         """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
-        return self.tracking(self.truth).rmse if self._tracked else {}
+        return self.rmse_of(self.truth) if self._tracked else {}
 
     @property
     def energy(self) -> float:

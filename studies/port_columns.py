@@ -48,10 +48,17 @@ class PortColumns(Mapping[str, Any]):
         self._rows = graph.all_rows(wire.port, wire.period)
         tree = columns(graph.ports[wire.port].like, self._rows)
         self._fields = wire.fields(tree, self.ticks * graph.setup.interval_ns)
-        # one message with each of the texts that occur: names, types and shapes of all columns
-        keys = [()] if wire.texts is None else _distinct(wire.texts(tree))
-        self._samples = _samples(wire.topic.message, *(wire.sample(*key).encode() for key in keys))
+        self._texts = () if wire.texts is None else wire.texts(tree)
+        first = tuple(int(column[0]) for column in self._texts)
+        self._shapes = _shapes(wire.topic.message, wire.sample(*first).encode())
         self._columns: dict[str, np.ndarray] = {}
+
+    @cached_property
+    def _names(self) -> dict[str, None]:
+        """What every message has, of one with each of the texts that occur."""
+        keys = _distinct(self._texts) if self._texts else [()]
+        shapes = [_shapes(self._wire.topic.message, self._wire.sample(*key).encode()) for key in keys]
+        return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
 
     @cached_property
     def messages(self) -> History:
@@ -70,29 +77,29 @@ class PortColumns(Mapping[str, Any]):
         if name not in self._fields:
             return self.messages[name]
         if name not in self._columns:
-            like = self._samples[name]
-            assert isinstance(like, np.ndarray)  # a number
-            column = np.asarray(self._fields[name]).astype(like.dtype, copy=False)
-            self._columns[name] = np.broadcast_to(column, (len(self.ticks), *like.shape[1:]))
+            (kind, shape), values = self._shapes[name], self._fields[name]
+            column = np.asarray(values() if callable(values) else values).astype(kind, copy=False)
+            self._columns[name] = np.broadcast_to(column, (len(self.ticks), *shape))
         return self._columns[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._samples)
+        return iter(self._names)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._samples
+        return name in self._shapes and (name in self._fields or name in self._names)
 
     def __len__(self) -> int:
-        return len(self._samples)
+        return len(self._names)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.messages.__reduce__()
 
 
-@lru_cache(maxsize=64)
-def _samples(message: Any, *payloads: bytes) -> History:
-    """The history of some messages; the flights of a campaign share theirs."""
-    return history(message, payloads)
+@lru_cache(maxsize=256)
+def _shapes(message: Any, payload: bytes) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    """Type and shape of each field of a message, without its time; the flights of a campaign share theirs."""
+    found = {name: np.asarray(column) for name, column in history(message, [payload]).items()}
+    return {name: (column.dtype, column.shape[1:]) for name, column in found.items()}
 
 
 def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:

@@ -19,10 +19,11 @@ class Touch(NamedTuple):
 
 def touches(truth: TopicView) -> list[Touch]:
     """All stretches on the ground, in order; empty for a plant that tells of no contact."""
-    edges = np.diff(truth.ground_contact.astype(np.int8), prepend=0, append=0)
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    contact = truth.ground_contact
+    changed = (np.flatnonzero(contact[1:] != contact[:-1]) + 1).tolist()
+    edges = [0] * bool(contact[0]) + changed + [len(contact)] * bool(contact[-1]) if len(contact) else []
     found: list[Touch] = []
-    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
         speed = max(-float(truth.velocity[start - 1, 2]), 0.0) if start else 0.0
         if found and truth.times[start] - truth.times[found[-1].stop - 1] < BOUNCE:
             found[-1] = Touch(found[-1].start, stop, max(found[-1].speed, speed))

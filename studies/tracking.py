@@ -1,5 +1,6 @@
 """How far a flight is from what was asked: errors of the six axes while the motors are armed."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,13 +20,26 @@ def shown(axis: str) -> tuple[str, float]:
 
 def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw [rad] of unit quaternions of shape (n, 4), shape (n, 3); yaw without jumps."""
-    x, y, z, w = np.asarray(xyzw, dtype=float).T
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    found, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))
+    _sines(found, cosines, plain(np.transpose(xyzw)))
+    roll, pitch, yaw = found
+    np.arctan2(roll, cosines[0], out=roll)  # numpy takes vectors of angles at once, compiled code takes one
+    np.arcsin(pitch, out=pitch)
+    np.arctan2(yaw, cosines[1], out=yaw)
     if not (np.abs(np.diff(yaw)) < np.pi).all():
-        yaw = np.unwrap(yaw)
-    return np.column_stack([roll, pitch, yaw])
+        yaw[:] = np.unwrap(yaw)
+    return found.T
+
+
+@kernel
+def _sines(found: Any, cosines: Any, xyzw: Any) -> None:
+    """Sines of roll, pitch, yaw (3, n) and cosines of roll and yaw (2, n), up to a factor, of quaternions (4, n)."""
+    for k in range(xyzw.shape[1]):
+        x, y, z, w = xyzw[0, k], xyzw[1, k], xyzw[2, k], xyzw[3, k]
+        found[0, k], cosines[0, k] = 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
+        sine = 2.0 * (w * y - z * x)
+        found[1, k] = np.sign(sine) if abs(sine) > 1.0 else sine
+        found[2, k], cosines[1, k] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
 
 
 def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
@@ -77,14 +91,6 @@ def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any
             k += 1
 
 
-class Tracking(NamedTuple):
-    """What the errors come to while the motors are armed; NaN where they never were."""
-
-    rmse: dict[str, float]  # root-mean-square of each axis [m], [rad]
-    distance: float  # greatest from the reference [m]
-    beyond: float  # farthest beyond the reference's extremes along any axis [m]; below 0: it never came as far
-
-
 class Reference(NamedTuple):
     """Where the vehicle ought to be at n times."""
 
@@ -93,37 +99,55 @@ class Reference(NamedTuple):
     yaw: np.ndarray  # [rad], shape (n,)
 
 
-def tracking(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> Tracking:
-    """What the errors come to, in one pass over the rows; other arguments as of `errors`."""
+def rmse(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> dict[str, float]:
+    """Root-mean-square error of each axis [m], [rad] while the motors are armed, NaN where they never were; other
+    arguments as of `errors`."""
     wanted = Reference(*(strided(values) for values in reference))
-    found = _tracking(*wanted, strided(position), plain(attitude), plain(armed, bool))
-    return Tracking(dict(zip(AXES, found[:6], strict=True)), *found[6:])
+    found = _mean_squares(*wanted, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
+    return dict(zip(AXES, map(math.sqrt, found), strict=True))
 
 
 @kernel
-def _tracking(
+def _mean_squares(
     wanted: Any, roll_pitch: Any, heading: Any, position: Any, attitude: Any, armed: Any
-) -> tuple[float, float, float, float, float, float, float, float]:
-    rows, away = 0, 0.0
+) -> tuple[float, float, float, float, float, float]:
+    rows = 0
     x = y = z = roll = pitch = yaw = 0.0
-    along_x = along_y = along_z = (-np.inf, -np.inf, -np.inf, -np.inf)
     for row in range(len(armed)):
         if armed[row]:
             rows += 1
-            ex, ey = (wanted[row, 0] - position[row, 0]) ** 2, (wanted[row, 1] - position[row, 1]) ** 2
-            ez = (wanted[row, 2] - position[row, 2]) ** 2
-            x, y, z, away = x + ex, y + ey, z + ez, _greater(away, ex + ey + ez)
-            roll += _turn(roll_pitch[row, 0], attitude[row, 0]) ** 2
-            pitch += _turn(roll_pitch[row, 1], attitude[row, 1]) ** 2
-            yaw += _turn(heading[row], attitude[row, 2]) ** 2
+            x += (wanted[row, 0] - position[row, 0]) ** 2
+            y += (wanted[row, 1] - position[row, 1]) ** 2
+            z += (wanted[row, 2] - position[row, 2]) ** 2
+            roll += _turn(roll_pitch[row, 0], attitude[0, row]) ** 2
+            pitch += _turn(roll_pitch[row, 1], attitude[1, row]) ** 2
+            yaw += _turn(heading[row], attitude[2, row]) ** 2
+    n = rows if rows else np.nan
+    return x / n, y / n, z / n, roll / n, pitch / n, yaw / n
+
+
+def reach(wanted: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
+    """Of positions while the motors are armed: greatest distance from those wanted [m], and how far they go beyond the
+    extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
+    return _reach(strided(wanted), strided(position), plain(armed, bool))
+
+
+@kernel
+def _reach(wanted: Any, position: Any, armed: Any) -> tuple[float, float]:
+    squares, away = 0.0, 0.0
+    along_x = along_y = along_z = (-np.inf, -np.inf, -np.inf, -np.inf)
+    for row in range(len(armed)):
+        if armed[row]:
+            x, y = wanted[row, 0] - position[row, 0], wanted[row, 1] - position[row, 1]
+            z = wanted[row, 2] - position[row, 2]
+            square = x * x + y * y + z * z
+            squares, away = squares + square, _greater(away, square)
             along_x = _extended(along_x, position[row, 0], wanted[row, 0])
             along_y = _extended(along_y, position[row, 1], wanted[row, 1])
             along_z = _extended(along_z, position[row, 2], wanted[row, 2])
-    n = rows if rows else np.nan
-    return (
-        np.sqrt(x / n), np.sqrt(y / n), np.sqrt(z / n), np.sqrt(roll / n), np.sqrt(pitch / n), np.sqrt(yaw / n),
-        np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z))),
-    )  # fmt: skip
+    if squares != squares:  # what a comparison would leave out
+        return np.nan, np.nan
+    return np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z)))
 
 
 Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown; that was wanted
@@ -145,8 +169,8 @@ def _beyond(known: Extremes) -> float:
 
 @leaf
 def _greater(a: float, b: float) -> float:
-    """The greater number; NaN if one is."""
-    return a if a >= b or a != a else b
+    """The greater number, of two that are numbers."""
+    return a if a > b else b
 
 
 def total(values: np.ndarray) -> float:

@@ -1,10 +1,15 @@
-"""Where each foot is, how fast it slips and how hard it presses."""
+"""Where each foot is, how fast it slips and how hard it presses; four feet side by side (dynamics/lanes.py)."""
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
+from dynamics.generate import each, implements
 from dynamics.kernel import leaf
-from dynamics.terrain import over_plane, summit, touch, upright
-from dynamics.vector import ZERO, Mat3, Vec3, add, apply, apply_transposed, cross, dot, scale
+from dynamics.lanes import beside, separate, spread, where
+from dynamics.terrain import Level, over_plane, summit, touch, upright
+from dynamics.vector import Mat3, Vec3, add, apply, apply_transposed, cross, dot, scale
+
+NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is nowhere is under nothing
 
 
 class Stance(NamedTuple):
@@ -33,33 +38,60 @@ def stance_of(e, motion, R_world_body):
 
 
 @leaf
-def above(stance, foot_body):
-    """Is a foot surely in the air? The cheap question that spares most of them the rest."""
-    return stance.over + dot(stance.upright_body, foot_body) >= 0.0
+def in_reach(stance, feet_body):
+    """Above zero for feet that may touch: the cheap question that spares most of them the rest."""
+    return -(stance.over + dot(stance.upright_body, feet_body))
 
 
 class Footing(NamedTuple):
-    """One foot on the ground or above it, in world coordinates."""
+    """Four feet on the ground or above it, in world coordinates; every number in four lanes."""
 
     arm: Vec3  # [m] from the centre of mass
     place: Vec3  # [m]
     press: float  # [N] normal force, 0 in the air
-    slip: Vec3  # [m/s] tangential velocity
+    slip: Vec3  # [m/s] tangential velocity, of no meaning in the air
     normal: Vec3
-    depth: float  # [m] along the normal, 0 in the air
-    approach: float  # [m/s] at which it grows, 0 in the air
+    depth: float  # [m] along the normal, not positive in the air
+    approach: float  # [m/s] at which it grows
 
 
 @leaf
-def foot_on(e, stance, foot_body):
-    """The footing of a foot (theory.md, eq. (2.12))."""
-    arm = apply(stance.R_world_body, foot_body)
+def _touch(terrain, place_world, _):
+    return touch(terrain, place_world)
+
+
+def _touch_four(terrain: Any, places_world: Vec3) -> tuple[float, Vec3]:
+    """`touch` of four places side by side."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_touch_four, inline=True)
+def _touch_four_on(terrain, places_world):
+    if terrain.instance_class is Level:
+
+        def level(terrain, places_world):
+            depth, normal = touch(terrain, places_world)
+            return depth, (spread(normal[0]), spread(normal[1]), spread(normal[2]))
+
+        return level
+
+    def one_by_one(terrain, places_world):
+        places = separate(places_world)
+        return beside(each(_touch, terrain, places, places))
+
+    return one_by_one
+
+
+@leaf
+def footing(e, stance, feet_body):
+    """The footing of four feet (theory.md, eq. (2.12))."""
+    arm = apply(stance.R_world_body, feet_body)
     place = add(stance.position_world, arm)
-    depth, normal = touch(e.terrain, place)
-    if depth <= 0.0:
-        return Footing(arm, place, 0.0, ZERO, normal, 0.0, 0.0)
+    depth, normal = _touch_four(e.terrain, place)
     velocity = add(stance.velocity_world, cross(stance.omega_world, arm))
     approach = -dot(velocity, normal)
-    onset = min(depth * e.inverse_width, 1.0)
-    press = max(onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach), 0.0)
+    onset = depth * e.inverse_width
+    onset = where(1.0 - onset, onset, 1.0)
+    press = onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach)
+    press = where(depth, where(press, press, 0.0), 0.0)
     return Footing(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)

@@ -4,7 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from dynamics.integrators._march import step
-from dynamics.kernel import kernel, leaf
+from dynamics.kernel import apart as never_inlined
+from dynamics.kernel import leaf
 from dynamics.tree import apart, finite
 
 SHORTEST = 0.01  # [s] times the tolerance: a part no longer than this is not split
@@ -23,13 +24,13 @@ def shorter(part, error, tolerance):
     return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
 
 
-@kernel
+@never_inlined
 def _once(method, p, t, x, h):
-    # called, not inlined three times: a third of the time to compile
+    # called, not inlined three times, and optimised once, not again in every function above
     return step(method, p, t, x, h)
 
 
-@kernel
+@never_inlined
 def march_controlled(how, p, t, x, h, end):
     """The state at time `end`, by parts of steps whose error is controlled; halves are kept, none longer than h."""
     allowed, part = how.tolerance, 2.0 * h

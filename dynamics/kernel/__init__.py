@@ -5,7 +5,7 @@ the three speeds (processes, single, batch) must give the same bits.
 
 Machine code is kept in the folder `LAPWING_CACHE`, by default ~/.cache/lapwing, by a cache of this package's own; what
 numba keeps for other functions is left alone. It is found again while no source that can be in it has changed (see
-`_key`); what another process is compiling is waited for (`_turns`). Compiled anew in every process are kernels in a
+`_key`); what another process is compiling is waited for (`_locks`). Compiled anew in every process are kernels in a
 script or notebook itself (`__main__`), and versions for arguments that are functions or whose class cannot be imported
 by name: put kernels and classes into modules.
 """

@@ -13,7 +13,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaWarning
 from numba.core.serialize import dumps
 
-from dynamics.kernel import _files, _sources, _turns
+from dynamics.kernel import _files, _locks, _sources
 from dynamics.kernel._key import Key, NotKeptError, key
 from dynamics.kernel._libraries import InnerLibrary
 from dynamics.kernel._pipeline import is_nested, reduced, restored
@@ -79,7 +79,7 @@ class KernelCache(_Cache):
             for listener in _listeners:
                 listener(self._label)
             if found:
-                _turns.take(f"{self._folder}/{self._file(found, is_nested())}-{found.sources}")
+                _locks.acquire(f"{self._folder}/{self._file(found, is_nested())}-{found.sources}")
                 result = self._loaded(found, sig, target_context)
         if result is not None:
             _counted["loaded"] += 1

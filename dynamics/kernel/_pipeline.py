@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
-from numba.core import ir, sigutils
+from numba.core import ir, sigutils, types
 from numba.core.compiler import Compiler, CompileResult, DefaultPassBuilder, PassManager
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
@@ -22,7 +22,7 @@ from numba.core.typed_passes import NativeLowering
 
 from dynamics.kernel._calls import InnerLower, KernelLower, is_whole, offer
 from dynamics.kernel._libraries import InnerLibrary, KernelLibrary
-from dynamics.kernel._turns import given_back
+from dynamics.kernel._locks import released_at_end
 
 
 class _Depth(threading.local):
@@ -175,8 +175,19 @@ class Pipeline(Compiler):
         return result._replace(type_annotation="")
 
 
+def _widened(kind: types.Type) -> types.Type:
+    """The type of a number, where this is that of a constant."""
+    return types.misc.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
+
+
 class KernelDispatcher(CPUDispatcher):
     """numba's dispatcher, which compiles a function again when Python calls what was compiled for kernels only."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """One version for all whole numbers and truth values, constant or not, where numba makes one for each constant:
+        LLVM puts constants in where it inlines the function."""
+        one, named = [_widened(kind) for kind in args], {name: _widened(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(one), named)
 
     def compile(self, sig: Any) -> Any:
         """Its entry from Python for a signature."""
@@ -184,7 +195,7 @@ class KernelDispatcher(CPUDispatcher):
         found = self.overloads.get(tuple(arguments))
         if found is not None and isinstance(found.library, InnerLibrary) and not is_nested():
             del self.overloads[tuple(arguments)]
-        with given_back():
+        with released_at_end():
             return super().compile(sig)
 
     def add_overload(self, cres: CompileResult) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynamics.integrators import RATES
 from dynamics.kernel import leaf
-from dynamics.lanes import beside, separate, where
+from dynamics.lanes import beside, choose, separate
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody.arrow import Core, Leaf, eliminate, felt
@@ -97,12 +97,6 @@ def free_turn(axis, gamma_1, gamma_2):
     (theory.md, eq. (8.46)); v1 and v2 are the chassis' x and y axes, `axis` is v3."""
     k = 1.0 / axis[2]
     return (-k * gamma_2, k * gamma_1, 0.0 * k)
-
-
-@leaf
-def choose(flag, a, b):
-    """The vector a where flag is above zero, else b."""
-    return (where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]))
 
 
 @leaf

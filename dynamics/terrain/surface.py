@@ -31,7 +31,7 @@ def _between(t, x, y):
     rows, columns = t.grid.shape
     u, v = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
     inside_x, inside_y = 0.0 <= u <= columns - 1.0, 0.0 <= v <= rows - 1.0
-    u, v = min(max(u, 0.0), columns - 1.0), min(max(v, 0.0), rows - 1.0)
+    u, v = min(max(0.0, u), columns - 1.0), min(max(0.0, v), rows - 1.0)  # in this order NaN becomes 0
     i, j = min(int(v), rows - 2), min(int(u), columns - 2)
     q, p = v - i, u - j
     a, b, c, d = t.grid[i, j], t.grid[i, j + 1], t.grid[i + 1, j], t.grid[i + 1, j + 1]

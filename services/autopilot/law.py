@@ -102,12 +102,12 @@ def hover_torque(airframe: Airframe) -> float:
 
 def lift(airframe: Airframe) -> float:
     """Force along body z [N] of a collective demand of 1 N: the number of rotors where none is tilted."""
-    return float(demand_effects(rotor_effectiveness(airframe))[0])
+    return _demand_effects(*_geometry(airframe))[0]
 
 
 def moments(airframe: Airframe) -> Vec3:
     """Torques about body x, y, z [N m] of demands of 1 N."""
-    _, x, y, z = map(float, demand_effects(rotor_effectiveness(airframe)))
+    _, x, y, z = _demand_effects(*_geometry(airframe))
     return x, y, z
 
 
@@ -140,7 +140,13 @@ def _effectiveness(
     return in_wakes(alone(0.0), alone(1.0) - alone(0.0), torque, wakes)
 
 
-@lru_cache(maxsize=16)  # asked for several times at a start, and by every run of a campaign
+# asked for several times at a start, and by every run of a campaign
+@lru_cache(maxsize=16)
+def _demand_effects(*geometry: Any) -> tuple[float, ...]:
+    return tuple(map(float, demand_effects(_effectiveness(*geometry))))
+
+
+@lru_cache(maxsize=16)
 def _tables(*geometry: Any) -> tuple[Shares, ...]:
     B = _effectiveness(*geometry)
     x, y, z, axes, signs, torque, wakes = geometry

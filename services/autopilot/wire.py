@@ -9,13 +9,11 @@ from cosim.setup import Setup
 from cosim.wire import Fields, Wire
 from messages import Actuators, Estimate, Status, Vector3, header
 from messages import topics as topic
-from messages.records import stamp_columns
+from messages.records import quaternion_columns, stamp_columns
 from services.autopilot.estimator import NAMES
 from services.common import ports
 from services.common.ports import AutopilotStatus, MotorCommand, StateEstimate
 from services.common.references import reference_wire
-
-XYZW = [1, 2, 3, 0]  # a message's order of a quaternion's parts
 
 
 def wires(
@@ -65,7 +63,7 @@ def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:
     return {
         **stamp_columns(time_ns),
         "pose.position": x.position_world,
-        "pose.orientation": np.asarray(x.attitude)[:, XYZW],
+        "pose.orientation": quaternion_columns(x.attitude),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration_world": x.acceleration_world,

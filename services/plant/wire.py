@@ -26,13 +26,12 @@ from messages import (
     header,
 )
 from messages import topics as topic
-from messages.records import stamp_columns
+from messages.records import quaternion_columns, stamp_columns
 from services.common import ports
 from services.common.ports import BatteryGauge, BodyMotions, ContactForces, TrueState
 
 WORLD = "world"
 AMPERE_HOUR = 3600.0  # [A s]
-XYZW = [1, 2, 3, 0]  # a message's order of a quaternion's parts
 
 
 class PlantWiring(NamedTuple):
@@ -87,7 +86,7 @@ def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
     return {
         **stamp_columns(time_ns),
         "pose.position": x.position_world,
-        "pose.orientation": np.asarray(x.attitude)[:, XYZW],
+        "pose.orientation": quaternion_columns(x.attitude),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration": x.acceleration_world,
@@ -106,7 +105,7 @@ def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
     return {
         **stamp_columns(time_ns),
         "pose.position": x.position_world,
-        "pose.orientation": np.asarray(x.attitude)[:, XYZW],
+        "pose.orientation": quaternion_columns(x.attitude),
     }
 
 
@@ -117,7 +116,7 @@ def _odometry(x: TrueState, time_ns: np.ndarray) -> Fields:
     return {
         **stamp_columns(time_ns),
         "pose.pose.position": x.position_world,
-        "pose.pose.orientation": np.asarray(x.attitude)[:, XYZW],
+        "pose.pose.orientation": quaternion_columns(x.attitude),
         "twist.twist.linear": np.column_stack(velocity_body),
         "twist.twist.angular": x.omega_body,
     }
@@ -132,7 +131,7 @@ def _transform(x: TrueState, time_ns: np.ndarray) -> Fields:
     return {
         **stamp_columns(time_ns, "transforms.0.header.stamp"),
         "transforms.0.transform.translation": x.position_world,
-        "transforms.0.transform.rotation": np.asarray(x.attitude)[:, XYZW],
+        "transforms.0.transform.rotation": quaternion_columns(x.attitude),
     }
 
 
@@ -182,7 +181,7 @@ def _bodies(x: BodyMotions, time_ns: np.ndarray) -> Fields:
     found: dict[str, Any] = dict(stamp_columns(time_ns))
     for i in range(len(x.position_world)):
         found[f"pose.{i}.position"] = x.position_world[i]
-        found[f"pose.{i}.orientation"] = np.asarray(x.attitude[i])[:, XYZW]
+        found[f"pose.{i}.orientation"] = quaternion_columns(x.attitude[i])
         found[f"velocity.{i}"] = x.velocity_world[i]
         found[f"angular_velocity.{i}"] = x.omega_body[i]
         found[f"force.{i}"] = x.force_world[i]

@@ -87,8 +87,10 @@ def plan(
     varied, swept = tuple(sorted((vary or {}).items())), _read(sweep) if sweep else ()
     if both := sorted(set(vary or {}) & set(swept[0] if swept else ())):
         raise ValueError(f"--vary {both[0]}: the sweep {sweep} varies it, too")
-    if SEED in (found := Plan(path, (), seed, 1, varied, swept)).keys:
-        raise ValueError(f"{found.option(SEED)} {SEED}: every run has a seed of its own; expected --seed")
+    overrides = tuple(overrides)
+    fixed = "--set" if any(text.partition("=")[0].strip() == SEED for text in overrides) else ""
+    if option := Plan(path, (), seed, 1, varied, swept).option(SEED) or fixed:
+        raise ValueError(f"{option} {SEED}: every run has a seed of its own; expected --seed")
     if design not in _PLACES:
         raise ValueError(f"--design {design}: expected one of {', '.join(_PLACES)}")
     if design in ("lhs", "sobol") and not varied:
@@ -102,7 +104,7 @@ def plan(
         raise ValueError(f"--runs {runs}: expected at least 1")
     if not 1 <= seed < 2**63 // APART:
         raise ValueError(f"--seed {seed}: expected a whole number from 1 to {2**63 // APART - 1}")
-    return Plan(path, tuple(overrides), seed, runs, varied, swept, design)
+    return Plan(path, overrides, seed, runs, varied, swept, design)
 
 
 def _word(seed: int, run: int, key: str) -> int:

@@ -2,7 +2,7 @@
 
 from numba.core import types
 
-from dynamics.generate import any_of, define, each, each_index, generated
+from dynamics.generate import any_of, define, each, each_index, fold, generated
 from dynamics.kernel import kernel, leaf
 
 
@@ -52,3 +52,18 @@ def test_any_of_a_tuple():
     for y, found in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
         assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == found
     assert not any_of(())
+
+
+@leaf
+def appended(common, value, x, y):
+    return common * value + x * y
+
+
+@kernel
+def folded(x, y):
+    return fold(appended, 10.0, 1.0, x, y)
+
+
+def test_folds_in_order():
+    x, y = (1.0, 2.0, 3.0), (1.0, 1.0, 2.0)
+    assert folded(x, y) == folded.py_func(x, y) == 1126.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from dynamics import vector
 from dynamics.kernel import kernel
-from dynamics.lanes import apart, beside, lanes, load, root, separate, spread, store, total, where
+from dynamics.lanes import any_above, apart, beside, choose, lanes, load, root, separate, spread, store, total, where
 from dynamics.lie import quaternion
 from dynamics.lie.quaternion import Quaternion
 
@@ -55,6 +55,18 @@ def test_choice_root_and_sum():
     picked, whole = chosen((1.0, 0.0, 0.5, -1.0), x)
     assert picked == (2.0, -1.0, math.sqrt(2.0), -1.0)
     assert whole == 14.0
+
+
+@kernel
+def vectors(flag, a, b):
+    f = beside(flag)
+    return separate(choose(f, beside(a), b)), any_above(f)
+
+
+def test_choice_of_vectors_and_whether_any_is_chosen():
+    a, b = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (10.0, 11.0, 12.0)), (0.0, -1.0, -2.0)
+    assert vectors((0.0, 1.0, -1.0, math.nan), a, b) == ((b, a[1], b, b), True)
+    assert vectors((0.0, -0.0, -1.0, math.nan), a, b) == ((b, b, b, b), False)
 
 
 @kernel

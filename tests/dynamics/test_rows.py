@@ -6,9 +6,12 @@ import weakref
 from typing import NamedTuple
 
 import numpy as np
+import pytest
+from numba.core.errors import TypingError
 
+from dynamics.kernel import kernel
 from dynamics.lie.quaternion import Quaternion
-from dynamics.rows import columns, reader, to_row, width
+from dynamics.rows import columns, load, reader, store, to_row, width
 
 
 class Inner(NamedTuple):
@@ -46,6 +49,32 @@ def test_a_row_is_read_as_the_tree_that_it_was_made_of():
     several = ((1, True), (2.5,), ())
     assert repr(reader(several)(to_row(several))) == repr(several)
     assert reader(3)(to_row(2**53)) == 2**53
+
+
+@kernel
+def _copied(like, rows, i, j):
+    found = load(like, rows, i)
+    store(found, rows, j)
+    return found
+
+
+class Counted(NamedTuple):
+    number: int
+    tree: Tree
+
+
+@pytest.mark.parametrize("tree", [Counted(-7, LIKE), Counted(2**53, LIKE._replace(time=-0.0)), (2.5, (True, 3), ())])
+def test_compiled_code_reads_and_writes_the_same_rows(tree):
+    rows = np.stack([np.full(width(tree), math.nan), to_row(tree), np.full(width(tree), 9.0)])
+    found = _copied(tree, rows, 1, 2)
+    assert repr(found) == repr(tree)
+    assert rows[2].tobytes() == rows[1].tobytes()
+    assert np.isnan(rows[0]).all()
+
+
+def test_only_numbers_stand_in_rows():
+    with pytest.raises(TypingError, match="a row holds numbers, tuples and NamedTuples only"):
+        _copied((1.0, "text"), np.zeros((2, 2)), 0, 1)
 
 
 def test_rows_are_let_go_with_their_columns():

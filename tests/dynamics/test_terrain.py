@@ -35,6 +35,13 @@ def test_the_normal_is_that_of_the_gradient(ground):
         assert over_plane(ground, (x, y, height)) <= summit(ground) + 1e-12
 
 
+@pytest.mark.parametrize("ground", [*SMOOTH.values(), BOX, STAIR], ids=[*SMOOTH, "box", "stair"])
+def test_a_place_that_is_no_number_is_under_nothing(ground):
+    nowhere = (math.nan, math.nan, math.nan)
+    assert not touch(ground, nowhere)[0] > 0.0
+    assert not over_plane(ground, nowhere) <= 0.0
+
+
 def test_a_grid_goes_through_its_points_and_counts_from_home():
     heights, ground = GRID["grid"], SMOOTH["grid"]
     assert surface(ground, 0.0, 0.0)[0] == 0.0

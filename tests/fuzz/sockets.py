@@ -141,7 +141,7 @@ def requests() -> Target:
             kind, said = 0x81, said.decode(errors="replace").encode()
         now.client.send(bytes([kind, 0xFE]) + len(said).to_bytes(2, "big") + bytes(4) + said)
         now.sent += 1
-        if now.sent % CONVERSATION == 0 and not now.client.answers():
+        if now.sent % CONVERSATION == 0 and not now.client.outlives(b""):
             raise ConnectionError("the server does not answer")
 
     return Target(read, (*(b"\0" + text for text in _TEXTS), b"\xff" + _BINARY))

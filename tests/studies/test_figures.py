@@ -8,7 +8,7 @@ from cosim.scene import SceneError
 from services.common.success import Success, holds
 from services.table import load
 from studies.figures import FIGURES, check_success, figures
-from studies.tracking import AXES, Reference, strided, total, tracking
+from studies.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided, total
 
 N = 400
 
@@ -132,23 +132,23 @@ def made():
 
 def test_one_pass_over_the_rows_finds_what_numpy_finds(made):
     (position, roll_pitch, yaw), flown, attitude, armed = made
-    found = tracking(*made)
     errors = np.column_stack([position - flown, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))])
-    rmse = np.sqrt((errors[armed] ** 2).mean(axis=0))
-    assert list(found.rmse.values()) == pytest.approx(rmse, rel=1e-12)
+    expected = np.sqrt((errors[armed] ** 2).mean(axis=0))
+    assert list(rmse(*made).values()) == pytest.approx(expected, rel=1e-12)
+    distance, farthest = reach(position, flown, armed)
     wanted, flown = position[armed], flown[armed]
     beyond = np.concatenate([flown.max(axis=0) - wanted.max(axis=0), wanted.min(axis=0) - flown.min(axis=0)])
-    assert found.distance == pytest.approx(np.linalg.norm(wanted - flown, axis=1).max(), rel=1e-12)
-    assert found.beyond == beyond.max()
+    assert distance == pytest.approx(np.linalg.norm(wanted - flown, axis=1).max(), rel=1e-12)
+    assert farthest == beyond.max()
 
 
 def test_what_is_no_number_stays_none(made):
     _, flown, _, armed = made
-    assert np.isnan(list(tracking(*made[:3], np.zeros(300, bool)).rmse.values())).all()
+    assert np.isnan(list(rmse(*made[:3], np.zeros(300, bool)).values())).all()
     flown[np.flatnonzero(armed)[7], 1] = np.nan
-    found = tracking(*made)
-    assert np.isnan([found.distance, found.beyond, found.rmse["y"]]).all()
-    assert np.isfinite([found.rmse[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
+    found = rmse(*made)
+    assert np.isnan([*reach(made[0].position, flown, armed), found["y"]]).all()
+    assert np.isfinite([found[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
 
 
 @pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
@@ -156,4 +156,26 @@ def test_the_layout_of_the_numbers_is_no_matter(made, laid):
     values = laid(made[1])
     assert np.array_equal(strided(values), values)
     assert total(values) == pytest.approx(values.sum(), rel=1e-12)
-    assert tracking(made[0], values, *made[2:]) == tracking(*made)
+    assert rmse(made[0], values, *made[2:]) == rmse(*made)
+    assert reach(made[0].position, values, made[3]) == reach(made[0].position, *made[1::2])
+
+
+@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray])
+def test_roll_pitch_yaw_make_the_rotation_again(laid):
+    angles = np.random.default_rng(3).uniform((-3.0, -1.5, -3.0), (3.0, 1.5, 3.0), (50, 3))
+    roll, pitch, yaw = np.cos(angles.T / 2) + 1j * np.sin(angles.T / 2)
+    w = roll.real * pitch.real * yaw.real + roll.imag * pitch.imag * yaw.imag
+    x = roll.imag * pitch.real * yaw.real - roll.real * pitch.imag * yaw.imag
+    y = roll.real * pitch.imag * yaw.real + roll.imag * pitch.real * yaw.imag
+    z = roll.real * pitch.real * yaw.imag - roll.imag * pitch.imag * yaw.real
+    found = roll_pitch_yaw(laid(np.column_stack([x, y, z, w])))
+    assert np.allclose(np.exp(1j * found), np.exp(1j * angles), rtol=0.0, atol=1e-12)
+    assert (np.abs(np.diff(found[:, 2])) <= np.pi).all()
+
+
+def test_an_attitude_that_is_no_number_has_no_angles_and_one_beyond_rounding_a_right_one():
+    assert np.isnan(roll_pitch_yaw(np.full((2, 4), np.nan))).all()
+    half = np.sqrt(0.5) * (1.0 + 1e-15)
+    assert roll_pitch_yaw(np.array([[0.0, half, 0.0, half], [0.0, -half, 0.0, half]]))[:, 1] == pytest.approx(
+        [0.5 * np.pi, -0.5 * np.pi]
+    )

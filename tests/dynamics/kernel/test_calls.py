@@ -126,3 +126,18 @@ def test_a_function_apart_is_linked_into_the_outermost_kernel_only():
     assert defined(outer) >= inner._apart.keys()
     with pytest.raises(ValueError, match="below zero"):
         twice_both((2.0, -3.0))
+
+
+@kernel
+def entry(table, i, doubled):
+    return 2.0 * table[i] if doubled else table[i]
+
+
+@kernel
+def entries(table, i):
+    return entry(table, 0, True), entry(table, 1, False), entry(table, -1, doubled=True), entry(table, i, i > 0)
+
+
+def test_constants_make_no_further_versions():
+    assert entries((1.0, 2.0, 3.0), 1) == (2.0, 2.0, 6.0, 4.0)
+    assert len(entry.overloads) == 1

@@ -170,7 +170,7 @@ def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
 
 def test_whoever_is_stopped_while_he_compiles_is_not_waited_for_long(package, compiling):
     compiling.send_signal(signal.SIGSTOP)
-    ended = package.run(f"from dynamics.kernel import _turns; _turns.PATIENCE = 0.1; {SLOW}")
+    ended = package.run(f"from dynamics.kernel import _locks; _locks.PATIENCE = 0.1; {SLOW}")
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 

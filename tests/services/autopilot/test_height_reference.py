@@ -12,6 +12,9 @@ from services.common.failures import OFF, WRONG
 from services.table import load
 
 SONAR = "autopilot.parameters.EKF2_HGT_REF=2"
+# the ground station's, whose plant over a slope is compiled anyway
+EFFECTS = [f"effects.{name}={{}}" for name in ("air_density", "gyroscopic_torque", "battery")]
+WIND = ["effects.wind_random.mean=[3.0,1.0,0.0]", "effects.wind_random.sigma=1.0"]
 AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command("goto", 14.0, 0.0, 3.0, 0.0, 2.0)]}
 
 
@@ -52,7 +55,7 @@ def test_a_rangefinder_that_looks_down_stands_in_for_a_sonar():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.position=[0,0,-0.2]"]
     slope = "environment.terrain={slope=[0.1,0.0]}"
-    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=sensors", *sensors, *laser, slope)
+    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=sensors", *sensors, *laser, slope, *EFFECTS, *WIND)
     x, _, z = place(flown, 17.0)
     assert x == pytest.approx(14.0, abs=0.2)
     assert z - 0.1 * x == pytest.approx(3.0, abs=0.15)

@@ -264,6 +264,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
             ["hover", "--vary", "run.seed=choice(1,2)"],
             "--vary run.seed: every run has a seed of its own; expected --seed",
         ),
+        (["hover", "--set", "run.seed=4"], "--set run.seed: every run has a seed of its own; expected --seed"),
         (
             ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
             "--vary vehicle.mass=uniform(9,10): vehicle.mass has a distribution already",

@@ -21,7 +21,7 @@ PATIENCE = 120.0  # [s] after which a process is taken to be stopped, and not to
 LOOK = 0.02  # [s] between two looks at whether it has ended
 
 
-class Turn(NamedTuple):
+class Lock(NamedTuple):
     """The lock of one kernel."""
 
     path: Path
@@ -29,17 +29,17 @@ class Turn(NamedTuple):
 
 
 class _Held(threading.local):
-    """The turns of this thread, the first one first."""
+    """The locks of this thread, the first one first."""
 
     def __init__(self) -> None:
-        self.turns: list[Turn] = []
+        self.locks: list[Lock] = []
 
 
 _held = _Held()
 
 
-def take(name: str) -> None:
-    """Take the turn to compile what is kept under `name`, and hold it to the end of `given_back`.
+def acquire(name: str) -> None:
+    """Take the lock of what is kept in the cache under `name`, and hold it to the end of `released_at_end`.
 
     Somebody else may have had it until now: what is kept is worth another look. Where there are no locks, or somebody
     has it for too long, none is taken.
@@ -54,24 +54,24 @@ def take(name: str) -> None:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         while time.monotonic() < until:
             try:
-                _held.turns.append(Turn(path, _locked(path)))
+                _held.locks.append(Lock(path, _locked(path)))
                 return
             except BlockingIOError:
                 time.sleep(LOOK)
 
 
 @contextlib.contextmanager
-def given_back() -> Iterator[None]:
-    """Turns that are taken within the context end with it."""
-    before = len(_held.turns)
+def released_at_end() -> Iterator[None]:
+    """Locks that are taken within the context are released at its end."""
+    before = len(_held.locks)
     try:
         yield
     finally:
-        while len(_held.turns) > before:
-            turn = _held.turns.pop()
+        while len(_held.locks) > before:
+            lock = _held.locks.pop()
             with contextlib.suppress(OSError):
-                turn.path.unlink()
-            os.close(turn.descriptor)
+                lock.path.unlink()
+            os.close(lock.descriptor)
 
 
 def _locked(path: Path) -> int:
