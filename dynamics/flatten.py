@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynamics.generate import define
-from dynamics.structure import structure
+from dynamics.structure import UnknownError, structure
 
 _BY_TYPE = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
 
@@ -50,7 +50,14 @@ class Flattener:
             return None
         if (tuple(map(type, tuples)), tuple(map(type, parts))) != self._types:
             return None
-        return parts if all(structure(parts[k]) == known for k, known in self._closer) else None
+        return parts if all(_is_of(parts[k], known) for k, known in self._closer) else None
+
+
+def _is_of(value: Any, known: Any) -> bool:
+    try:
+        return structure(value) == known
+    except UnknownError:
+        return False
 
 
 def _written(example: Any) -> Any:

@@ -28,6 +28,7 @@ def test_flattens_trees():
 
 def test_a_whole_number_of_more_bits_is_another_type():
     assert Flattener((1, 2.0)).leaves((2**62, 2.0)) == (2**62, 2.0)
+    assert Flattener((1, 2.0)).leaves((2**63, 2.0)) is None
     assert Flattener((1, 2.0)).leaves(("text", 2.0)) is None
 
 
