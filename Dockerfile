@@ -1,5 +1,4 @@
-# Lapwing's images: `runtime` (every service, the launcher, replay), `foxglove` (shows a flight), `cluster` (campaigns on
-# Dask) and `tests`.
+# Lapwing's images: `runtime` (every service, the launcher, replay, live views, campaigns on Dask) and `tests`.
 #
 #   make docker-build            also where no image can be pulled and no package index is reached from a container
 #   docker compose build         where both can
@@ -8,13 +7,8 @@
 # release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder of
 # older engines takes it too: no mounts, no here-documents.
 ARG BASE=python:3.11-slim-bookworm
-# An earlier image, whose kernels are taken where nothing of them has changed; deploy/build.sh names it.
-ARG PREVIOUS
 # An image with the pinned wheels in /wheels (deploy/wheels.sh): in the context they would be sent again for each image.
 ARG WHEELS
-
-
-FROM ${PREVIOUS:-${BASE}} AS previous
 
 
 FROM ${WHEELS:-${BASE}} AS wheels
@@ -54,28 +48,13 @@ CMD ["lapwing", "--help"]
 
 
 FROM packages AS built
+# With kernels of an earlier image, if deploy/build.sh has found one: what has not changed is not compiled again.
 COPY . /build/
-# Likewise where there are no kernels.
-COPY --from=previous /etc/debian_version /var/cache/lapwin[g] /var/cache/lapwing/
 RUN /build/deploy/built.sh
 
 
 FROM packages AS runtime
 USER lapwing
-COPY --from=built /image/ /
-
-
-FROM packages AS cluster
-USER lapwing
-COPY --from=dependencies /opt/lapwing-cluster /opt/lapwing-cluster
-ENV PYTHONPATH=/opt/lapwing-cluster
-COPY --from=built /image/ /
-
-
-FROM packages AS foxglove
-USER lapwing
-COPY --from=dependencies /opt/lapwing-foxglove /opt/lapwing-foxglove
-ENV PYTHONPATH=/opt/lapwing-foxglove
 COPY --from=built /image/ /
 
 

@@ -1,6 +1,5 @@
 #!/bin/sh
-# Builds the images lapwing, lapwing-foxglove, lapwing-cluster and lapwing-tests (`make docker-build`), also where no image
-# can be pulled.
+# Builds the images lapwing and lapwing-tests (`make docker-build`), also where no image can be pulled.
 #
 #   [BASE=IMAGE] [IMAGE=NAME] [PYTHON=python3] deploy/build.sh
 set -eu
@@ -23,11 +22,13 @@ if [ -z "${BASE:-}" ]; then
 fi
 export BASE
 
-# What has not changed since the last build is not compiled again. The name stays with that build's image while this one's
-# are made, so that the second of them finds the steps of the first.
-PREVIOUS=${IMAGE:-lapwing}-previous
-docker tag "${IMAGE:-lapwing}" "$PREVIOUS" 2> /dev/null || PREVIOUS=
-export PREVIOUS
+# The last build's kernels: what has not changed since is not compiled again.
+mkdir -p build
+rm -rf build/kernels
+if last=$(docker create "${IMAGE:-lapwing}" 2> /dev/null); then
+    docker cp "$last:/var/cache/lapwing" build/kernels > /dev/null
+    docker rm "$last" > /dev/null
+fi
 
 # With the host's pip the wheels are fetched by its settings; without, pip in the build asks the index itself.
 WHEELS=
@@ -37,6 +38,5 @@ if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then
 fi
 export WHEELS
 
-mkdir -p build
-$COMPOSE build mission foxglove campaign tests > build/docker-build.log 2>&1 || { tail -30 build/docker-build.log >&2; exit 1; }
-docker image ls --format '{{.Repository}}:{{.Tag}} {{.Size}}' | grep "^${IMAGE:-lapwing}\(-foxglove\|-cluster\|-tests\)\?:latest " | sort
+$COMPOSE build mission tests > build/docker-build.log 2>&1 || { tail -30 build/docker-build.log >&2; exit 1; }
+docker image ls --format '{{.Repository}}:{{.Tag}} {{.Size}}' | grep "^${IMAGE:-lapwing}\(-tests\)\?:latest " | sort

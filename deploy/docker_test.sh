@@ -43,7 +43,7 @@ fail() {
 }
 passed() { echo "docker-test: $*"; }
 
-for image in "$IMAGE" "$IMAGE-foxglove" "$IMAGE-cluster" "$IMAGE-tests"; do
+for image in "$IMAGE" "$IMAGE-tests"; do
     size=$(docker image inspect --format '{{.Size}}' "$image")
     [ "$size" -lt $LIMIT ] || fail "$image has $size bytes, allowed are $LIMIT"
     [ "$(docker run --rm --network none "$image" id -u)" -ne 0 ] || fail "$image runs as root"

@@ -1,6 +1,5 @@
 #!/bin/sh
-# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what some images have besides to /opt/lapwing-NAME,
-# from each requirements-NAME.lock.
+# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what the tests need besides to /opt/lapwing-tests.
 set -eu
 cd /build
 
@@ -9,9 +8,10 @@ if ls ./*.whl > /dev/null 2>&1; then export PIP_NO_INDEX=1 PIP_FIND_LINKS=/build
 
 # The environment gets no pip of its own: the base's serves, and nothing is installed at run time.
 python3 -m venv --without-pip /opt/lapwing
-pip --python /opt/lapwing/bin/python install --no-deps -r requirements.lock
-for lock in requirements-*.lock; do
-    more=${lock#requirements-}
-    pip --python /opt/lapwing/bin/python install --no-deps --target "/opt/lapwing-${more%.lock}" -r "$lock"
+for lock in requirements*.lock; do
+    case $lock in
+        *-tests.lock) pip --python /opt/lapwing/bin/python install --no-deps --target /opt/lapwing-tests -r "$lock" ;;
+        *) pip --python /opt/lapwing/bin/python install --no-deps -r "$lock" ;;
+    esac
 done
-python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-*
+python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-tests

@@ -3,9 +3,9 @@
 #
 #   deploy/lock.sh [PACKAGE]     all anew, or only PACKAGE to its newest version
 #
-# Writes requirements.lock (what the runtime image holds, and the build backend) and for each of $MORE what it needs on top
-# of it (a Dask cluster, the server for Foxglove, the tests), each with the hashes of all files of that version, for every
-# platform. pip refuses what has another hash. A local environment gets the same versions by `pip install --constraint`.
+# Writes requirements.lock (what an installation needs, and the build backend) and for each of $MORE what it needs on top
+# of it (a Dask cluster and the server for Foxglove, in the image too; the tests, in theirs), each with the hashes of all files
+# of that version, for every platform. pip refuses what has another hash. A local environment gets the same versions by `pip install --constraint`.
 set -eu
 cd "$(dirname "$0")/.."
 
