@@ -2,8 +2,8 @@
 
     python -m benchmarks.before [REPEATS]
 
-The first version is a commit of this repository, installed into an environment of its own. To compile takes the processor time
-of a command with an empty cache less that of the same command once more.
+The first version is a commit of this repository, installed into an environment of its own. To compile takes the
+processor time of a command with an empty cache less that of the same command once more.
 """
 
 import json
@@ -105,10 +105,10 @@ def versions(folder):
     subprocess.run(["git", "clone", "--quiet", str(ROOT), str(first)], check=True)
     subprocess.run(["git", "checkout", "--quiet", FIRST], cwd=first, check=True)
     subprocess.run(["make", "--silent", ".venv/.installed"], cwd=first, check=True)
-    effect = ["--set", "effects.body_drag.area=[0.06,0.06,0.06]"]
+    drag = ["--set", "effects.body_drag.area=[0.06,0.06,0.06]"]
     return (
-        Version(first, [str(first / ".venv/bin/lapwing")], ["--space", "benchmark"], effect, ["--seeds", "1"]),
-        Version(ROOT, LAPWING, ["--key-prefix", "benchmark"], [*effect, "--set", "effects.wind_random.beside_drag=true"],
+        Version(first, [str(first / ".venv/bin/lapwing")], ["--space", "benchmark"], drag, ["--seeds", "1"]),
+        Version(ROOT, LAPWING, ["--key-prefix", "benchmark"], [*drag, "--set", "effects.wind_random.beside_drag=true"],
                 ["--runs", "1", "--workers", "1", "--out", "{folder}/campaign"]),
     )  # fmt: skip
 
