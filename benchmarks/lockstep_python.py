@@ -25,10 +25,10 @@ class Idle:
     def __init__(self):
         self.next = (0, b"")
 
-    def receive(self, senders):
+    def receive(self, senders, few):
         return SimpleNamespace(get=lambda timeout: self.next)
 
-    def publisher(self, key):
+    def publisher(self, key, drops=False):
         return lambda payload, time_ns: None
 
     def has_audience(self, keys):
