@@ -48,6 +48,11 @@ CMD ["lapwing", "--help"]
 
 
 FROM packages AS built
+# The command, which finds the sources in /app.
+COPY pyproject.toml README.md ./
+RUN pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps --no-build-isolation --no-index \
+        --no-cache-dir --no-warn-script-location --config-settings editable_mode=compat --editable . && \
+    mkdir -p /image/app && cp -rp /image/opt/lapwing/. /opt/lapwing/
 # With kernels of an earlier image, if deploy/build.sh has found one: what has not changed is not compiled again.
 COPY . /build/
 RUN /build/deploy/built.sh

@@ -2,18 +2,15 @@
 # Build step of the Dockerfile: all that images have besides packages, to /image: sources, command, kernels.
 set -eu
 
-mkdir -p /image/app/recordings /image/opt/lapwing /image/var/cache "$LAPWING_CACHE"
 for name in pyproject.toml README.md scenes messages dynamics cosim services studies lapwing; do
     cp -rp "/build/$name" /image/app/
 done
+mkdir -p /image/app/recordings "/image$LAPWING_CACHE"
 chmod 777 /image/app/recordings
-cp -rp /image/app/. /app/
-
-pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing \
-    --no-deps --no-build-isolation --no-index --no-cache-dir --no-warn-script-location --editable /app
 cp /build/deploy/entrypoint.sh /image/opt/lapwing/bin/
+if [ -d /build/build/kernels ]; then cp -rp /build/build/kernels/. "/image$LAPWING_CACHE/"; fi
 
-cp -rp /image/opt/lapwing/. /opt/lapwing/
-if [ -d /build/build/kernels ]; then cp -rp /build/build/kernels/. "$LAPWING_CACHE"; fi
+# Seen from here where they are in the images.
+ln -sf /image/app/* /app/
+ln -s "/image$LAPWING_CACHE" "$LAPWING_CACHE"
 python /build/deploy/warm.py
-cp -rp "$LAPWING_CACHE" /image/var/cache/

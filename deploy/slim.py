@@ -1,4 +1,4 @@
-"""Make a folder of installed packages small: drop tests, headers, what nobody imports, foreign dialects, symbols.
+"""Make a folder of installed packages small: drop tests, headers, what nobody imports, symbols.
 
 Used by the Dockerfile:  python3 slim.py SITE_PACKAGES...
 """
@@ -10,10 +10,14 @@ from pathlib import Path
 
 UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
 # pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read.
-NOT_IMPORTED = ("lxml", "narwhals")
+NOT_IMPORTED = ("lxml", "narwhals", "dask/array", "dask/dataframe", "numpy/distutils")
 PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
-# What the link speaks and pymavlink takes by default.
-DIALECTS = {"__init__", "all"}
+# The modules of these folders that are imported: the dialects that the link speaks and pymavlink takes by default; the
+# language of tracebacks.
+MODULES = {
+    "pymavlink/dialects/v*": {"__init__", "all"},
+    "pygments/lexers": {"__init__", "_mapping", "python", "special"},
+}
 ELF64_LITTLE = b"\x7fELF\x02\x01"
 PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr
 
@@ -77,10 +81,11 @@ def slim(packages: Path) -> int:
     for path in [path for path in packages.rglob("*.*") if path.suffix in UNUSED]:
         saved += path.stat().st_size
         path.unlink()
-    for path in packages.glob("pymavlink/dialects/v*/**/*.*"):
-        if path.suffix == ".xml" or path.name.split(".")[0] not in DIALECTS:
-            saved += path.stat().st_size
-            path.unlink()
+    for folder, kept in MODULES.items():
+        for path in packages.glob(f"{folder}/**/*.*"):
+            if path.suffix == ".xml" or path.name.split(".")[0] not in kept:
+                saved += path.stat().st_size
+                path.unlink()
     return saved + sum(strip(path) for path in packages.rglob("*.so*") if not path.is_symlink())
 
 
