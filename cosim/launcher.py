@@ -144,6 +144,9 @@ def _follow(
             watch.last_news, ended_at = time.monotonic(), None
         if observe(watch):
             return
+        late = {name for name, child in children.items() if child.poll() != 0}
+        if late < needed and late <= restarts.begun - watch.present:
+            break  # killed when it had handed over all: of the others nobody is left to join
         if watch.ended:
             ended_at = ended_at or time.monotonic()
             if time.monotonic() - ended_at > STALL:

@@ -12,7 +12,11 @@ MOST = 3  # of one service in a run: what is killed again and again has a reason
 
 
 class Restarts:
-    """Those of one run."""
+    """Those of one run.
+
+    Attributes:
+        begun: the services that have been started again.
+    """
 
     def __init__(self, journals: Mapping[str, int], say: Callable[[str], None]):
         """Services by name.
@@ -22,6 +26,7 @@ class Restarts:
             say: is given a line for the user.
         """
         self._journals, self._say = dict(journals), say
+        self.begun: set[str] = set()
         self._left = dict.fromkeys(journals, MOST)
         self._reasons: dict[str, str] = {}  # of those that the launcher has killed
         self._told: list[tuple[float, str]] = []  # time [s] and what happened
@@ -50,4 +55,5 @@ class Restarts:
         self._told.append((time, f"{name} was {reason}, and is started again"))
         watch.publish(f"{RESTARTED_KEY}/{WATCHER}", watch.time_ns, json.dumps(self._told).encode())
         watch.forget(name)
+        self.begun.add(name)
         return True

@@ -80,8 +80,26 @@ def test_a_controller_in_python_is_where_it_was(tmp_path):
 
 def test_all_services_of_a_mission_are_killed_one_after_another(tmp_path):
     kills = {1.0: "sensors", 1.6: "autopilot", 2.2: "trajectory", 2.8: "plant", 3.4: "sensors"}
-    alone = fly(load("delivery_mission", SHORT)).digest
-    assert struck("delivery_mission", tmp_path, kills) == alone
+    longer = "run.duration=16"  # as it hurries after each restart until it is on time again
+    alone = fly(load("delivery_mission", [*SHORT, longer])).digest
+    assert struck("delivery_mission", tmp_path, kills, longer) == alone
+
+
+def test_whoever_is_killed_after_the_last_tick_holds_nobody_up(tmp_path):
+    setup = resolve(load("hover", ["run.duration=1", "success.require=[]", restarted(["plant"])]))
+    steps = [signal.SIGSTOP, signal.SIGCONT]  # of the recorder: the plant waits until that has all, and leaves
+
+    def strike(watch):
+        if steps and (watch.ended if steps[0] == signal.SIGCONT else watch.time_ns > 5e8):
+            if watch.ended:
+                os.kill(*children(os.getpid(), "plant"), signal.SIGKILL)
+            os.kill(*children(os.getpid(), "recorder"), steps.pop(0))
+
+    log = tmp_path / "struck.mcap"
+    fly_processes(Participation("mission", setup, {}, "test-late", log=str(log), speed=1.0), Silent(), live=strike)
+    assert not steps
+    with LogReader(log) as read:
+        assert read.digest() == fly(load("hover", ["run.duration=1", "success.require=[]"])).digest
 
 
 def struck(scene, tmp_path, kills, *overrides):
