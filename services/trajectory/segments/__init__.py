@@ -32,7 +32,7 @@ def choose(table: object) -> Segment:
         return table
     if not isinstance(table, dict) or "kind" not in table:
         raise KeyedError("", f"got {table!r}", f"a table with a kind of segment ({', '.join(KINDS)})")
-    if table["kind"] not in KINDS:
+    if not isinstance(table["kind"], str) or table["kind"] not in KINDS:
         raise KeyedError.unknown("kind", "kind of segment", table["kind"], KINDS)
     try:
         return KINDS[table["kind"]].model_validate(table)

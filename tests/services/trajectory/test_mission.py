@@ -124,6 +124,7 @@ def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
             "trajectory.phase.0.z.kind=rump",
             "phase.0.z.kind: unknown kind of segment 'rump'; did you mean ramp? expected",
         ),
+        ("trajectory.phase.0.z.kind=[3.0]", "phase.0.z.kind: unknown kind of segment [3.0]; expected one of chirp"),
         (
             "trajectory.phase.0.z=3.0",
             "trajectory.phase.0.z: expected a table with a kind of segment (chirp, hold, mini",
