@@ -9,6 +9,7 @@ A batch is the tick before which all messages have been handed over (int64), the
 name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
 """
 
+import math
 import struct
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -45,7 +46,9 @@ class Bundles:
         """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
         self._ports = [(port.name, port.period, width(port.like)) for port in ports]
         self._periods = sorted({port.period for port in ports})
+        self._cycle = math.lcm(*self._periods)  # [ticks] after which bundles hold the same rows again
         self._ticks = ticks
+        self._by_phase: dict[int, tuple[_Rows, ...]] = {}
         self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # by the number of rows for each period
 
     def due(self, first: int) -> bool:
@@ -84,6 +87,12 @@ class Bundles:
         return due_ticks(first, first + self._ticks, rows.period)
 
     def _rows(self, first: int) -> tuple[_Rows, ...]:
+        phase = first % self._cycle
+        if (rows := self._by_phase.get(phase)) is None:
+            rows = self._by_phase[phase] = self._rows_of(phase)
+        return rows
+
+    def _rows_of(self, first: int) -> tuple[_Rows, ...]:
         last = first + self._ticks - 1
         numbers = tuple([last // period - (first - 1) // period for period in self._periods])
         if numbers not in self._known:

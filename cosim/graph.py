@@ -133,8 +133,9 @@ class Graph:
             return
         stop, self.ended, failed = advance_all(self._turns, stop, self._act, self._failure)
         self.tick = max(self.tick, stop)
-        for service in self.services if len(self._turns) > 1 else ():
-            service.messages.sort(key=_tick)
+        if len(self._turns) > 1:
+            for service in self.services:
+                service.messages.sort(key=_tick)
         if failed is not None:
             raise failed
 

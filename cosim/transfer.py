@@ -42,6 +42,7 @@ class Source:
         self._needs = {(period, delay) for _, period, delay in taken}
         self._delay = min(delay for _, delay in self._needs)
         self._newest = -1  # tick up to which bundles are taken
+        self._known = 0  # tick before which nothing more is needed
 
     def take(self, tick: int) -> int:
         """Take bundles up to the newest that is needed at `tick`; the tick before which nothing more is needed.
@@ -50,6 +51,8 @@ class Source:
             EndOfRun: the producer has ended.
             LockStepError: another bundle came than the one that is due.
         """
+        if tick < self._known:
+            return self._known
         needed = max([_due(tick, period, delay) for period, delay in self._needs])
         while self._newest < needed:
             stamp = self._newest + 1
@@ -66,7 +69,8 @@ class Source:
             except BundleError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
             self._newest = stamp + self._span - 1
-        return max(tick, self._newest + self._delay) + 1
+        self._known = max(tick, self._newest + self._delay) + 1
+        return self._known
 
     def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
         """Time and payload of the next bundle, or of what comes in its place."""
