@@ -21,6 +21,7 @@ from tests.fuzz.target import Target
 from tests.services.foxglove.client import Client
 
 CONVERSATION = 64  # inputs that one endpoint sends before the next comes
+UNANSWERED = 1024  # requests before an answer is awaited, which takes two turns of the processor
 STEP = 100_000_000  # [ns] of simulated time from one to the next
 _LONGEST_HEAD = 14  # [bytes] of a frame
 _SENDER = bytes([255, 190])  # system and component of a ground station
@@ -141,7 +142,7 @@ def requests() -> Target:
             kind, said = 0x81, said.decode(errors="replace").encode()
         now.client.send(bytes([kind, 0xFE]) + len(said).to_bytes(2, "big") + bytes(4) + said)
         now.sent += 1
-        if now.sent % CONVERSATION == 0 and not now.client.outlives(b""):
+        if now.sent % UNANSWERED == 0 and not now.client.outlives(b""):
             raise ConnectionError("the server does not answer")
 
     return Target(read, (*(b"\0" + text for text in _TEXTS), b"\xff" + _BINARY))
