@@ -3,8 +3,8 @@
     pip install lapwing[learn]
     python examples/ppo_hover.py [STEPS] [SEED]
 
-Prints the mean return of whole episodes and how far from the target they end, before and after; 500 is the most that
-ten seconds could give.
+Prints the mean return of whole episodes, how far from the target they end and after how many actions, before and
+after; 500 is the most that ten seconds, 500 actions, could give.
 """
 
 import sys
@@ -24,8 +24,9 @@ from skrl.utils import set_seed
 
 import lapwing.gym  # noqa: F401 (registers the environments)
 
-VEHICLES, ROLLOUT, EPISODE = 256, 32, 500  # EPISODE in actions of 20 ms
+VEHICLES, JUDGES, ROLLOUT = 256, 64, 32  # that learn, and that show how well; ROLLOUT in actions of 20 ms
 FIRST = -1.0  # logarithm of the actions' standard deviation at first
+SAID = "{:6} return {:6.1f}, {:.2f} m from the target at the end, after {:.0f} actions"
 
 
 class Policy(GaussianMixin, Model):
@@ -84,36 +85,52 @@ def learner(environments):
     )  # fmt: skip
 
 
-def judged(agent, seed=10**6, vehicles=64):
-    """Mean return of one episode of each vehicle with the mean actions, and mean distance at its end [m]."""
-    environments = gymnasium.make_vec("lapwing/Hover-v0", vehicles, "vector_entry_point")
-    observed, _ = environments.reset(seed=seed)
-    total, over, away = np.zeros(vehicles), np.zeros(vehicles, bool), np.full(vehicles, np.nan)
-    for _ in range(EPISODE):
-        _, outputs = agent.policy.act({"observations": jnp.asarray(observed)}, role="policy")
-        observed, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
-        total += np.where(over, 0.0, reward)
-        away = np.where(over, away, np.linalg.norm(observed[:, :3], axis=1))
-        over |= terminated | truncated
-    return total.mean(), away.mean()
-
-
-def main(steps=2000, seed=1):
-    """Learn for so many steps of 20 ms of all vehicles; (return, distance [m]) before and after."""
-    set_seed(seed)
-    environments = wrap_env(gymnasium.make_vec("lapwing/Hover-v0", VEHICLES, "vector_entry_point"), verbose=False)
-    agent = learner(environments)
-    before = judged(agent)
-    print(f"before: return {before[0]:6.1f}, {before[1]:.2f} m from the target at the end", flush=True)
-    began, processor = time.monotonic(), time.process_time()
+def train(agent, environments, steps):
+    """Let it learn for so many steps of all vehicles."""
     SequentialTrainer(
         env=environments,
         agents=agent,
         cfg={"timesteps": steps, "headless": True, "disable_progressbar": None, "close_environment_at_exit": False},
     ).train()
+
+
+def made(vehicles):
+    """So many of them, in one environment."""
+    return gymnasium.make_vec("lapwing/Hover-v0", vehicles, "vector_entry_point")
+
+
+def way(observed):
+    """To the target [m], shape (n, 3), of observations (n, 21)."""
+    return observed[:, :3]
+
+
+def judged(agent, environments, way=way, seed=10**6):
+    """Of one episode of each vehicle with the mean actions: mean return, distance at its end [m] and actions in it."""
+    observed, _ = environments.reset(seed=seed)
+    n = environments.num_envs
+    total, away, flown, over = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)
+    while not over.all():
+        _, outputs = agent.policy.act({"observations": jnp.asarray(observed)}, role="policy")
+        observed, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
+        total += np.where(over, 0.0, reward)
+        away = np.where(over, away, np.linalg.norm(way(observed), axis=1))
+        flown += ~over
+        over |= terminated | truncated
+    return total.mean(), away.mean(), flown.mean()
+
+
+def main(steps=2000, seed=1):
+    """Learn for so many steps of 20 ms of all vehicles; what `judged` says before and after."""
+    set_seed(seed)
+    environments, judges = wrap_env(made(VEHICLES), verbose=False), made(JUDGES)
+    agent = learner(environments)
+    before = judged(agent, judges)
+    print(SAID.format("before", *before), flush=True)
+    began, processor = time.monotonic(), time.process_time()
+    train(agent, environments, steps)
     took = time.process_time() - processor
-    after = judged(agent)
-    print(f"after:  return {after[0]:6.1f}, {after[1]:.2f} m from the target at the end")
+    after = judged(agent, judges)
+    print(SAID.format("after", *after))
     print(f"{steps * VEHICLES} steps, {took:.0f} s of processor time, {time.monotonic() - began:.0f} s")
     return before, after
 

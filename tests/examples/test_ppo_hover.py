@@ -14,7 +14,7 @@ def test_a_few_updates_change_the_policy(monkeypatch):
     from examples import ppo_hover
 
     monkeypatch.setattr(ppo_hover, "VEHICLES", 8)
-    monkeypatch.setattr(ppo_hover, "EPISODE", 50)
+    monkeypatch.setattr(ppo_hover, "JUDGES", 4)
     before, after = ppo_hover.main(2 * ppo_hover.ROLLOUT)
     assert all(map(math.isfinite, (*before, *after)))
     assert before != after
