@@ -96,7 +96,7 @@ def advance_all(
             turn.advance(stop, act, failure)
         except LockStepError as error:
             failed, stop = error, turn.tick
-    if not any([turn.over for turn in turns]):
+    if not any(turn.over for turn in turns):
         return stop, False, failed
     ended = failed is None and all(turn.over for turn in turns)
     if ended:
