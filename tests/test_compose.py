@@ -20,6 +20,8 @@ from services import processes, security
 from services.table import load, resolve
 from tests.services.foxglove.client import patient
 
+pytestmark = pytest.mark.long
+
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
 ROOT = Path(__file__).parent.parent

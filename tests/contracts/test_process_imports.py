@@ -9,6 +9,8 @@ import pytest
 from services.participant import Participation, hand_over
 from services.table import load, resolve
 
+pytestmark = pytest.mark.long
+
 OWN = {"cosim", "dynamics", "messages", "services"}
 NEEDED = {"annotated_types", "llvmlite", "numba", "numpy", "typing_extensions", "zenoh"}
 # numpy's, and what numba imports where it is installed

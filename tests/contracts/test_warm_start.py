@@ -4,6 +4,10 @@ import json
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.long
+
 RUN = """
 import json, sys
 from lapwing.cli.main import app

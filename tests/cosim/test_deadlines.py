@@ -10,6 +10,8 @@ from cosim.log import LogReader
 from lapwing import Flight
 from studies.report.facts import facts
 
+pytestmark = pytest.mark.long
+
 
 def test_ticks_that_are_late_are_counted_and_the_worst_is_kept():
     deadlines = Deadlines()

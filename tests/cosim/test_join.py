@@ -19,6 +19,8 @@ from services.security import says
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 
+pytestmark = pytest.mark.long
+
 SCENE = "scenes/gyrostat_blocked.toml"
 
 

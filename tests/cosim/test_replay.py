@@ -23,6 +23,8 @@ from services.replay.pace import Pace
 from services.replay.schedule import Cut, schedule
 from tests.endpoints import loopback_endpoints
 
+pytestmark = pytest.mark.long
+
 TICK = 4_000_000
 
 

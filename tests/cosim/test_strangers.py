@@ -21,6 +21,8 @@ from services.common.operator import OPERATOR_KEY
 from services.table import load, resolve
 from tests.participants import participants
 
+pytestmark = pytest.mark.long
+
 SCENE = "scenes/hover.toml"
 PREFIX = "test-strangers"
 

@@ -9,6 +9,8 @@ from tests.faults import cut
 from tests.faults.trial import Trial, draw, fly
 from tests.hosts.network import why_not
 
+pytestmark = pytest.mark.long
+
 FEW = {
     "a service waits for a frozen one that goes on": Trial(0, "hover", "pause", 0.0, 4.0),
     "frozen before it has joined": Trial(0, "hover", "freeze", 0.5, 0.2),

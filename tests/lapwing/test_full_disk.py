@@ -9,6 +9,8 @@ import pytest
 
 from cosim.log import LogReader
 
+pytestmark = pytest.mark.long
+
 SCENE = Path.cwd() / "scenes" / "hover.toml"
 RUN = """
 import os, resource, signal, sys

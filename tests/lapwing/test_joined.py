@@ -17,6 +17,8 @@ from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import patient
 
+pytestmark = pytest.mark.long
+
 SETS = ["--set", "run.duration=60.0"]
 PATIENCE = 300.0  # [s]
 

@@ -22,6 +22,8 @@ from services.table import load, resolve
 from studies.report.motion import steps_to_json
 from tests.studies import chromium
 
+pytestmark = pytest.mark.long
+
 PATIENCE = 120.0  # [s]
 
 

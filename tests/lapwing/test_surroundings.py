@@ -9,6 +9,8 @@ import pytest
 
 from dynamics.kernel import cache_folder
 
+pytestmark = pytest.mark.long
+
 COMMAND = [sys.executable, "-m", "lapwing", "run", "gyrostat_blocked", "--set", "run.duration=5.0"]
 JUMPS = """
 import itertools, time

@@ -20,6 +20,8 @@ from services.security import settings
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 
+pytestmark = pytest.mark.long
+
 PREFIX = "test-router"
 
 

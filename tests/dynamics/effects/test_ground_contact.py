@@ -15,6 +15,8 @@ from dynamics.lie.quaternion import Quaternion
 from dynamics.terrain import relief
 from dynamics.vehicles import multirotor
 
+pytestmark = pytest.mark.long
+
 RK4 = get("rk4_renormalised").Method()
 G, HEIGHT = 9.80665, 0.35
 OFF = (0.0,) * 4

@@ -139,5 +139,6 @@ def entries(table, i):
 
 
 def test_constants_make_no_further_versions():
+    entries._cache.disable()  # what comes from the disk has no inner kernels
     assert entries((1.0, 2.0, 3.0), 1) == (2.0, 2.0, 6.0, 4.0)
     assert len(entry.overloads) == 1

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 OUTER = "from plant.outer import outer; values['outer'] = outer(3.0)"
 TOTAL = "import plant.law; from plant.table import total; values['total'] = total(plant.law.Spring(3.0))"
 PRODUCT = "from plant.factory import times; values['product'] = [times(2.0)(1.0), times(5.0)(1.0)]"

@@ -13,6 +13,8 @@ from services.foxglove.server import Server, parse_address
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import Client, patient
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
 TICK = 4_000_000  # [ns]
 

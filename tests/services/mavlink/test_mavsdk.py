@@ -22,6 +22,8 @@ from mavsdk.offboard import (  # noqa: E402
 )
 from mavsdk.param import ParamError  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 END = 60.0  # [s] a session is held to have failed after
 SPEED = 2.0  # simulated seconds per second
 

@@ -20,6 +20,8 @@ from services.ros2.node import ROUTER, Node, parse_router
 from services.table import load, resolve
 from tests.endpoints import loopback_endpoints
 
+pytestmark = pytest.mark.long
+
 DOMAIN = 7
 PATIENCE = 120.0  # [s] the run gets to compile and to begin
 

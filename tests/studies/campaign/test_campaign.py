@@ -20,6 +20,8 @@ from studies.campaign.runs import first_setup, fly_runs, reference, row_of
 from studies.campaign.statistics import interval
 from studies.campaign.study import Count, Ending, campaign
 
+pytestmark = pytest.mark.long
+
 SCENE = "delivery_mission"  # the start of it; some of the runs are said to fail
 SHORT = ("run.duration=3.5", 'success.require=["max_tilt < 0.03"]')
 VARY = {"vehicle.mass": normal(10.4, 0.3), "effects.wind_random.mean.0": uniform(0.0, 9.0)}

@@ -16,6 +16,8 @@ from studies.campaign.plan import plan
 from studies.campaign.runs import first_setup, reference
 from studies.campaign.study import campaign
 
+pytestmark = pytest.mark.long
+
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
 
 

@@ -14,6 +14,8 @@ from studies.tune.bandwidths import Bandwidths
 from studies.tune.polish import rmse
 from studies.tune.study import tune, write
 
+pytestmark = pytest.mark.long
+
 SCENES = Path(__file__).parents[3] / "scenes"
 HOVER = SCENES / "hover.toml"
 

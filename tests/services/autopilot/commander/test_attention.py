@@ -3,6 +3,7 @@
 import math
 
 import numba
+import pytest
 from commander_session import CONSTANTS, VIEW
 from flights import command, item
 from hypothesis import example, given, settings
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 from services.autopilot.commander.attention import BatteryThresholds, battery_thresholds, needs_attention
 from services.autopilot.commander.commander import Commander
 from services.autopilot.estimate import EXACT
+
+pytestmark = pytest.mark.long
 
 DT = 0.05  # [s] coarse: time-outs of half a second are ten ticks
 LOOK = 5

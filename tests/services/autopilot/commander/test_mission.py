@@ -7,6 +7,8 @@ import pytest
 from commander_session import Flight
 from flights import command, item
 
+pytestmark = pytest.mark.long
+
 NAN = math.nan
 START = command("mission"), command("arm")
 

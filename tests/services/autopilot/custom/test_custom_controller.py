@@ -16,6 +16,8 @@ from services.participant import Participation
 from services.table import from_resolved, load, resolve
 from studies.fly import fly
 
+pytestmark = pytest.mark.long
+
 HOVER = Path("scenes/hover.toml")
 
 LAW = """
