@@ -25,7 +25,7 @@ class Idle:
     def __init__(self):
         self.next = (0, b"")
 
-    def receive(self, senders, few):
+    def inbox(self, key, sender):
         return SimpleNamespace(get=lambda timeout: self.next)
 
     def publisher(self, key, drops=False):

@@ -6,6 +6,7 @@
 import json
 import os
 import queue
+import threading
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
@@ -14,6 +15,7 @@ from types import MappingProxyType
 from typing import Any
 
 from cosim.errors import BusError
+from cosim.inbox import Inbox
 from cosim.session_settings import session_settings
 from cosim.subscription import Message, Subscription
 from messages.attachment import pack, time_and_gid
@@ -23,6 +25,9 @@ _RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handove
 os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
+
+INBOX = 4096  # messages; far more than come in lock step before one is taken
+WAKE = 0.05  # [s] between two looks at whether somebody has waited long enough
 
 _opened = False
 
@@ -75,6 +80,9 @@ class ZenohBus:
         self.refused = 0
         self._publishers: dict[str, tuple[zenoh.Publisher, Callable[[bytes, int], None]]] = {}
         self._held: list = []  # subscribers and tokens live as long as the session
+        self._inboxes: dict[str, Inbox] = {}  # by key
+        self._waker = uuid.uuid4().bytes  # the mark of what this bus says to its own inboxes
+        self._closed = threading.Event()
 
     @property
     def session_id(self) -> str:
@@ -115,15 +123,29 @@ class ZenohBus:
         """
         return self._receive(key_expressions, Subscription(_message, None, self._refuse, notify))
 
-    def receive(
-        self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None, few: bool = False
-    ) -> Subscription:
-        """The same of known senders: by key the mark that a message must carry, None for that of the first.
+    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
+        """The same of known senders: by key the mark that a message must carry, None for that of the first."""
+        return self._receive(senders, Subscription(_message, dict(senders), self._refuse, notify))
 
-        `few`: messages are taken soon after they come, and stay as they are until then. That spares Zenoh's thread some
-        15 us each; but each keeps the 64 kB alive into which it was read, and such memory is not given back.
-        """
-        return self._receive(senders, Subscription(_message, dict(senders), self._refuse, notify, few))
+    def inbox(self, key: str, sender: bytes | None) -> Inbox:
+        """Receive what the sender with this mark publishes on `key`, where it is taken soon after it comes: a message
+        keeps the 64 kB alive into which it was read, and the oldest of too many are lost. None as of `receive`."""
+        subscriber = self._session.declare_subscriber(key, zenoh.handlers.RingChannel(INBOX))
+        self._held.append(subscriber)
+        found = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._refuse)
+        if not self._inboxes:
+            threading.Thread(target=self._wake, daemon=True).start()
+        self._inboxes[key] = found
+        return found
+
+    def _wake(self) -> None:
+        """Let those who wait at an inbox know when they have waited long enough: Zenoh's queues have no time-out."""
+        while not self._closed.wait(WAKE):
+            for key, inbox in list(self._inboxes.items()):
+                if time.monotonic() >= inbox.until:
+                    here = zenoh.Locality.SESSION_LOCAL
+                    with suppress(zenoh.ZError):  # closed meanwhile
+                        self._session.put(key, b"", attachment=pack(0, 0, self._waker), allowed_destination=here)
 
     def _receive(self, keys: Iterable[str], subscription: Subscription) -> Subscription:
         handler = zenoh.handlers.Callback(subscription.arrive, indirect=False)
@@ -199,6 +221,7 @@ class ZenohBus:
 
     def close(self) -> None:
         """Close the session; what was put before is delivered, but to those whom nothing reaches any more."""
+        self._closed.set()
         with suppress(zenoh.ZError):  # it has waited for one of these
             self._session.close()
 

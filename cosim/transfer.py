@@ -13,7 +13,6 @@ from cosim.process import POLL, Process
 from cosim.restart import Held, Progress, Refilled
 from cosim.schedule import due
 from cosim.spans import span, spans, step_key
-from cosim.subscription import Subscription
 from dynamics.kernel import uncompiled
 from messages.topics import Topic
 
@@ -36,9 +35,9 @@ class Source:
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
         self._span = span(process.setup, name, process.name) if process.bundles_ahead else 1
         self._bundles = Bundles(process.setup.services[name].ports, self._span)
-        key = step_key(self._span)
-        self._subscription: Subscription = process.bus.receive(process.participants.senders(key, [name]), few=True)
-        self._refilled = Refilled(self._subscription.get, lambda words: process.ask(HELD_KEY, name, words))
+        ((key, mark),) = process.participants.senders(step_key(self._span), [name]).items()
+        self._inbox = process.bus.inbox(key, mark)
+        self._refilled = Refilled(self._inbox.get, lambda words: process.ask(HELD_KEY, name, words))
         self._needs = {(period, delay) for _, period, delay in taken}
         self._delay = min(delay for _, delay in self._needs)
         self._newest = -1  # tick up to which bundles are taken
@@ -74,7 +73,7 @@ class Source:
 
     def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
         """Time and payload of the next bundle, or of what comes in its place."""
-        process, get = self._process, self._subscription.get
+        process, get = self._process, self._inbox.get
         if not process.restarts:
             return get(POLL) or process.patient(get, lambda: self._describe(needed))
 

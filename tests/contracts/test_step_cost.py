@@ -4,9 +4,9 @@ from benchmarks import batch, plant
 
 
 def test_a_step_with_the_catalogue_costs_what_one_written_by_hand_costs():
-    """The ratio is 1.00 to 1.02."""
-    _, _, ratio, _ = plant.bare()
-    assert ratio < 1.15
+    """The ratio of the best is 1.00 to 1.02; half of some pairs were once disturbed for all of 50 ms."""
+    with_it, by_hand, *_ = plant.bare()
+    assert with_it < 1.15 * by_hand
 
 
 def test_a_batch_steps_several_vehicles_in_the_time_of_one():
