@@ -121,9 +121,8 @@ def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
 
 
 @implements(step, inline=True)
-def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Callable:
-    found = sys.modules[parameters.instance_class.__module__].step
-    return lambda parameters, state, tick, inputs: found(parameters, state, tick, inputs)
+def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
+    return sys.modules[parameters.instance_class.__module__].step
 
 
 @leaf

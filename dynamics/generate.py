@@ -9,12 +9,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numba
-from numba.extending import overload
+from numba.core import types
+from numba.core.targetconfig import ConfigStack
+from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from dynamics.kernel import Pipeline
-
-COMPILED: dict[str, Any] = {"pipeline_class": Pipeline}
-INLINE: dict[str, Any] = {**COMPILED, "forceinline": True}
+from dynamics.kernel import unkept
 
 
 def define(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
@@ -41,36 +40,57 @@ def generated(signature: str, generate: Callable[..., Callable], doc: str, *, in
         doc: its docstring.
         inline: always into its caller.
     """
-    name, _, arguments = signature.rstrip(")").partition("(")
+    name = signature.partition("(")[0]
 
     def function(*values: Any) -> Any:
         return generate(*map(numba.typeof, values))(*values)
 
     function.__name__, function.__qualname__, function.__doc__ = name, name, doc
     function.__module__ = generate.__module__
-    _implement(function, arguments, generate, inline)
+    _implement(function, generate, inline)
     return function
 
 
 def implements(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
     """Decorates what takes the numba types of a function's arguments and gives its implementation in compiled code.
 
+    That is a function of the same arguments, or better, where there is one, a kernel: nothing more to compile.
+
     Args:
         function: what stands in the source of kernels; it is not called in them.
-        inline: always into its caller.
+        inline: always into its caller, where a kernel does not say itself whether it is.
     """
 
-    def decorate(generate: Callable[..., Callable]) -> Callable:
-        _implement(function, ", ".join(inspect.signature(function).parameters), generate, inline)
-        return generate
+    def decorate(choose: Callable[..., Callable]) -> Callable:
+        _implement(function, choose, inline)
+        return choose
 
     return decorate
 
 
-def _implement(function: Callable, arguments: str, generate: Callable[..., Callable], inline: bool) -> None:
-    # numba compares the argument lists, annotations and all: this one has none, like the implementations
-    chosen = define(f"chosen({arguments})", {"generate": generate}, f"return generate({arguments})")
-    overload(function, jit_options=INLINE if inline else COMPILED)(chosen)
+def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> None:
+    chosen: dict[tuple, Any] = {}
+
+    class Implementation(AbstractTemplate):
+        key = function
+
+        def generic(self, args: tuple, kws: dict) -> Any:
+            if kws:
+                args = inspect.signature(function).bind(*args, **kws).args
+            flags = ConfigStack().top().copy()
+            flags.forceinline = flags.forceinline or inline
+            if (args, flags.forceinline) not in chosen:
+                chosen[args, flags.forceinline] = unkept(choose(*args))
+            kernel = types.Dispatcher(chosen[args, flags.forceinline])
+            with ConfigStack().enter(flags):
+                signature = kernel.get_call_type(self.context, args, {})
+            self._entry = kernel.get_overload(signature)
+            return signature
+
+        def get_impl_key(self, sig: Any) -> Any:
+            return self._entry
+
+    infer_global(function, types.Function(Implementation))
 
 
 def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
@@ -112,7 +132,7 @@ def each_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
     return tuple(function(*arguments, i) for i in range(len(count)))
 
 
-@overload(each_index, jit_options=COMPILED)
+@implements(each_index)
 def _each_index(function, count, *arguments):
     given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
     calls = "".join(f"function({given}{i}), " for i in range(len(count)))

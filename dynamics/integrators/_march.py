@@ -33,8 +33,7 @@ def _rate(p, t, x):
 
 @implements(_rate)
 def _rate_of(p, t, x):
-    found = RATES[p.instance_class]
-    return lambda p, t, x: found(p, t, x)
+    return RATES[p.instance_class]
 
 
 @leaf

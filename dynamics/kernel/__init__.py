@@ -13,7 +13,7 @@ by name: put kernels and classes into modules.
 from dynamics.kernel._began import BEGAN  # noqa: F401 (first of all)
 from dynamics.kernel._by_class import ByClass
 from dynamics.kernel._cache import Statistics, on_compile, statistics
-from dynamics.kernel._decorators import apart, kernel, leaf, uncompiled, uncounted, vectorised
+from dynamics.kernel._decorators import apart, kernel, leaf, uncompiled, uncounted, unkept, vectorised
 from dynamics.kernel._files import root as cache_folder
 from dynamics.kernel._pipeline import Pipeline
 from dynamics.kernel._sources import digest as source_digest
@@ -33,5 +33,6 @@ __all__ = [
     "statistics",
     "uncompiled",
     "uncounted",
+    "unkept",
     "vectorised",
 ]

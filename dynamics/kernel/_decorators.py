@@ -22,6 +22,13 @@ def _compile(function: Callable, **options: Any) -> Any:
     return compiled
 
 
+def unkept(function: Any) -> Any:
+    """Compile a function that every process makes anew, and of which nothing is kept on the disk; a kernel as it is."""
+    if isinstance(function, KernelDispatcher):
+        return function
+    return KernelDispatcher(py_func=function, targetoptions={"nopython": True}, pipeline_class=Pipeline)
+
+
 @cache
 def uncompiled(function: F) -> F:
     """The Python function of a kernel, on those of the kernels that it calls by name.

@@ -152,8 +152,7 @@ def seen(layout: RotorLayout, x: Any) -> Motion:
 
 @implements(seen, inline=True)
 def _seen(layout, x):
-    found = FORMS[x.instance_class].seen
-    return lambda layout, x: found(layout, x)
+    return FORMS[x.instance_class].seen
 
 
 def accelerations_of_form(drive, t, x):
@@ -163,5 +162,4 @@ def accelerations_of_form(drive, t, x):
 
 @implements(accelerations_of_form, inline=True)
 def _accelerations_of_form(drive, t, x):
-    found = FORMS[x.instance_class].accelerations
-    return lambda drive, t, x: found(drive, t, x)
+    return FORMS[x.instance_class].accelerations

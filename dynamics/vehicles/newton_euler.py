@@ -14,8 +14,7 @@ def angular_acceleration(body, omega, torque):
 
 @implements(angular_acceleration, inline=True)
 def _angular_acceleration_of_class(body, omega, torque):
-    found = _with_products if body.instance_class is FullMassProperties else _about_principal_axes
-    return lambda body, omega, torque: found(body, omega, torque)
+    return _with_products if body.instance_class is FullMassProperties else _about_principal_axes
 
 
 @leaf
@@ -41,8 +40,7 @@ def newton_euler(body, drive, s, force, torque):
 
 @implements(newton_euler, inline=True)
 def _newton_euler_of_class(body, drive, s, force, torque):
-    found = _about_offset_centre if body.instance_class is OffsetMassProperties else _about_centre
-    return lambda body, drive, s, force, torque: found(body, drive, s, force, torque)
+    return _about_offset_centre if body.instance_class is OffsetMassProperties else _about_centre
 
 
 @leaf

@@ -1,6 +1,5 @@
 """The plant as a service: it owns time, and integrates what the scene's `vehicle.model` names."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -152,6 +151,5 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
 
 
 @implements(_struck)
-def _struck_of(drive: types.Type, x: types.Type) -> Callable:
-    found = struck if x.instance_class is FiveBodies else multirotor_euler.struck
-    return lambda drive, x: found(drive, x)
+def _struck_of(drive: types.Type, x: types.Type) -> Any:
+    return struck if x.instance_class is FiveBodies else multirotor_euler.struck

@@ -1,7 +1,6 @@
 """One instrument, compiled: the true state in, its reading out at its own rate."""
 
 import sys
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
@@ -31,9 +30,8 @@ def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
 
 
 @implements(_sample, inline=True)
-def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Callable:
-    found = sys.modules[p.instance_class.__module__].sample
-    return lambda p, s, key, tick, truth: found(p, s, key, tick, truth)
+def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Any:
+    return sys.modules[p.instance_class.__module__].sample
 
 
 def _initial(p: Any, key: Key, truth: Truth) -> Any:
@@ -42,9 +40,8 @@ def _initial(p: Any, key: Key, truth: Truth) -> Any:
 
 
 @implements(_initial, inline=True)
-def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Callable:
-    found = sys.modules[p.instance_class.__module__].initial
-    return lambda p, key, truth: found(p, key, truth)
+def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Any:
+    return sys.modules[p.instance_class.__module__].initial
 
 
 @leaf

@@ -1,7 +1,6 @@
 """Laser rangefinder: the distance along one ray, in any direction of the body (theory.md, eq. (3.40))."""
 
 import math
-from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -65,9 +64,8 @@ def _to_relief(terrain: Any, origin: Vec3, direction: Vec3) -> float:
 
 
 @implements(to_ground, inline=True)
-def _to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) -> Callable:
-    over = _to_level if terrain.instance_class is Level else _to_relief
-    return lambda terrain, origin, direction: over(terrain, origin, direction)
+def _to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) -> Any:
+    return _to_level if terrain.instance_class is Level else _to_relief
 
 
 @leaf

@@ -1,8 +1,7 @@
 """Sonar: an ultrasonic rangefinder that looks down (theory.md, section 3.2)."""
 
 import math
-from collections.abc import Callable
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Lt
@@ -46,9 +45,8 @@ def _distance(p: Sonar, truth: Truth) -> float:
 
 
 @implements(_distance, inline=True)
-def _distance_over(p: types.Type, truth: types.Type) -> Callable:
-    over = _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
-    return lambda p, truth: over(p, truth)
+def _distance_over(p: types.Type, truth: types.Type) -> Any:
+    return _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
 
 
 @leaf

@@ -38,9 +38,8 @@ def wrong(r: Any) -> Any:
 
 
 @implements(wrong, inline=True)
-def _wrong_by(r: types.Type) -> Callable:
-    found = FAILURES[r.instance_class].wrong
-    return lambda r: found(r)
+def _wrong_by(r: types.Type) -> Any:
+    return FAILURES[r.instance_class].wrong
 
 
 def nonsense(r: Any, key: Key, tick: int) -> Any:
@@ -49,9 +48,8 @@ def nonsense(r: Any, key: Key, tick: int) -> Any:
 
 
 @implements(nonsense, inline=True)
-def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Callable:
-    found = FAILURES[r.instance_class].garbage
-    return lambda r, key, tick: found(r, key, tick)
+def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
+    return FAILURES[r.instance_class].garbage
 
 
 def lost(r: Any) -> Any:

@@ -1,7 +1,6 @@
 """The readings of a barometer, a magnetometer, a distance or optical flow: each kind has its update of the filter."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba import types
 
@@ -61,9 +60,8 @@ def update(p: Estimator, x: State, r: Reading) -> State:
 
 
 @implements(update, inline=True)
-def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Callable:
-    found = UPDATES[r.instance_class]
-    return lambda p, x, r: found(p, x, r)
+def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
+    return UPDATES[r.instance_class]
 
 
 @leaf

@@ -34,9 +34,8 @@ TOLD = ByClass()
 
 
 @implements(told, inline=True)
-def _told(p: types.Type, t: types.Type, x: types.Type) -> Callable:
-    found = TOLD[p.instance_class]
-    return lambda p, t, x: found(p, t, x)
+def _told(p: types.Type, t: types.Type, x: types.Type) -> Any:
+    return TOLD[p.instance_class]
 
 
 def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:

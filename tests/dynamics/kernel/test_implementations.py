@@ -1,4 +1,4 @@
-"""What the kernel cache relies on: an overload stands beside the function that it is for, which its users import."""
+"""What the kernel cache relies on: an implementation stands beside its function, which its users import."""
 
 import ast
 from pathlib import Path
@@ -7,14 +7,17 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 FILES = [p for folder in ("dynamics", "services", "studies", "cosim", "lapwing") for p in (ROOT / folder).rglob("*.py")]
-FOUND = [path for path in FILES if "@overload(" in path.read_text(encoding="utf-8")]
+FOUND = [path for path in FILES if "@implements(" in path.read_text(encoding="utf-8")]
 
 
 @pytest.mark.parametrize("path", FOUND, ids=lambda path: str(path.relative_to(ROOT)))
-def test_an_overload_is_in_the_module_of_its_function(path):
+def test_an_implementation_is_in_the_module_of_its_function(path):
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     calls = [
-        d for f in functions for d in f.decorator_list if isinstance(d, ast.Call) and ast.unparse(d.func) == "overload"
+        d
+        for f in functions
+        for d in f.decorator_list
+        if isinstance(d, ast.Call) and ast.unparse(d.func) == "implements"
     ]
     assert {ast.unparse(call.args[0]) for call in calls} <= {f.name for f in functions}
