@@ -1,6 +1,6 @@
 """Build step of the Dockerfile: kernels and matplotlib's list of fonts, in the folder $LAPWING_CACHE.
 
-Of what an earlier image has, versions of kernels that others have replaced are dropped, so that images do not grow.
+Of what an earlier image has, kernels of which there is another version now are dropped, so that images do not grow.
 """
 
 import os
@@ -12,6 +12,7 @@ from typing import Any
 from lapwing.cli.main import main
 
 cache = Path(os.environ["LAPWING_CACHE"])
+had = {path for path in (cache / "kernels").rglob("*") if path.is_file()}
 opened: set[str] = set()
 
 
@@ -28,11 +29,11 @@ try:
 except SystemExit as end:
     if end.code:
         raise
-kept = sorted((path for path in (cache / "kernels").rglob("*") if path.is_file()), key=lambda p: p.stat().st_mtime)
-newest = {str(path).rpartition("-")[0]: path for path in kept}
-for path in kept:
-    if path not in newest.values() and str(path) not in opened:
-        path.unlink()
+kernels = [path for path in (cache / "kernels").rglob("*") if path.is_file()]
+new = {str(path).rsplit("-", 2)[0] for path in kernels if path not in had}  # FOLDER/NAME of FOLDER/NAME-KEY-SOURCES
+for path in had:
+    if str(path) not in opened and str(path).rsplit("-", 2)[0] in new:
+        path.unlink(missing_ok=True)
 import matplotlib.font_manager  # noqa: E402, F401  (makes its list)
 
 # Whoever the services run as reads the kernels, whose files nobody else can have written.
