@@ -29,6 +29,7 @@ from services.common import ports
 from services.common.ports import MotorCommand, Reference, TrueState
 from services.plant.wire import PlantWiring
 from services.plant.wire import wires as plant_wires
+from services.trajectory.resolve import LEAD
 
 HOPS = 3
 NONE = PlantWiring(5, False, 0, 0.0, ())
@@ -42,7 +43,7 @@ PARTS = {  # inputs and ports of the mission's services
         (Input(ports.IMU), Input(ports.TRAJECTORY)),
         (Port(ports.ACTUATORS, MotorCommand((1.0,) * 4, True, (1.0,) * 4, (0.0,) * 3)),),
     ),
-    "trajectory": ((Input(ports.TRUTH, 25),), (Port(ports.TRAJECTORY, Reference()),)),
+    "trajectory": ((Input(ports.TRUTH, round(250 * LEAD)),), (Port(ports.TRAJECTORY, Reference()),)),
 }
 
 

@@ -1,11 +1,18 @@
-"""How many ticks go into one bundle on its way from one service to another.
+"""What goes into one bundle on its way from one service to another, and how many ticks.
 
 A service all of whose inputs are d ticks old runs ahead of the others by up to d ticks, as the trajectory does. Nobody
 waits for its single ticks: what it takes and what it gives goes in bundles of d / 2 ticks. Every loop through it has
 those d ticks in it, and the two bundles delay a message by less, so that the lock step cannot come to a stop.
+
+A service that takes only what is due every n ticks gets a bundle every n ticks, as the autopilot the battery's.
 """
 
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
 from cosim.keys import STEP_KEY
+from cosim.schedule import Port
 from cosim.setup import Setup
 
 
@@ -15,18 +22,39 @@ def ticks_at_once(setup: Setup, name: str) -> int:
     return max(1, min(delays, default=0) // 2)
 
 
-def span(setup: Setup, producer: str, consumer: str) -> int:
-    """The ticks of a bundle from one service to another."""
-    return max(ticks_at_once(setup, producer), ticks_at_once(setup, consumer))
+class Way(NamedTuple):
+    """How bundles go from one service to another."""
+
+    ticks: int  # of a bundle
+    every: int  # ticks from the first of a bundle to that of the next; only ports whose period is a multiple
+
+    @property
+    def key(self) -> str:
+        """The key of its bundles, before the name of the service that gives them."""
+        if self.ticks > 1:
+            return f"{STEP_KEY}_{self.ticks}"
+        return STEP_KEY if self.every == 1 else f"{STEP_KEY}_every_{self.every}"
+
+    def ports(self, given: Iterable[Port]) -> list[Port]:
+        """Those in its bundles, of what a service gives."""
+        return [port for port in given if self.ticks > 1 or port.period % self.every == 0]
 
 
-def spans(setup: Setup, producer: str) -> set[int]:
-    """Those of the bundles that a service gives; of one whose rows nobody takes, a tick."""
+EACH_TICK = Way(1, 1)
+"""A bundle at each tick, of all that a service gives."""
+
+
+def way(setup: Setup, producer: str, consumer: str) -> Way:
+    """How bundles go from one service to another that takes something of it."""
+    if (ticks := max(ticks_at_once(setup, producer), ticks_at_once(setup, consumer))) > 1:
+        return Way(ticks, ticks)
+    taken = {i.port for i in setup.services[consumer].inputs}
+    periods = [port.period for port in setup.services[producer].ports if port.name in taken]
+    return Way(1, math.gcd(*periods))
+
+
+def ways(setup: Setup, producer: str) -> set[Way]:
+    """How the bundles of a service go; those of one whose rows nobody takes at each tick."""
     given = {port.name for port in setup.services[producer].ports}
     takers = [name for name, service in setup.services.items() if any(i.port in given for i in service.inputs)]
-    return {span(setup, producer, taker) for taker in takers} or {1}
-
-
-def step_key(ticks: int) -> str:
-    """The key, before the name of a service, of its bundles of so many ticks."""
-    return STEP_KEY if ticks == 1 else f"{STEP_KEY}_{ticks}"
+    return {way(setup, producer, taker) for taker in takers} or {EACH_TICK}

@@ -12,7 +12,7 @@ from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY
 from cosim.process import POLL, Process
 from cosim.restart import Held, Progress, Refilled
 from cosim.schedule import due
-from cosim.spans import span, spans, step_key
+from cosim.spans import EACH_TICK, Way, way, ways
 from dynamics.kernel import uncompiled
 from messages.topics import Topic
 
@@ -33,13 +33,12 @@ class Source:
     def __init__(self, process: Process, name: str, taken: list[tuple[str, int, int]], graph: Graph):
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
-        self._span = span(process.setup, name, process.name) if process.bundles_ahead else 1
-        self._bundles = Bundles(process.setup.services[name].ports, self._span)
-        ((key, mark),) = process.participants.senders(step_key(self._span), [name]).items()
+        self._way = way(process.setup, name, process.name) if process.bundles_ahead else EACH_TICK
+        self._bundles = Bundles(self._way.ports(process.setup.services[name].ports), self._way.ticks)
+        ((key, mark),) = process.participants.senders(self._way.key, [name]).items()
         self._inbox = process.bus.inbox(key, mark)
         self._refilled = Refilled(self._inbox.get, lambda words: process.ask(HELD_KEY, name, words))
         self._needs = {(period, delay) for _, period, delay in taken}
-        self._delay = min(delay for _, delay in self._needs)
         self._newest = -1  # tick up to which bundles are taken
         self._known = 0  # tick before which nothing more is needed
 
@@ -56,7 +55,7 @@ class Source:
         while self._newest < needed:
             stamp = self._newest + 1
             while not self._bundles.due(stamp):
-                stamp += self._span
+                stamp += self._way.every
             due_ns = stamp * self._process.setup.interval_ns
             time_ns, payload = self._next(due_ns, needed)
             if not payload:
@@ -67,8 +66,8 @@ class Source:
                 self._bundles.unpack(payload, self._graph, stamp)
             except BundleError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
-            self._newest = stamp + self._span - 1
-        self._known = max(tick, self._newest + self._delay) + 1
+            self._newest = stamp + self._way.every - 1
+        self._known = min([(self._newest // period + 1) * period + delay for period, delay in self._needs])
         return self._known
 
     def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
@@ -101,10 +100,10 @@ def sources(process: Process, graph: Graph) -> list[Source]:
 
 
 @dataclass
-class _Way:
-    """Of bundles of so many ticks, to the consumers that take these."""
+class _Outlet:
+    """The bundles to the consumers that take them the same way."""
 
-    ticks: int
+    way: Way
     bundles: Bundles
     put: Callable[[bytes, int], None]
     given: int = 0  # tick before which all has gone
@@ -117,11 +116,12 @@ class Outlets:
         """Declare the publishers; the bundles are somebody else's where it does not hand over."""
         key_prefix, bus = process.key_prefix, process.bus
         self._process, self._service, self._graph = process, service, graph
-        self._ways = []
+        self._outlets = []
         if hands_over:
-            for ticks in spans(process.setup, service.name) if process.bundles_ahead else {1}:
-                put = bus.publisher(f"{key_prefix}/{step_key(ticks)}/{service.name}")
-                self._ways.append(_Way(ticks, Bundles(process.setup.services[service.name].ports, ticks), put))
+            for way in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
+                put = bus.publisher(f"{key_prefix}/{way.key}/{service.name}")
+                bundles = Bundles(way.ports(process.setup.services[service.name].ports), way.ticks)
+                self._outlets.append(_Outlet(way, bundles, put))
         self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
         self._puts = {topic: bus.publisher(key, drops=True) for topic, key in self._topics.items()}
@@ -141,22 +141,22 @@ class Outlets:
 
     def repeat(self, tick: int) -> None:
         """Go once more through a tick whose bundle was published; only those who have missed it will hear of it."""
-        for way in self._ways:
-            self._next(way)
+        for outlet in self._outlets:
+            self._next(outlet)
         if tick < self._handed:
             self._service.messages.clear()
         elif tick + 1 - self._handed >= PAGE:
             self._hand_over(tick + 1)
 
-    def _next(self, way: _Way) -> bytes:
+    def _next(self, outlet: _Outlet) -> bytes:
         """The next bundle, empty if there is none; it is in the journal and held before it is published."""
-        first = way.given
-        bundle = way.bundles.pack(self._graph, first) if way.bundles.due(first) else b""
+        first = outlet.given
+        bundle = outlet.bundles.pack(self._graph, first) if outlet.bundles.due(first) else b""
         if self._journal:
             self._journal.write(first, bundle)
         if self._held and bundle:
             self._held.add(bundle, first * self._interval_ns)
-        way.given += way.ticks
+        outlet.given += outlet.way.every
         return bundle
 
     def look(self) -> None:
@@ -165,10 +165,10 @@ class Outlets:
 
     def publish(self, first: int, stop: int) -> None:
         """Hand over what the graph gives at the ticks [first, stop)."""
-        for way in self._ways:
-            while (following := way.given + way.ticks) <= stop:
-                if bundle := self._next(way):
-                    way.put(bundle, (following - way.ticks) * self._interval_ns)
+        for outlet in self._outlets:
+            while (given := outlet.given) + outlet.way.ticks <= stop:
+                if bundle := self._next(outlet):
+                    outlet.put(bundle, given * self._interval_ns)
         if self._listened:
             for page in self._graph.pages(first, stop, self._listened, keep=True):
                 for at, payload in zip(page.ticks, page.payloads, strict=True):
@@ -196,6 +196,6 @@ class Outlets:
         time_ns = stop * self._interval_ns
         if self._held:
             self._held.add(b"", time_ns)
-        ways = [] if self._process.abandoned else [way.put for way in self._ways]
-        for put in (*ways, self._put_batch, *self._puts.values()):
+        bundles = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
+        for put in (*bundles, self._put_batch, *self._puts.values()):
             put(b"", time_ns)

@@ -20,7 +20,7 @@ from services.trajectory.following import FollowedPath
 from services.trajectory.piece import Parameters
 from services.trajectory.service import TrajectorySetup
 
-LEAD = 0.1  # [s] the references are ahead of the plant at the most
+LEAD = 0.2  # [s] the references are ahead of the plant at the most
 
 
 def resolve(scene: Scene) -> ServiceSetup | None:

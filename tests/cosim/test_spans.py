@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from cosim.errors import LockStepError
 from cosim.schedule import Input, Port
 from cosim.setup import ServiceSetup, Setup
-from cosim.spans import span, spans, step_key, ticks_at_once
+from cosim.spans import EACH_TICK, Way, ticks_at_once, way, ways
 from services.table import load, resolve
 
 LAST = 120  # [tick]
@@ -36,7 +36,7 @@ def end(setup):
     while moved and min(stepped.values()) <= LAST:
         moved = False
         for name, service in setup.services.items():
-            given = {i.port: stepped[i.port] // (n := span(setup, i.port, name)) * n for i in service.inputs}
+            given = {i.port: stepped[i.port] // (n := way(setup, i.port, name).ticks) * n for i in service.inputs}
             ready = stepped[name]
             while ready < stepped[name] + ticks_at_once(setup, name) and all(
                 newest_needed(setup, producer, name, ready) < there for producer, there in given.items()
@@ -70,10 +70,21 @@ def test_it_never_comes_to_a_stop(links):
 def test_only_who_runs_ahead_hands_over_several_ticks_at_once():
     setup = resolve(load("delivery_mission"))
     assert {name: ticks_at_once(setup, name) for name in setup.services} == {
-        "plant": 1, "sensors": 1, "autopilot": 1, "trajectory": 12,
+        "plant": 1, "sensors": 1, "autopilot": 1, "trajectory": 25,
     }  # fmt: skip
-    assert spans(setup, "plant") == {1, 12}
-    assert spans(setup, "trajectory") == {12}
-    assert spans(setup, "sensors") == spans(setup, "autopilot") == {1}
-    assert step_key(1) == "_step"
-    assert step_key(12) != step_key(6)
+    assert ways(setup, "plant") == {EACH_TICK, Way(25, 25), Way(1, 25)}
+    assert ways(setup, "trajectory") == {Way(25, 25)}
+    assert ways(setup, "sensors") == ways(setup, "autopilot") == {EACH_TICK}
+
+
+def test_every_way_has_a_key_of_its_own():
+    found = [EACH_TICK, Way(1, 2), Way(1, 25), Way(2, 2), Way(25, 25)]
+    assert EACH_TICK.key == "_step"
+    assert len({w.key for w in found}) == len(found)
+
+
+def test_the_battery_goes_to_the_autopilot_by_itself():
+    setup = resolve(load("delivery_mission"))
+    taken = way(setup, "plant", "autopilot")
+    assert [port.name for port in taken.ports(setup.services["plant"].ports)] == ["battery"]
+    assert way(setup, "plant", "sensors") == EACH_TICK
