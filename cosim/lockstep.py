@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import suppress
 
 from cosim import realtime
 from cosim.backlog import Backlog
@@ -167,7 +168,8 @@ def batch() -> None:
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_BATCH, os.sched_param(0))
+            with suppress(OSError):  # it has ended meanwhile, or a sandbox knows no classes
+                os.sched_setscheduler(int(thread), os.SCHED_BATCH, os.sched_param(0))
 
 
 def _pace(when: float) -> float:
