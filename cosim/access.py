@@ -59,7 +59,7 @@ def _reading(key: str) -> list[dict[str, Any]]:
 
 
 def _withheld(key_prefix: str) -> dict[str, Any]:
-    """Of the lock step a viewer is told nothing: its sender waits for all who read it, one who stops reading too."""
+    """Rule that keeps lock-step messages from viewers: a sender would wait for one that stops reading."""
     return _rule("withhold", ["put", "delete"], "egress", [f"{key_prefix}/_$*/**"]) | {"permission": "deny"}
 
 

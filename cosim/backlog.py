@@ -13,7 +13,7 @@ _PROGRESS = struct.Struct("<q?")  # tick before which all is recorded, whether t
 
 
 class Teller:
-    """Tells the others how far a log is."""
+    """Publishes, for the recorder of a run, how far its log is."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str, name: str):
         """Of the recorder `name`."""
@@ -21,17 +21,17 @@ class Teller:
         self._recorded = 0
 
     def recorded(self, tick: int) -> None:
-        """All before this tick is recorded."""
+        """Publish that all messages before this tick are in the log."""
         self._recorded = tick
         self._put(_PROGRESS.pack(tick, False), 0)
 
     def waiting(self) -> None:
-        """The disk is waited for."""
+        """Publish that the recorder waits for the disk."""
         self._put(_PROGRESS.pack(self._recorded, True), 0)
 
 
 def waits_for_disk(payload: bytes) -> bool:
-    """Whether this progress says that the disk is waited for."""
+    """Whether the recorder waits for the disk, by a payload that a `Teller` has published."""
     return _PROGRESS.unpack(payload)[1]
 
 

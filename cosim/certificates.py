@@ -3,9 +3,10 @@
 FOLDER/NAME/authority.pem     who is trusted
 FOLDER/NAME/certificate.pem   NAME as its common name
 FOLDER/NAME/key.pem           its private key, mode 0600
-FOLDER/NAME/zenoh.json5       the same as a Zenoh configuration, for programs of one's own
+FOLDER/NAME/zenoh.json5       all of it in a Zenoh configuration for programs of one's own, wherever it is taken; 0600
 """
 
+import base64
 import json
 import os
 import stat
@@ -17,6 +18,12 @@ from typing import Any
 
 AUTHORITY, CERTIFICATE, KEY, CONFIGURATION = "authority.pem", "certificate.pem", "key.pem", "zenoh.json5"
 _CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
+_LINKS = {
+    "enable_mtls": True,
+    # who is at the other end is told by the common name, at both ends (cosim.access), whatever its address
+    "verify_name_on_connect": False,
+    "close_link_on_expiration": True,
+}
 
 
 def make(folder: Path, names: Iterable[str], days: int) -> None:
@@ -52,10 +59,12 @@ def make(folder: Path, names: Iterable[str], days: int) -> None:
                     *("-addext", "extendedKeyUsage=serverAuth,clientAuth"),
                     *("-keyout", str(own / KEY), "-out", str(own / CERTIFICATE)),
                 )
-                (own / KEY).chmod(0o600)
                 (own / AUTHORITY).write_bytes(authority.read_bytes())
-                text = json.dumps({"mode": "client", "transport": {"link": {"tls": _tls(folder.absolute() / name)}}})
-                (own / CONFIGURATION).write_text(text + "\n")
+                (own / CONFIGURATION).write_text(json.dumps(_configuration(own)) + "\n")
+                for file in (AUTHORITY, CERTIFICATE):  # whatever the umask
+                    (own / file).chmod(0o644)
+                for file in (KEY, CONFIGURATION):
+                    (own / file).chmod(0o600)
             made.rename(folder)
     except OSError as error:
         raise ValueError(f"{folder}: cannot be made: {(error.strerror or str(error)).lower()}") from None
@@ -84,11 +93,19 @@ def _tls(own: Path) -> dict[str, Any]:
         "listen_certificate": certificate,
         "connect_private_key": key,
         "connect_certificate": certificate,
-        "enable_mtls": True,
-        # who is at the other end is told by the common name, at both ends (cosim.access), whatever its address
-        "verify_name_on_connect": False,
-        "close_link_on_expiration": True,
+        **_LINKS,
     }
+
+
+def _configuration(own: Path) -> dict[str, Any]:
+    """For a client: what the files hold instead of where they are."""
+    entries = {
+        "root_ca_certificate_base64": AUTHORITY,
+        "connect_private_key_base64": KEY,
+        "connect_certificate_base64": CERTIFICATE,
+    }
+    held = {entry: base64.b64encode((own / file).read_bytes()).decode() for entry, file in entries.items()}
+    return {"mode": "client", "transport": {"link": {"tls": {**held, **_LINKS}}}}
 
 
 def _openssl(*arguments: str) -> None:

@@ -12,26 +12,26 @@ MISSED, WORST = "missed_deadlines", "worst_lateness"  # keys of a log's metadata
 
 
 class Lateness(NamedTuple):
-    """Of one service in a run."""
+    """How often and by how much at most one service was late in a run."""
 
     ticks: int  # at which it was late
     worst: float  # [s], 0 where it never was
 
 
 class Deadlines:
-    """Counts them for one service."""
+    """Counts the ticks at which one service was late."""
 
     def __init__(self) -> None:
         self._ticks, self._worst = 0, 0.0
 
     def note(self, late: float) -> None:
-        """A tick that was done `late` [s] after its time; negative where it was early."""
+        """Count a tick that was done `late` seconds after its time; negative where it was early."""
         if late > 0.0:
             self._ticks += 1
             self._worst = max(self._worst, late)
 
     def told(self) -> str:
-        """As text, for `lateness`."""
+        """The counts as text, which `lateness` reads."""
         return json.dumps(Lateness(self._ticks, self._worst))
 
 

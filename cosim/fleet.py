@@ -17,8 +17,10 @@ from messages.topics import CLOCK, Topic, of_vehicle
 
 
 def within(vehicle: str, name: str) -> str:
-    """What a port or a part of a vehicle is called in its fleet; that of another vehicle has its whole name already,
-    after a slash: "/left/truth"."""
+    """Full name of a port or part of `vehicle` in a fleet.
+
+    A name with a leading slash is one of another vehicle and is already full: "/left/truth".
+    """
     return name[1:] if name.startswith("/") else f"{vehicle}/{name}"
 
 

@@ -34,6 +34,7 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
     """
     setup = process.setup
     graph = Graph(setup, [service], 2 * PAGE)
+    graph.advance(0)  # nothing is stepped, but the loop over the parts is compiled before the clock begins
     givers = sources(process, graph)
     outlets = Outlets(process, service, graph)
     backlog = Backlog(process, recorder) if owns_time else None

@@ -14,12 +14,12 @@ from cosim.keys import BATCH_KEY, ENCODER
 
 
 def new_secret() -> str:
-    """For one run."""
+    """A secret for one run, 64 hexadecimal digits, from which its participants derive their marks."""
     return secrets.token_hex(32)
 
 
 class Participants(NamedTuple):
-    """Those of one run."""
+    """The participants of one run: the marks by which their messages are known."""
 
     key_prefix: str
     secret: str = ""  # hexadecimal; "" where they share none

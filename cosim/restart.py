@@ -169,18 +169,18 @@ class Refilled:
 
 
 class Progress(NamedTuple):
-    """How far a log is, in ticks before which all is there."""
+    """How far a log is: all messages before these ticks are there."""
 
     handed: int  # of one service
     recorded: int  # of all
 
     def pack(self) -> bytes:
-        """For whoever asks."""
+        """The two ticks as bytes, which `unpack` reads."""
         return _PROGRESS.pack(*self)
 
     @classmethod
     def unpack(cls, answer: bytes) -> "Progress":
-        """What `pack` gave."""
+        """The progress in the bytes that `pack` has made."""
         return cls(*_PROGRESS.unpack(answer))
 
 

@@ -36,7 +36,7 @@ class Subscription:
         return found and found[1:]
 
     def get_with_key(self, timeout: float) -> tuple[str, int, bytes] | None:
-        """The same with the message's key in front."""
+        """Key, simulation time [ns] and payload of the next message, None after `timeout` seconds."""
         try:
             return self._arrived.get(timeout=timeout)
         except queue.Empty:

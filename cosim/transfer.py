@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from cosim.backlog import AHEAD
 from cosim.bundle import BundleError, Bundles, pack_batch
+from cosim.delivery import Delivery
 from cosim.errors import LockStepError
 from cosim.graph import Graph, Service
-from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY
-from cosim.process import POLL, Process
+from cosim.keys import BATCH_KEY, HANDED_KEY, HELD_KEY, WAITING_KEY
+from cosim.process import PATIENCE, POLL, Process
 from cosim.restart import Held, Progress, Refilled
 from cosim.schedule import due
 from cosim.spans import EACH_TICK, Way, way, ways
@@ -129,6 +130,8 @@ class Outlets:
         self._handed = 0  # tick before which all is handed over
         self._due = 0.0
         self._interval_ns = process.setup.interval_ns
+        bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
+        self._delivery = Delivery(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
         self._journal, self._held = process.journal, Held(HELD) if process.restarts else None
         if self._held:
             bus.answer(f"{key_prefix}/{HELD_KEY}/{service.name}", self._held.since)
@@ -165,18 +168,19 @@ class Outlets:
 
     def publish(self, first: int, stop: int) -> None:
         """Hand over what the graph gives at the ticks [first, stop)."""
-        for outlet in self._outlets:
-            while (given := outlet.given) + outlet.way.ticks <= stop:
-                if bundle := self._next(outlet):
-                    outlet.put(bundle, given * self._interval_ns)
-        if self._listened:
-            for page in self._graph.pages(first, stop, self._listened, keep=True):
-                for at, payload in zip(page.ticks, page.payloads, strict=True):
-                    self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
-        if stop - self._handed >= PAGE or time.monotonic() > self._due:
-            self._hand_over(stop)
-            self._process.tell_of_refused()
-            self.look()
+        with self._delivery:
+            for outlet in self._outlets:
+                while (given := outlet.given) + outlet.way.ticks <= stop:
+                    if bundle := self._next(outlet):
+                        outlet.put(bundle, given * self._interval_ns)
+            if self._listened:
+                for page in self._graph.pages(first, stop, self._listened, keep=True):
+                    for at, payload in zip(page.ticks, page.payloads, strict=True):
+                        self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
+            if stop - self._handed >= PAGE or time.monotonic() > self._due:
+                self._hand_over(stop)
+                self._process.tell_of_refused()
+                self.look()
 
     def _hand_over(self, stop: int) -> None:
         self._due = time.monotonic() + BATCH
@@ -191,6 +195,7 @@ class Outlets:
         Where who watches the run is gone, consumers are not told: they are to find that out, and not to take it for an
         end of the run.
         """
+        self._delivery.close()
         self._hand_over(stop)
         self._process.tell_of_refused()
         time_ns = stop * self._interval_ns

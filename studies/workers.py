@@ -3,20 +3,30 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
+
+# What clears away the semaphores of a process that was killed says so otherwise
+SILENT = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 
 @contextmanager
 def workers(number: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of processes that end with the block, at once where it ends with an error, and with this process."""
+    """A pool of processes that end with the block, at once where it ends with an error, and with this process.
+
+    Raises:
+        ValueError: they cannot talk to one another here.
+    """
     # spawned: a fork of a process with threads may hang, and would hold the other end of the pipe
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
-    with ours, ProcessPoolExecutor(number, context, _end_with, (theirs,)) as pool:
+    with ours, _pool(number, context, theirs) as pool:
         try:
             yield pool
         except BaseException:
@@ -24,6 +34,17 @@ def workers(number: int) -> Iterator[ProcessPoolExecutor]:
             raise
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _pool(number: int, context: SpawnContext, parent: Connection) -> ProcessPoolExecutor:
+    try:
+        sys.warnoptions.append(SILENT)
+        resource_tracker.ensure_running()
+        sys.warnoptions.remove(SILENT)
+        return ProcessPoolExecutor(number, context, _end_with, (parent,))
+    except OSError as fault:
+        reason = (fault.strerror or str(fault)).lower()
+        raise ValueError(f"worker processes need semaphores: {reason}; expected a /dev/shm to write to") from None
 
 
 def _end_with(parent: Connection) -> None:

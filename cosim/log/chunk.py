@@ -72,7 +72,7 @@ def rows(topic: WrittenTopic, times_ns: np.ndarray, payloads: np.ndarray, order:
 
 
 def rows_of(entries: list[tuple[WrittenTopic, int, bytes]]) -> list[Rows]:
-    """The same from single messages (topic, time [ns], payload), in their order."""
+    """Rows of single messages (topic, time [ns], payload), in their order: one `Rows` for each topic and size."""
     groups: dict[tuple[WrittenTopic, int], list[int]] = {}
     for k, (topic, _, payload) in enumerate(entries):
         groups.setdefault((topic, len(payload)), []).append(k)

@@ -10,7 +10,7 @@ RECOVERED = "recovered"  # key in the metadata: from which file, and what it lac
 
 
 class Recovered(NamedTuple):
-    """What was found."""
+    """What `recover` has saved of a damaged log."""
 
     messages: int
     end_ns: int  # time of the last message

@@ -65,7 +65,9 @@ def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: V
             found.append(override)
             continue
         if len(rest) < 2 or not rest[0].isdigit() or int(rest[0]) >= vehicles:
-            expected = f"{VEHICLE}.N.{'.'.join(rest[-1:]) or 'KEY'}, N from 0 to {vehicles - 1}"
+            known = {*vocabulary.sections, *vocabulary.sections[VEHICLE].model_fields}
+            which = len(rest) > 1 and rest[0] not in known
+            expected = f"{VEHICLE}.N.{'.'.join(rest[which:]) or 'KEY'}, N from 0 to {vehicles - 1}"
             raise SceneError(override.key, "which vehicle?", expected, Source(override=override.text))
         name, *inner = rest[1:]
         if int(rest[0]) == i:

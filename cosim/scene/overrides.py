@@ -13,7 +13,7 @@ Overrides = Iterable[str] | Mapping[str, Any]
 
 
 class Override(NamedTuple):
-    """One of them."""
+    """A key of a scene and the value that the user gives it: KEY=VALUE."""
 
     key: str
     value: Any

@@ -11,7 +11,7 @@ from rich.progress_bar import ProgressBar
 from cosim.graph import Graph
 from cosim.setup import Setup
 from cosim.single import PAGE
-from lapwing.runs.compiling import guessed, notice, told
+from lapwing.runs.compiling import Compilation, guessed, told
 from services.processes import create_all
 from studies import figures
 
@@ -33,7 +33,7 @@ def compile_ahead(setups: Mapping[str, Setup], console: Console) -> None:
         setups: by the name to print.
         console: a terminal has a bar, anything else a line before a scene is compiled.
     """
-    guesses = [guessed(setup) for setup in setups.values()]
+    guesses = [guessed(setup).seconds for setup in setups.values()]
     total, done = sum(guesses), 0.0
     columns = (_Bar(bar_width=24), TextColumn("of about {task.total:.0f} s  {task.description}", markup=False))
     bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
@@ -43,9 +43,9 @@ def compile_ahead(setups: Mapping[str, Setup], console: Console) -> None:
             if bar and task is not None:
                 bar.update(task, completed=done, description=name, began=time.monotonic(), guess=guess)
 
-            def say(seconds: float, name: str = name) -> None:
+            def say(what: Compilation) -> None:
                 if not bar:
-                    console.print(f"{name}: {notice(seconds)}", soft_wrap=True)
+                    console.print(what.notice, soft_wrap=True)
 
             started = time.perf_counter()
             with told(setup, say):

@@ -1,23 +1,39 @@
-"""The user is told when something compiles, and only then, with a guess of how long: as long as the last time."""
+"""The user is told when something compiles, and only then: what, and about how long, which is the longest so far."""
 
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from cosim.setup import Setup
 from dynamics.kernel import cache_folder, on_compile
 
-EACH = 12.0  # [s] a service takes to compile, on an idle core of 2020, where nothing is known of this machine
+EACH = 5.0  # [s] a service takes to compile, on an idle core of 2024, where nothing is known of this machine
 FILE = "compile_seconds.json"
 ONE = "one process"
 
 
-def notice(guess: float) -> str:
-    """What is said where there is no bar: about how long it takes [s]."""
-    return f"compiling kernels, about {guess:.0f} s (they are kept for later runs) ..."
+class Compilation(NamedTuple):
+    """Of the kernels of a run.
+
+    Attributes:
+        scene: its name.
+        services: that are compiled, as far as they are not kept.
+        seconds: about how long that takes.
+    """
+
+    scene: str
+    services: tuple[str, ...]
+    seconds: float
+
+    @property
+    def notice(self) -> str:
+        """What is said where there is no bar."""
+        about = f"about {self.seconds:.0f} s (kept for later runs)"
+        return f"{self.scene}: compiling kernels of {', '.join(self.services)}, {about} ..."
 
 
 class Stopwatch:
@@ -27,11 +43,10 @@ class Stopwatch:
     disk tells it of neither, and nothing is said.
     """
 
-    def __init__(self, mode: str, services: Iterable[str], say: Callable[[float], None]):
-        """`say` is called once with the guess [s], when something compiles."""
-        names = list(services)
-        self._key, self._say, self._started = _key(mode, names), say, 0.0
-        self._guess = _guess(mode, names)
+    def __init__(self, mode: str, setup: Setup, say: Callable[[Compilation], None]):
+        """`say` is called once, when something compiles."""
+        self._key, self._say, self._started = _key(mode, setup), say, 0.0
+        self._guess = guessed(setup, mode)
 
     def began(self) -> None:
         """Something compiles; said once."""
@@ -42,20 +57,21 @@ class Stopwatch:
     def ended(self) -> None:
         """Everything is compiled."""
         if self._started:
-            _keep({**_known(), self._key: round(time.monotonic() - self._started, 1)})
+            known, taken = _known(), round(time.monotonic() - self._started, 1)
+            _keep({**known, self._key: max(taken, known.get(self._key, 0.0))})
             self._started = 0.0
 
 
 @contextmanager
-def told(setup: Setup, say: Callable[[float], None], alone: bool = True) -> Iterator[None]:
-    """Say so once, with a guess [s], as soon as a kernel is compiled within the context for a run in this process.
+def told(setup: Setup, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
+    """Say so once, as soon as a kernel is compiled within the context for a run in this process.
 
     Args:
         setup: of the run.
         say: is told.
         alone: whether the context does nothing else, so that its time is the next guess.
     """
-    watch, waiting = Stopwatch(ONE, setup.services, say), True
+    watch, waiting = Stopwatch(ONE, setup, say), True
 
     def listener(_: str) -> None:
         if waiting:
@@ -70,17 +86,14 @@ def told(setup: Setup, say: Callable[[float], None], alone: bool = True) -> Iter
         waiting = False
 
 
-def guessed(setup: Setup) -> float:
-    """How long [s] the kernels of a run in one process compile, where none is kept."""
-    return _guess(ONE, list(setup.services))
+def guessed(setup: Setup, mode: str = ONE) -> Compilation:
+    """What a run compiles where none of its kernels is kept."""
+    seconds = _known().get(_key(mode, setup), EACH * len(setup.services))
+    return Compilation(setup.scene, tuple(setup.services), seconds)
 
 
-def _key(mode: str, names: list[str]) -> str:
-    return f"{mode}: {', '.join(names)}"
-
-
-def _guess(mode: str, names: list[str]) -> float:
-    return _known().get(_key(mode, names), EACH * len(names))
+def _key(mode: str, setup: Setup) -> str:
+    return f"{mode}: {setup.scene}: {', '.join(setup.services)}"
 
 
 def _file() -> Path | None:

@@ -65,23 +65,26 @@ def _follow(watch: Watch, clock: Clock, stop: Stop, names: set[str], live: Calla
             watch.last_news = time.monotonic()
             if time.monotonic() > deadline:
                 raise RunFailed(f"nobody answers as {', '.join(sorted(names - watch.present))}")
-        elif not watch.ended and watch.gone & names and not _ends(watch):
+        elif not watch.ended and watch.gone & names and not _comes(watch, lambda: watch.ended, GRACE):
             raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
         elif watch.began is None and time.monotonic() < deadline:
             watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
         elif culprit := watch.frozen(names):
             raise RunFailed(culprit)
+    # After a cut, links come back one after another; whoever says how it ended stays until it is heard
+    others = names - {processes.RECORDER}
+    _comes(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
     live(watch)
     if early := watch.broken_off():
         raise RunFailed(early)
 
 
-def _ends(watch: Watch) -> bool:
-    """Whether the news of the end arrives now, by other links than the news that somebody has gone."""
-    deadline = time.monotonic() + GRACE
-    while not watch.ended and time.monotonic() < deadline:
+def _comes(watch: Watch, news: Callable[[], bool], seconds: float) -> bool:
+    """Whether some news arrives within so many seconds, by other links than the news that somebody has gone."""
+    deadline = time.monotonic() + seconds
+    while not news() and time.monotonic() < deadline:
         watch.poll(0.2)
-    return watch.ended
+    return news()
 
 
 def parse_peers(text: str) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
+from lapwing.runs.compiling import Compilation
+
 
 class Elapsed(NamedTuple):
     """How long a run took."""
@@ -21,8 +23,8 @@ class Observer(Protocol):
         """The run is at `time_ns`; the newest payloads of the pose and status topics."""
         ...
 
-    def compiling(self, guess: float) -> None:
-        """Kernels are being compiled, which ends with `begin`, in about so many seconds."""
+    def compiling(self, what: Compilation) -> None:
+        """Kernels are being compiled, which ends with `begin`."""
         ...
 
     def say(self, line: str) -> None:
@@ -39,7 +41,7 @@ class Silent:
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
         """Say nothing."""
 
-    def compiling(self, guess: float) -> None:
+    def compiling(self, what: Compilation) -> None:
         """Say nothing."""
 
     def say(self, line: str) -> None:

@@ -104,7 +104,7 @@ class Clock:
     def __init__(self, observer: Observer, setup: Setup):
         self._observer, self._began, self._slow_disk = observer, False, False
         self._pose, self._status = leading(setup, POSE), leading(setup, STATUS)
-        self._compiling = Stopwatch("processes", setup.services, observer.compiling)
+        self._compiling = Stopwatch("processes", setup, observer.compiling)
         self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
 
     def observe(self, watch: Watch) -> bool:
@@ -132,8 +132,3 @@ def shared_core(setup: Setup) -> int | None:
         return None
     cores = sorted(os.sched_getaffinity(0))
     return cores[os.getpid() % len(cores)]
-
-
-def recorder_log(path: Path) -> str:
-    """A log's path for another process, whose working directory may be another."""
-    return str(path.absolute())

@@ -152,6 +152,12 @@ def test_topics_of_a_vehicle_of_a_fleet():
 
 WRONG = {
     "vehicle.7.name=x": "--set vehicle.7.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
+    "vehicle.left.start=[0,0]": (
+        "--set vehicle.left.start=[0,0]: which vehicle? expected vehicle.N.start, N from 0 to 2"
+    ),
+    "vehicle.left.airframe.mass.total=3": (
+        "--set vehicle.left.airframe.mass.total=3: which vehicle? expected vehicle.N.airframe.mass.total, N from 0 to 2"
+    ),
     "vehicle.name=x": "--set vehicle.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
     "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share it; expected a table [run] of the scene",
     "vehicle.1.name=left": "--set vehicle.1.name: left is also that of vehicle.0; expected another",

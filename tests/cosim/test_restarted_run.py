@@ -30,18 +30,18 @@ def restarted(names):
 
 
 @pytest.mark.parametrize(
-    ("victims", "number"),
+    ("victims", "number", "named"),
     [
-        (["plant"], signal.SIGKILL),
-        (["autopilot"], signal.SIGKILL),
-        (["trajectory"], signal.SIGKILL),
-        (["plant", "autopilot", "trajectory"], signal.SIGKILL),
-        (["autopilot"], signal.SIGSTOP),
+        (["plant"], signal.SIGKILL, ["plant"]),
+        (["autopilot"], signal.SIGKILL, ["autopilot"]),
+        (["trajectory"], signal.SIGKILL, True),
+        (["plant", "autopilot", "trajectory"], signal.SIGKILL, True),
+        (["autopilot"], signal.SIGSTOP, ["autopilot"]),
     ],
 )
-def test_a_service_that_is_killed_in_flight_takes_its_place_again(started, tmp_path, victims, number):  # noqa: F811
+def test_a_service_that_is_killed_in_flight_takes_its_place_again(started, tmp_path, victims, number, named):  # noqa: F811
     alone = single(tmp_path, *SHORT)
-    run = started("test-restart", *sets(restarted(victims)))
+    run = started("test-restart", *sets(restarted(named)))
     for name in victims:
         os.kill(run.children[name], number)
     assert run.end() == (0, "")

@@ -48,6 +48,7 @@ def measured(pid, seconds=1.5):
     return waited(pid) - before
 
 
+@pytest.mark.long
 def test_a_starved_process_waits_and_one_that_is_stopped_or_sleeps_does_not(start):
     core = min(os.sched_getaffinity(0))
     for _ in range(2):

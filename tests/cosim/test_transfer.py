@@ -92,6 +92,7 @@ def exchanged(inputs):
         given_rows.advance(tick + 1)
         outlets.publish(tick, tick + 1)
     counts = {key: len(found) for key, found in bus.messages.items() if "_step" in key}
+    outlets.end(LAST + 1)
     tick = 0
     while tick <= LAST:
         known = source.take(tick)

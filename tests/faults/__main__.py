@@ -31,7 +31,7 @@ def main() -> None:
             counts[trial.kind, not outcome.wrong] += 1
             longest[trial.kind] = max(longest.get(trial.kind, 0.0), outcome.seconds)
             words = "; ".join(outcome.wrong) or "ok"
-            where = f"{trial.seed:6d} {trial.scene:18s} {trial.kind:14s} {outcome.victim:10s} {trial.delay:4.1f} s"
+            where = f"{trial.seed:6d} {trial.scene:18s} {trial.kind:15s} {outcome.victim:10s} {trial.delay:4.1f} s"
             print(f"{where}  exit code {outcome.code:3d} after {outcome.seconds:4.1f} s  {words}", flush=True)
     for kind in sorted(longest):
         right, wrong = counts[kind, True], counts[kind, False]

@@ -1,11 +1,13 @@
 """A few of the runs with faults; `python -m tests.faults` has as many as one likes."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from tests.faults import cut
+from tests.faults import after, campaign, cut
 from tests.faults.trial import Trial, draw, fly
 from tests.hosts.network import why_not
 
@@ -20,6 +22,9 @@ FEW = {
     "interrupted while it starts": Trial(0, "gyrostat_attitude", "Ctrl-C", 1.0, 0.4),
     "interrupted while it compiles": Trial(1, "gyrostat_attitude", "Ctrl-C", 1.0, 3.0),
     "whoever watches is cut off for good, with much unsent": Trial(4042, "delivery_mission", "cut off", 0.99, 1.7),
+    "a worker of a campaign is killed": Trial(0, "hover", "campaign worker", 0.7, 4.0),
+    "a campaign is interrupted while it compiles": Trial(1, "hover", "campaign Ctrl-C", 0.9, 6.0),
+    "a campaign is killed while it compiles": Trial(1, "hover", "campaign kill", 0.0, 5.0),
     "the disk is full": Trial(0, "hover", "full disk", 0.0, 3.0),
 }
 
@@ -39,3 +44,28 @@ def test_a_fault_has_the_end_that_it_should(trial):
 def test_a_seed_makes_the_same_trial():
     assert draw(7) == draw(7)
     assert len({draw(seed).kind for seed in range(40)}) >= 4
+    assert draw(7, [campaign.KILL]).scene == "hover"
+
+
+def test_what_is_left_of_a_trial_is_found(tmp_path):
+    """A process of it, the port at which it listens, and a lock that it has taken."""
+    (tmp_path / "cache" / after.LOCKS).mkdir(parents=True)
+    lock = tmp_path / "cache" / after.LOCKS / "kernel"
+    with subprocess.Popen([sys.executable, "-c", HOLDS, lock], stdout=subprocess.PIPE, text=True) as holder:
+        port = holder.stdout.readline().strip()
+        taken = after.ports(after.of_trial(tmp_path))
+        assert list(taken.values()) == [f"tcp port {port}"]
+        there = after.left(tmp_path, taken, tmp_path / "cache", 0.0)
+        holder.kill()
+    assert there[0].startswith(f"process {holder.pid} ")
+    assert there[1:] == [f"tcp port {port} stays taken"]  # the lock's holder is there, and named by its number
+    assert after.left(tmp_path, taken, tmp_path / "cache", 10.0) == []
+
+
+HOLDS = """
+import fcntl, socket, sys, time
+with open(sys.argv[1], "w") as lock, socket.create_server(("127.0.0.1", 0)) as server:
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    print(server.getsockname()[1], flush=True)
+    time.sleep(600)
+"""

@@ -19,7 +19,7 @@ import studies.fly
 from cosim.log import LogReader
 from services.processes import needed
 from services.table import load, resolve
-from tests.faults import cut
+from tests.faults import after, campaign, cut
 from tests.faults.kinds import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
 from tests.participants import participants
 
@@ -56,13 +56,14 @@ class Outcome(NamedTuple):
 
 
 def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
-    """The trial of a seed, of one of these kinds."""
+    """The trial of a seed, of one of these kinds; None: of those that a seed has drawn from ever since."""
     chance = random.Random(seed)
     every = [*KINDS, *cut.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
     kind = chance.choice(kinds or every)
-    launcher = kind != FULL and kind not in RESTARTED and chance.random() < 0.2
+    launcher = kind not in (FULL, *RESTARTED, *campaign.KINDS) and chance.random() < 0.2
     place = 1.0 if kind == INTERRUPT or launcher else chance.random()
-    return Trial(seed, chance.choice(sorted(SCENES)), kind, place, chance.uniform(0.2, LATEST))
+    scenes = ["hover"] if kind in campaign.KINDS else sorted(SCENES)
+    return Trial(seed, chance.choice(scenes), kind, place, chance.uniform(0.2, LATEST))
 
 
 def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
@@ -74,7 +75,11 @@ def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
     try:
         if trial.kind in cut.KINDS:
             victim = cut.HOSTS[min(int(trial.place * len(cut.HOSTS)), len(cut.HOSTS) - 1)]
-            return Outcome(victim, *cut.fly(victim, trial.kind, trial.delay / 2, folder))
+            code, said, seconds, wrong = cut.fly(victim, trial.kind, trial.delay / 2, folder)
+            return Outcome(victim, code, said, seconds, wrong + after.left(folder, {}, None, timeout))
+        if trial.kind in campaign.KINDS:
+            cold = trial.seed % 2 == 1
+            return Outcome(*campaign.fly(trial.kind, trial.place, trial.delay, cold, folder, timeout))
         if full:
             subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", disk], check=True)
         return _fly(trial, folder, disk / "log.mcap", timeout)
@@ -110,6 +115,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
             names = [name for name in names if name in undisturbed(trial.scene).services]
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
         late = launcher.poll() is not None
+        taken = after.ports(after.of_trial(folder))
         if trial.kind == FULL:
             victim = "recorder"
             _fill(log.with_name("filler"))
@@ -132,6 +138,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
         for name in left:
             with suppress(ProcessLookupError):
                 os.kill(children[name], signal.SIGKILL)
+        wrong += after.left(folder, taken, Path(cold["LAPWING_CACHE"]) if cold else None, timeout)
         said.seek(0)
         text = said.read()
     code = launcher.returncode

@@ -1,0 +1,129 @@
+"""A campaign that is struck: how it ends, and whether the same command goes on to the table of an undisturbed one."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.faults import after
+
+KILL, WORKER, INTERRUPT = "campaign kill", "campaign worker", "campaign Ctrl-C"
+COMMAND = ["campaign", "hover", "--runs", "40", "--set", "run.duration=2", "--workers", "2"]
+SHARE = {KILL: 0.7, WORKER: 0.25, INTERRUPT: 0.7}  # of the delay of a trial, after the start, or that of the workers
+ROOT = Path(__file__).parents[2]
+LONGEST = 600.0  # [s] for a whole campaign, all kernels compiled
+
+
+def _killed(code: int, said: str) -> bool:
+    return (code, said) == (-signal.SIGKILL, "")
+
+
+def _lost(code: int, said: str) -> bool:
+    line = r"lapwing: a worker process has ended before its time.*; the same command goes on where it stopped\n"
+    return code == 1 and re.fullmatch(line, said) is not None
+
+
+def _interrupted(code: int, said: str) -> bool:
+    return (code, said) == (130, "lapwing: ended by SIGINT\n")
+
+
+KINDS: dict[str, Callable[[int, str], bool]] = {KILL: _killed, WORKER: _lost, INTERRUPT: _interrupted}
+
+
+def fly(
+    kind: str, place: float, delay: float, cold: bool, folder: Path, timeout: float
+) -> tuple[str, int, str, float, list[str]]:
+    """Strike a campaign; victim, exit code and words, the seconds until the last process has ended, what was wrong.
+
+    Args:
+        kind: of `KINDS`.
+        place: which worker, in [0, 1]; of Ctrl-C below 0.5 the command alone, else all, as of a terminal.
+        delay: [s].
+        cold: nothing is compiled yet.
+        folder: for all that it writes.
+        timeout: [s] for its end.
+    """
+    own, out = folder / "tmp", folder / "out"
+    own.mkdir()
+    kernels = folder / "cache" if cold else None
+    environment = {**os.environ, "TMPDIR": str(own), **({"LAPWING_CACHE": str(kernels)} if kernels else {})}
+    command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", str(out)]
+    with (folder / "said").open("w+") as said:
+        begun = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=said, env=environment, cwd=ROOT, start_new_session=True
+        )
+        while kind == WORKER and begun.poll() is None and not _workers(folder):
+            time.sleep(0.02)
+        time.sleep(SHARE[kind] * delay)
+        workers = _workers(folder)
+        victim = "worker" if kind == WORKER else "all" if kind == INTERRUPT and place >= 0.5 else "command"
+        over = begun.poll() is not None
+        taken = after.ports(after.of_trial(folder))
+        struck = time.monotonic()
+        with suppress(ProcessLookupError):
+            if victim == "worker" and workers:
+                os.kill(workers[min(int(place * len(workers)), len(workers) - 1)], signal.SIGKILL)
+            elif victim == "all":
+                os.killpg(begun.pid, signal.SIGINT)
+            elif victim == "command" and not over:
+                os.kill(begun.pid, signal.SIGINT if kind == INTERRUPT else signal.SIGKILL)
+        wrong = []
+        try:
+            begun.wait(timeout)
+        except subprocess.TimeoutExpired:
+            wrong.append(f"the command has not ended after {timeout:g} s")
+            begun.kill()
+            begun.wait()
+        wrong += after.left(folder, taken, kernels, timeout)
+        seconds = time.monotonic() - struck
+        for process in after.of_trial(folder):
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        said.seek(0)
+        code, text = begun.returncode, said.read()
+    if not KINDS[kind](code, text) and (code, text) != (0, ""):
+        wrong.append(f"exit code {code}: {text!r}")
+    if kind != KILL and (found := [path.name for place in (own, out) for path in place.glob("*/.*")]):
+        wrong.append(f"left behind: {', '.join(found)}")
+    return victim, code, text.strip(), seconds, wrong + _goes_on(command, environment, out)
+
+
+def _goes_on(command: list[str], environment: dict[str, str], out: Path) -> list[str]:
+    """What is wrong with the same command afterwards."""
+    again = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=LONGEST)
+    if (again.returncode, again.stderr) != (0, ""):
+        return [f"does not go on: exit code {again.returncode}: {again.stderr!r}"]
+    found, wanted = _digest(again.stdout), undisturbed()
+    return [] if found == wanted else [f"digest {found} when it has gone on, expected {wanted}"]
+
+
+@cache
+def undisturbed() -> str:
+    """The digest of a campaign to which nothing is done."""
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", f"{folder}/out"]
+        flown = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST)
+        return _digest(flown.stdout)
+
+
+def _digest(said: str) -> str:
+    found = re.search(r"^digest +([0-9a-f]{32})$", said, re.MULTILINE)
+    assert found, said
+    return found[1]
+
+
+def _workers(folder: Path) -> list[int]:
+    """The numbers of a campaign's worker processes."""
+    found = []
+    for process in sorted(after.of_trial(folder)):
+        with suppress(OSError):
+            if b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes():
+                found.append(process)
+    return found
