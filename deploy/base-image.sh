@@ -11,7 +11,7 @@ set -eu
 TAG=${1:-lapwing-base:bookworm}
 RELEASE=bookworm
 KEYRING=/usr/share/keyrings/debian-archive-keyring.gpg
-PACKAGES="usr-is-merged python3 python3-venv python3-pip ca-certificates passwd"
+PACKAGES="usr-is-merged python3 python3-venv python3-pip ca-certificates openssl passwd"
 
 fail() { echo "base-image: $*" >&2; exit 1; }
 for tool in apt-get dpkg-deb docker tar; do command -v "$tool" >/dev/null || fail "needs $tool"; done

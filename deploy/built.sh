@@ -7,7 +7,7 @@ for name in pyproject.toml README.md scenes messages dynamics cosim services stu
 done
 mkdir -p /image/app/recordings "/image$LAPWING_CACHE"
 chmod 777 /image/app/recordings
-cp /build/deploy/entrypoint.sh /image/opt/lapwing/bin/
+cp /build/deploy/entrypoint.sh /build/deploy/keys.sh /image/opt/lapwing/bin/
 if [ -d /build/build/kernels ]; then cp -rp /build/build/kernels/. "/image$LAPWING_CACHE/"; fi
 
 # Seen from here where they are in the images.

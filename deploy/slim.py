@@ -16,7 +16,7 @@ PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
 # language of tracebacks.
 MODULES = {
     "pymavlink/dialects/v*": {"__init__", "all"},
-    "pygments/lexers": {"__init__", "_mapping", "python", "special"},
+    "pygments/lexers": {"__init__", "_mapping", "diff", "python", "special"},
 }
 ELF64_LITTLE = b"\x7fELF\x02\x01"
 PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_Phdr

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from cosim.access import VIEWER
 from cosim.certificates import make
 from cosim.watch import WATCHER
 from lapwing.runs.joined import parse_peers
@@ -59,20 +60,24 @@ def test_every_service_has_a_known_command_and_needs_only_what_is_there():
     for name, service in services.items():
         assert set(service.get("depends_on", ())) <= set(services), name
         if command := service.get("command"):
+            if entrypoint := service.get("entrypoint"):
+                assert (ROOT / "deploy" / entrypoint[0]).exists()
+                continue
             assert command[0] == "lapwing" or command[:2] == ["python", "-m"]
             assert command[1] in ("run", "service", "replay", "campaign", "-m")
 
 
 def test_a_profile_starts_all_that_it_needs_and_nothing_else():
     services = compose()
+    assert "profiles" not in services.pop("keys")  # docker-compose 1.29 finds what others need only so
     for name, service in services.items():
         assert service["profiles"], name  # one without starts with every profile
-        for needed in service.get("depends_on", ()):
+        for needed in {*service.get("depends_on", ())} - {"keys"}:
             assert set(service["profiles"]) <= set(services[needed]["profiles"]), f"{name} needs {needed}"
     profiles = ("cluster", "mission", "groundstation", "view")
     of = {p: {n for n, s in services.items() if p in s["profiles"]} for p in profiles}
     assert of["cluster"] == {"scheduler", "worker", "campaign"}
-    assert of["mission"] == {"mission", *services["mission"]["depends_on"]}
+    assert of["mission"] | {"keys"} == {"mission", *services["mission"]["depends_on"]}
     assert of["groundstation"] == {*of["mission"], "groundstation"}
     assert of["view"] == {*of["mission"], "foxglove"}
 
@@ -84,14 +89,47 @@ def test_every_image_is_a_stage_of_the_dockerfile():
     assert images == {("lapwing" if t == "runtime" else f"lapwing-{t}", t) for _, t in images}
 
 
-def test_with_certificates_every_service_is_given_its_own_and_no_other():
-    keyed = yaml.safe_load((ROOT / "docker-compose.keys.yml").read_text())["services"]
-    base = compose()
-    assert set(keyed) == {name for name, service in base.items() if "--peers" in service.get("command", ())}
-    for name, service in keyed.items():
-        command = base[name]["command"]
-        participant = command[2] if command[1] == "service" else name
-        assert service["volumes"] == [f"./keys/{participant}:/app/keys/{participant}:ro"]
+def own_certificates(services):
+    """The participant whose certificate each service that takes part in a flight needs."""
+    taking_part = {name: service["command"] for name, service in services.items() if "--peers" in service["command"]}
+    return {name: command[2] if command[1] == "service" else name for name, command in taking_part.items()}
+
+
+def mounted(service):
+    """Where what a service is given of certificates comes from, and goes to."""
+    return [volume for volume in service.get("volumes", ()) if "keys" in volume]
+
+
+def test_every_container_is_given_its_own_certificate_and_no_other():
+    services = compose()
+    services.pop("tests")
+    keys, own = services.pop("keys"), own_certificates(services)
+    for name, service in services.items():
+        expected = [f"keys-{own[name]}:/app/keys/{own[name]}:ro"] if name in own else []
+        assert mounted(service) == expected, name
+        made = service.get("depends_on", {})
+        assert (name in own) == ("keys" in made), name
+        assert name not in own or made["keys"] == {"condition": "service_completed_successfully"}
+    assert sorted(mounted(keys)) == sorted(f"keys-{each}:/app/keys/{each}" for each in (*own.values(), VIEWER))
+    assert keys["network_mode"] == "none"
+    assert set(keys["command"]) == {own[name] for name in own if services[name].get("user") == "root"}
+    declared = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["volumes"]
+    assert set(declared) == {volume.partition(":")[0] for volume in mounted(keys)}
+
+
+def test_links_between_containers_are_certified_unless_that_is_asked_for():
+    services, opened = compose(), compose(SCHEME="tcp", LINKS="--insecure")
+    for name in own_certificates({name: each for name, each in services.items() if "command" in each}):
+        command, insecure = services[name]["command"], opened[name]["command"]
+        k = command.index("--peers") + 1
+        assert command[k + 1] == "--keys=keys"
+        assert {endpoint.partition("/")[0] for endpoint in parse_peers(command[k]).values()} == {"tls"}
+        # of what nobody but this host reaches: MAVLink's ports, and Foxglove's
+        assert ("--insecure" in command) == (name in ("groundstation", "foxglove"))
+        if "--open" in command:
+            assert command[command.index("--open") + 1].startswith("tls/")
+        assert insecure[k + 1] == "--insecure"
+        assert {endpoint.partition("/")[0] for endpoint in parse_peers(insecure[k]).values()} == {"tcp"}
 
 
 def test_containers_are_closed():
@@ -99,11 +137,13 @@ def test_containers_are_closed():
         assert service["cap_drop"] == ["ALL"], name
         assert service["security_opt"] == ["no-new-privileges:true"], name
         assert all(port.startswith("127.0.0.1:") for port in service.get("ports", ())), name
-        assert not {"privileged", "network_mode"} & {*service}, name
+        assert "privileged" not in service, name
+        assert service.get("network_mode", "none") == "none", name
         assert service["read_only"], name
         assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
-        # who starts as root has what is needed to become another, and no more (deploy/entrypoint.sh)
+        # who starts as root has what it takes to become another, or to give to others (deploy/entrypoint.sh, keys.sh)
         added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder", "campaign") else []
+        added = ["CHOWN"] if name == "keys" else added
         assert service.get("cap_add", []) == added, name
         assert ("user" in service) == bool(added), name
 
@@ -112,7 +152,7 @@ def endpoints():
     """The names in the table of participants, and who is started by `docker compose up mission`."""
     mission = compose()["mission"]
     table = mission["command"][mission["command"].index("--peers") + 1]
-    return parse_peers(table), {"mission", *mission["depends_on"]}
+    return parse_peers(table), {"mission", *mission["depends_on"]} - {"keys"}
 
 
 @pytest.mark.parametrize("scene", sorted(Path("scenes").glob("*.toml")), ids=lambda path: path.stem)
@@ -165,7 +205,7 @@ def flying(services, name, folder, *more):
 
     running = {}
     with ended_after(30) as processes:
-        for each in [*services[name]["depends_on"], name]:
+        for each in [*({*services[name]["depends_on"]} - {"keys"}), name]:
             command = [sys.executable, "-m", "lapwing", *map(here, services[each]["command"][1:]), *more]
             with (folder / f"{each}.txt").open("w") as said:
                 running[each] = subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
@@ -177,7 +217,7 @@ def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(t
     pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
     keys = tmp_path / "keys"
     make(keys, security.names(), 1)
-    services = compose(SCENE="scenes/hover.toml", SPEED="1", SCHEME="tls", LINKS=f"--keys={keys}")
+    services = compose(SCENE="scenes/hover.toml", SPEED="1", LINKS=f"--keys={keys}")
     with flying(services, "foxglove", tmp_path, "--set", "run.duration=6") as (running, ports):
         client = patient(ports["0.0.0.0:8765"], running["foxglove"])
         client.subscribe("/drone1/truth", "/drone1/events")
@@ -192,7 +232,7 @@ def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(t
 
 
 def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
-    services = compose()
+    services = compose(SCHEME="tcp", LINKS="--insecure")
     with flying(services, "groundstation", tmp_path) as (_, ports):
         port = ports["0.0.0.0:5760"]
         station = None
