@@ -120,6 +120,6 @@ def end_state(flight: Flight) -> str:
 
 
 def joint_end_state(flights: Sequence[Flight]) -> str:
-    """That of a flight; of the flights of several vehicles a digest of theirs."""
+    """Digest of the end of one flight, as of `end_state`; of several vehicles one digest over those of all."""
     states = [end_state(flight) for flight in flights]
     return states[0] if len(states) == 1 else hashlib.blake2b("".join(states).encode(), digest_size=8).hexdigest()

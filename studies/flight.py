@@ -11,9 +11,7 @@ from cosim.fleet import members
 from cosim.graph import Graph
 from cosim.log import LogReader
 from cosim.provenance import DIVERGED, FAILURE, RESTARTS
-from cosim.setup import Setup
 from messages import TYPES
-from messages.digest import Digest
 from messages.topics import (
     ACTUATORS,
     BODIES,
@@ -26,10 +24,10 @@ from messages.topics import (
     TRUTH,
     Topic,
     of_all,
-    topic_named,
 )
 from studies import tracking
 from studies.events import Event, events, ordered, restarts, slack
+from studies.flight_topics import FlightTopics
 from studies.origin import Origin
 from studies.port_columns import columns_of
 from studies.topic_view import TopicView
@@ -42,7 +40,7 @@ IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle i
 SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which verdict, events, figures and report are made
 
 
-class Flight:
+class Flight(FlightTopics):
     """What was said in a flight, topic by topic, and what that comes to.
 
     `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
@@ -58,8 +56,8 @@ class Flight:
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
         """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
-        self.origin, self.vehicle, self.failure, self.diverged = origin, origin.vehicle, failure, diverged
-        self._topics = dict(topics)
+        super().__init__(topics, origin)
+        self.failure, self.diverged = failure, diverged
         self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
         self.others: tuple[Flight, ...] = ()
 
@@ -153,85 +151,6 @@ class Flight:
         said = str(self.verdict) if len(self.truth) else "nothing was flown"
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {said}>"
 
-    @property
-    def setup(self) -> Setup:
-        """What was flown.
-
-        Raises:
-            ValueError: the log carries no set-up, or one that this version cannot read.
-        """
-        return self.origin.setup
-
-    @property
-    def metadata(self) -> dict[str, str]:
-        """What the log says about its making: scene, seed, mode, version, digest and more."""
-        return self.origin.metadata
-
-    @cached_property
-    def digest(self) -> str:
-        """Digest over the deterministic messages: as the log states it ("": it has no end), or of the topics here."""
-        if self.origin.recorded:
-            return self.metadata.get("digest", "")
-        digest = Digest()
-        for name in self.topics:
-            topic = topic_of(name)
-            if topic.recorded and topic.deterministic:
-                for time_ns, payload in self.topic(name).payloads():
-                    digest.update(topic.key(self.vehicle), time_ns, payload)
-        return digest.hexdigest()
-
-    @property
-    def truth(self) -> TopicView:
-        """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
-        return self.topic("truth")
-
-    @property
-    def setpoint(self) -> TopicView:
-        """Where the vehicle ought to be, as the autopilot follows it: position, velocity, acceleration, yaw, phase."""
-        return self.topic("setpoint")
-
-    @property
-    def actuators(self) -> TopicView:
-        """What the autopilot commands: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
-        return self.topic("actuators")
-
-    @property
-    def estimate(self) -> TopicView:
-        """What the estimator tells, and its standard deviations: position, position_std, velocity, ..."""
-        return self.topic("estimate")
-
-    @property
-    def status(self) -> TopicView:
-        """What the autopilot is doing: phase, armed, landed, finished, warnings."""
-        return self.topic("status")
-
-    @property
-    def topics(self) -> list[str]:
-        """The names of all topics."""
-        return sorted(self._topics)
-
-    def topic(self, name: str) -> TopicView:
-        """A topic by its name without the vehicle's, for example "gps/fix".
-
-        Raises:
-            ValueError: it is not there; names those that are.
-        """
-        if name not in self._topics:
-            raise ValueError(f"{self.origin.source}: has no topic {name}; it has {', '.join(self.topics)}")
-        return self._topics[name]
-
-    def has(self, topic: str) -> bool:
-        """Whether there is this topic."""
-        return topic in self._topics
-
-    def times(self, topic: str) -> np.ndarray:
-        """Simulation times of a topic [s], shape (n,)."""
-        return self.topic(topic).times
-
-    def column(self, topic: str, field: str) -> np.ndarray:
-        """A field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
-        return self.topic(topic)[field]
-
     @cached_property
     def reference(self) -> np.ndarray:
         """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "truth", shape (n, 6).
@@ -324,19 +243,6 @@ class Flight:
         """Whether the mission has ended on the ground: as the autopilot says, and upright, slow and in contact."""
         return self.verdict.kind == "landed"
 
-    def to_dataframe(self, topic: str = "truth") -> Any:
-        """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
-        view = self.topic(topic)
-        return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
-
 
 def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
     """Of the names in a log those of the topics that are wanted."""
@@ -351,14 +257,6 @@ def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]
     found = [name.split("/")[1] for name in topics if name.endswith("/truth")]
     said = metadata.get("vehicle", "").split(", ")
     return sorted(found, key=lambda name: said.index(name) if name in said else len(said))
-
-
-def topic_of(name: str) -> Topic:
-    """The topic whose name without the vehicle's is given; ValueError if there is none."""
-    try:
-        return topic_named(f"{{vehicle}}/{name}")
-    except ValueError:
-        return topic_named(name)
 
 
 def _short(topic: Topic) -> str:

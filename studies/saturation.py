@@ -29,11 +29,11 @@ class Saturation(NamedTuple):
 
     @property
     def lasted(self) -> float:
-        """In all [s]."""
+        """Time in all at which a motor is at a limit [s]."""
         return float(self.step[self.any].sum())
 
     def share(self, seconds: float) -> float:
-        """Of the time in the air."""
+        """A time [s] as a share of the time in the air."""
         return seconds / max(float(self.step[self.flying].sum()), 1e-9)
 
 

@@ -11,7 +11,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.errors import fail, user_errors
 from lapwing.cli.files import check_writable
-from lapwing.cli.links import check_links, check_ros2, mavlink_options
+from lapwing.cli.links import check_links, check_published, check_ros2, mavlink_options
 from lapwing.cli.options import (
     FoxgloveAddress,
     Insecure,
@@ -85,6 +85,7 @@ def replay(
     from cosim.interrupt import Stop
     from cosim.key_prefix import check_key_prefix
     from lapwing.cli.keyboard import Keyboard
+    from services.foxglove.server import check_address
     from services.replay.pace import Pace
     from services.replay.player import play
     from services.replay.schedule import Cut
@@ -97,7 +98,10 @@ def replay(
         if record and record.resolve() == log.resolve():
             raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
         check_writable(record)
-        check_links(mavlink, mavlink_key, insecure and ros2_router is None)
+        check_published("--listen", listen, insecure)
+        check_links(mavlink, mavlink_key)
+        if foxglove is not None:
+            check_address(foxglove, insecure)
         router = check_ros2(ros2, ros2_router, insecure)
         with ExitStack() as stack:
             hubs: dict[str, Hub] = {}
@@ -117,7 +121,7 @@ def replay(
             if foxglove is not None:
                 from services.foxglove.server import Server
 
-                viewers.append(stack.enter_context(Server(foxglove)))
+                viewers.append(stack.enter_context(Server(foxglove, insecure)))
             if ros2 is not None:
                 from services.ros2.node import Node
 

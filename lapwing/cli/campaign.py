@@ -77,6 +77,10 @@ def campaign(
             raise ValueError(f"--workers {workers}: expected at least 1")
         if until_ci is not None and not 0.0 < until_ci < 1.0:
             raise ValueError(f"--until-ci {until_ci:g}: expected a probability between 0 and 1, for example 0.01")
+        if until_ci is not None and shard is not None:
+            raise ValueError("--until-ci: a part does not know how the others end; expected without --shard")
+        if cluster is not None and workers is not None:
+            raise ValueError("--workers: a cluster has its own; expected without --cluster")
         check_distinct({"SCENE": scene, "--sweep": sweep, "--json": json, "--report": report})
         check_writable(json)
         check_report("--report", report)
@@ -96,7 +100,7 @@ def campaign(
         about = manifest(given, first)
         folder = begin(out or default_path(about), given, about)
         part = _part(shard, len(folder.shards))
-        _fly(screen, folder, first, _workers(cluster, workers, folder), until_ci, part)
+        _fly(screen, folder, first, _workers(screen, cluster, workers, folder), until_ci, part)
         if shard is not None and folder.missing():
             screen.print(f"{folder.path}: part {shard} is done; {len(folder.missing())} shards are still missing")
             return
@@ -130,11 +134,11 @@ def compare(
 
 
 def _reference(screen: "Console", given: "Plan") -> "Reference":
-    from lapwing.runs.compiling import notice, told
+    from lapwing.runs.compiling import told
     from studies.campaign.runs import first_setup, reference
 
     run, setup = first_setup(given)
-    with told(setup, lambda guess: screen.print(notice(guess))):
+    with told(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
         return reference(run, setup)
 
 
@@ -150,13 +154,13 @@ def _part(shard: str | None, shards: int) -> range | None:
     return range(int(i) - 1, shards, int(n))
 
 
-def _workers(cluster: str | None, count: int | None, folder: "Folder") -> "Workers":
+def _workers(screen: "Console", cluster: str | None, count: int | None, folder: "Folder") -> "Workers":
     from studies.campaign import local
 
     if cluster is not None:
         from studies.campaign.cluster import dask
 
-        return dask(cluster)
+        return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
     number = min(count or local.cores(), len(folder.missing()))
     return local.here if number <= 1 else local.processes(number)
 

@@ -85,7 +85,7 @@ def check_writable(path: Path | None) -> None:
 
 
 def check_plot(path: Path | None) -> None:
-    """Refuse two options that name the same file."""
+    """Refuse a picture that is no .png, .svg or .pdf, or cannot be written."""
     if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"--plot {path}: expected a name that ends in .png, .svg or .pdf")
     check_writable(path)

@@ -19,6 +19,18 @@ def check_endpoints(option: str, endpoints: Iterable[str], keys: Path | None, in
             raise ValueError(f"{option} {endpoint}: anybody could join there: {expected}")
 
 
+def check_published(option: str, endpoint: str, insecure: bool) -> None:
+    """Refuse a Zenoh endpoint that other machines reach, and at which nobody proves who he is, unless asked for."""
+    from lapwing.runs.joined import check_endpoint
+    from services.foxglove.server import is_loopback
+
+    check_endpoint(option, endpoint)
+    kind, _, address = endpoint.partition("/")
+    if kind != "unixsock-stream" and not is_loopback(address.rpartition(":")[0].strip("[]")) and not insecure:
+        expected = "expected an address of this machine alone, tcp/127.0.0.1:7447, or --insecure"
+        raise ValueError(f"{option} {endpoint}: anybody could listen there: {expected}")
+
+
 def check_external(texts: Iterable[str], insecure: bool) -> None:
     """Refuse programs of the user's own at endpoints where another could stand in their place, unless asked for."""
     for text in texts:
@@ -27,11 +39,11 @@ def check_external(texts: Iterable[str], insecure: bool) -> None:
             raise ValueError(f"--external {text}: whoever listens there first is taken for the program: {expected}")
 
 
-def check_links(urls: list[str] | None, key: Path | None, insecure: bool) -> None:
-    """Refuse MAVLink links that cannot be, before anything is started for them."""
+def check_links(urls: list[str] | None, key: Path | None) -> None:
+    """Refuse MAVLink links that cannot be, and a file of a passphrase for none, before anything is started for them."""
     if not urls:
-        if key or insecure:
-            raise ValueError(f"{'--mavlink-key' if key else '--insecure'}: expected with --mavlink URL")
+        if key:
+            raise ValueError("--mavlink-key: expected with --mavlink URL")
         return
     from services.mavlink.channel import read_key
     from services.mavlink.links import check

@@ -1,7 +1,7 @@
 """What there is to fly, whether it is valid, what it is tuned to, what a log shows; and kernels compiled ahead."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -68,14 +68,25 @@ def warm(
         list[Path] | None, typer.Argument(metavar="[SCENE|FOLDER]...", help="[delivery_mission]; of a folder all")
     ] = None,
 ) -> None:
-    """Compile what scenes need, so that their first run starts at once."""
+    """Compile what scenes need, so that their first run starts at once; of several the sound ones."""
     from lapwing.runs.ahead import compile_ahead
     from services.table import resolve
     from studies.terminal import console
 
     with user_errors():
         paths = [each for given in scenes or [Path("delivery_mission")] for each in _scenes_of(given)]
-        compile_ahead({str(path): resolve(decided(path, [])) for path in paths}, console())
+        sound: dict[str, Any] = {}
+        faults: list[ValueError] = []
+        for path in paths:
+            try:
+                sound[str(path)] = resolve(decided(path, []))
+            except ValueError as fault:
+                faults.append(fault)
+        compile_ahead(sound, console())
+        for other in faults[:-1]:
+            typer.echo(f"lapwing: {other}", err=True)
+        if faults:
+            raise faults[-1]
 
 
 def _scenes_of(path: Path) -> list[Path]:

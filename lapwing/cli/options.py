@@ -30,7 +30,10 @@ MavlinkKey = Annotated[
 ]
 Insecure = Annotated[
     bool,
-    typer.Option("--insecure", help="links whose other end proves nothing: unsigned MAVLink, Zenoh without --keys"),
+    typer.Option(
+        "--insecure",
+        help="links whose other end proves nothing: unsigned MAVLink, Zenoh without --keys, viewers elsewhere",
+    ),
 ]
 Keys = Annotated[
     Path | None, typer.Option(metavar="FOLDER", help="certificates of `lapwing keys`, for endpoints tls/HOST:PORT")

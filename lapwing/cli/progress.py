@@ -7,7 +7,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.progress_bar import ProgressBar
 from rich.text import Text
 
-from lapwing.runs.compiling import notice
+from lapwing.runs.compiling import Compilation
 from messages import PoseStamped, Status
 
 NEARLY = 0.97  # of a guess that was too low, where the bar waits
@@ -77,12 +77,13 @@ class Display:
         if self._bar:
             self._bar.reset(self._task, total=self._duration, description="", guess=None)
 
-    def compiling(self, guess: float) -> None:
-        """Kernels are being compiled, in about `guess` seconds."""
+    def compiling(self, what: Compilation) -> None:
+        """Kernels are being compiled."""
         if self._bar:
-            self._bar.reset(self._task, total=self._duration, description="compiling kernels, once", guess=guess)
+            said = f"compiling {what.scene}, once"
+            self._bar.reset(self._task, total=self._duration, description=said, guess=what.seconds)
         else:
-            self.say(notice(guess))
+            self.say(what.notice)
 
     def say(self, line: str) -> None:
         """Print a line."""

@@ -106,11 +106,11 @@ def run(
         if keys and not opened:
             raise ValueError("--keys: expected with --open or --peers")
         check_external(external or [], insecure)
-        check_links(mavlink, mavlink_key, insecure and not (opened or external) and ros2_router is None)
+        check_links(mavlink, mavlink_key)
         if foxglove is not None:
-            from services.foxglove.server import parse_address
+            from services.foxglove.server import check_address
 
-            parse_address(foxglove)
+            check_address(foxglove, insecure)
         set_ = [
             *(set_ or []),
             *(plans.overrides(plan, scene, set_ or []) if plan else ["autopilot.operator=true"] if mavlink else []),
@@ -188,8 +188,11 @@ def run(
             from studies.campaign import again
 
             there = again.end_state_of(run_, campaign)
-            same = "the same end, to the bit" if there == joint_end_state(flights) else "ends in another state"
-            typer.echo(f"run {run_} of {campaign}: {same if there else 'it has not been flown there yet'}")
+            which, same = f"run {run_} of {campaign}", there == joint_end_state(flights)
+            if there and not same and not set_:
+                fail(f"{which}: ends in another state than there", FLIGHT_FAILED)
+            ended = "the same end, to the bit" if same else "ends in another state, with --set"
+            typer.echo(f"{which}: {ended if there else 'it has not been flown there yet'}")
         for flown, flier in zip(flights, loaded.vehicles or (loaded,), strict=False):
             if unmet := flier[Success].unmet(figures(flown)):
                 of = f" of {flown.vehicle}" if loaded.vehicles else ""

@@ -52,6 +52,7 @@ def service(
     from cosim.key_prefix import check_key_prefix
     from lapwing.runs.joined import elsewhere, parse_peers
     from services import processes
+    from services.foxglove.server import check_address
     from services.participant import Participation, take_part
     from services.table import resolve
 
@@ -65,12 +66,14 @@ def service(
         check_endpoints("--open", open_ or [], keys, insecure)
         if name == processes.RECORDER and log is None:
             raise ValueError("--log: the recorder needs the name of its log")
-        if name == processes.FOXGLOVE and foxglove is None:
-            raise ValueError("--foxglove: the service needs an address to listen on, HOST:PORT")
+        if name == processes.FOXGLOVE:
+            if foxglove is None:
+                raise ValueError("--foxglove: the service needs an address to listen on, HOST:PORT")
+            check_address(foxglove, insecure)
         if name == processes.ROS2 and ros2 is None:
             raise ValueError("--ros2: the service needs a domain, ROS_DOMAIN_ID of the nodes")
         if name == processes.MAVLINK:
-            check_links(mavlink, mavlink_key, insecure and bool(mavlink))
+            check_links(mavlink, mavlink_key)
         loaded = decided(scene, [*(set_ or []), *plans.overrides(plan or [], scene, set_ or [])])
         setup = resolve(loaded, plans.commands(plan or [], loaded))
         if entry.lock_step and entry.name not in setup.services:

@@ -8,6 +8,9 @@ def main() -> None:
 
         try:
             end_at_once()
+            from lapwing.cli.standard_files import open_closed
+
+            open_closed()
             from lapwing.cli.main import main as carry_out
 
             carry_out()

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from cosim.scene import Scene
+    from lapwing.runs.compiling import Compilation
 
 
 def _study(
@@ -59,8 +60,8 @@ def _compiling(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator
     from lapwing.runs.compiling import told
     from services.table import resolve
 
-    def say(guess: float) -> None:
-        progress.update(task, description=f"compiling, about {guess:.0f} s, then flying")
+    def say(what: "Compilation") -> None:
+        progress.update(task, description=f"compiling, about {what.seconds:.0f} s, then flying")
 
     with told(resolve(scene), say, alone=False):
         yield

@@ -23,7 +23,7 @@ SLOW = 3.0  # [s] after which the user is told why
 
 
 class Study(NamedTuple):
-    """What was found of a target."""
+    """What `lapwing accuracy` has found of a target: a system by name, or a scene."""
 
     target: str
     problem: Problem
@@ -34,7 +34,7 @@ class Study(NamedTuple):
 
 
 def console() -> Console:
-    """Where it is shown."""
+    """The terminal, or a page of fixed width where the output goes elsewhere."""
     return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 

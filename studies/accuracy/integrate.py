@@ -36,13 +36,13 @@ def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, row
 # kernels of this file, so that their cache names no class but those of systems that every user of the study can import
 @kernel
 def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
-    """`record` from time 0."""
+    """March from time 0 in steps of h, each `every`-th state into a row of `out`; returns how many rows are finite."""
     return record(method, p, 0.0, x, h, every, out)
 
 
 @kernel
 def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
-    """`adapt`."""
+    """Write the states at `times` into the rows of `out`, by steps under error control; how it ended, as of `adapt`."""
     return adapt(p, x, times, tolerance, out)
 
 

@@ -13,8 +13,10 @@ from cosim.launcher import RunFailed
 PATIENCE = 10.0  # [s] for the scheduler to answer
 
 
-def dask(address: str) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
-    """The workers of the scheduler at an address, tcp://host:8786.
+def dask(
+    address: str, say: Callable[[str], None] = lambda line: None
+) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
+    """The workers of the scheduler at an address, tcp://host:8786; a line is said while there are none.
 
     Raises:
         ValueError: Dask is not installed, or nobody answers at this address.
@@ -33,6 +35,8 @@ def dask(address: str) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterat
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
         with client:
+            if not client.nthreads():
+                say(f"{address}: no worker has joined the scheduler yet; the campaign waits for one")
             futures = {client.submit(call, *task, pure=False): place for place, task in enumerate(tasks)}
             try:
                 for future in as_completed(list(futures), loop=client.loop):

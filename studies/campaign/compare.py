@@ -14,6 +14,8 @@ from studies.campaign.results import Results
 from studies.campaign.statistics import Interval, interval, paired
 from studies.figures import FIGURES
 
+COMPARED = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a campaign's manifest
+
 
 class Difference(NamedTuple):
     """A figure in both campaigns, and by how much the second has more of it."""
@@ -33,6 +35,9 @@ class Comparison(NamedTuple):
     """Two campaigns, paired."""
 
     names: tuple[str, str]
+    differing: list[
+        str
+    ]  # in what the campaigns differ: entries of their plans, and keys that pairs have drawn otherwise
     pairs: int
     left_out: int  # runs that only one has, or that one refuses
     failures: tuple[Interval, Interval]
@@ -66,7 +71,10 @@ def compare(one: Path, other: Path) -> Comparison:
     failures = interval(int(count - good.sum()), count), interval(int(count - better.sum()), count)
     worse, mended = int(((good == 1) & (better == 0)).sum()), int(((good == 0) & (better == 1)).sum())
     total = len(set(_pairs(a)) | set(_pairs(b)))
-    return Comparison((str(one), str(other)), count, total - count, failures, mended, worse, differences)
+    keys = [key for key in a.folder.plan.keys if key in b.folder.plan.keys]
+    drawn = [f"{key} (drawn otherwise)" for key in keys if not np.array_equal(a[key][at], b[key][of])]
+    differing = [name for name in COMPARED if a.folder.about[name] != b.folder.about[name]] + drawn
+    return Comparison((str(one), str(other)), differing, count, total - count, failures, mended, worse, differences)
 
 
 def _pairs(found: Results) -> list[tuple[int, int]]:
@@ -77,6 +85,7 @@ def show(console: Console, found: Comparison) -> None:
     """Print the comparison."""
     left_out = f", {found.left_out} left out that only one has flown" if found.left_out else ""
     console.print(f"{found.pairs} pairs of runs{left_out}", highlight=False)
+    console.print(f"the campaigns differ in: {', '.join(found.differing) or 'nothing'}", highlight=False)
     for name, p in zip(found.names, found.failures, strict=True):
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}", highlight=False)
     console.print(

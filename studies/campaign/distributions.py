@@ -1,7 +1,8 @@
 """How a key of a scene varies from run to run: distributions given by their quantile functions."""
 
-import math
 import re
+import sys
+import tomllib
 from collections.abc import Callable
 from inspect import signature
 from typing import Any, NamedTuple
@@ -64,10 +65,11 @@ def linspace(low: float, high: float, count: int) -> Distribution:
     """One of `count` values from low to high, equally far apart, each as likely.
 
     Raises:
-        ValueError: the count is no whole number above 0.
+        ValueError: the count is no whole number from 1 to 1 000 000.
     """
-    sound = isinstance(count, int) and count > 0
-    return _made("linspace", low, high, count, sound=sound, expected="a whole number of values as third argument")
+    sound = isinstance(count, int) and 0 < count <= MOST
+    expected = f"a whole number of values, up to {MOST}, as third argument"
+    return _made("linspace", low, high, count, sound=sound, expected=expected)
 
 
 def choice(*values: Any) -> Distribution:
@@ -91,6 +93,7 @@ _VALUES: dict[str, Callable[..., tuple]] = {
     "choice": lambda *values: values,
     "linspace": lambda low, high, count: tuple(np.linspace(low, high, count).tolist()),
 }
+MOST = 1_000_000  # values of a linspace
 _FORM = re.compile(r"(\w+)\s*\((.*)\)", re.DOTALL)
 _SPLIT = re.compile(r"""((?:"[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|[^,])+)(?:,|$)""")
 
@@ -104,7 +107,7 @@ def parse(text: str) -> Distribution:
     found = _FORM.fullmatch(text.strip())
     if not found or found[1] not in KINDS:
         raise ValueError(f"expected a distribution, {', '.join(KINDS)}: normal(10.4, 0.2), got {text!r}")
-    arguments = [value_of(part.strip()) for part in _SPLIT.findall(found[2])]
+    arguments = _arguments(found[2])
     try:
         return KINDS[found[1]](*arguments)
     except TypeError:
@@ -112,8 +115,16 @@ def parse(text: str) -> Distribution:
         raise ValueError(f"{found[1]}: got {found[2]!r}, expected {found[1]}({wanted}) with numbers") from None
 
 
+def _arguments(text: str) -> list[Any]:
+    """Values of TOML between commas, bare words among them. ValueError for anything else."""
+    try:
+        return tomllib.loads(f"values = [{text}]")["values"]
+    except tomllib.TOMLDecodeError:
+        return [value_of(part.strip()) for part in _SPLIT.findall(text)]
+
+
 def _made(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
-    if not sound or not all(map(math.isfinite, numbers)):
+    if not sound or not all(abs(number) <= sys.float_info.max for number in numbers):
         raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
     return Distribution(name, numbers)
 

@@ -2,6 +2,7 @@
 
 campaign.json      the plan, the scene's texts, versions; a campaign is its hash
 shards/00007.csv   the rows of one shard, written whole or not at all
+last_shard         where the table ends that `--until-ci` has ended; shards after it stay for a command without
 runs.parquet       all rows in their order (runs.csv without pyarrow)
 report.html
 """
@@ -28,6 +29,7 @@ from studies.campaign.plan import Plan
 from studies.campaign.runs import Reference, Row, columns, scene_of, sources, vehicles
 
 MANIFEST = "campaign.json"
+LAST = "last_shard"
 SHARDS = 32  # of a small campaign
 MOST = 250  # runs in a shard
 
@@ -64,9 +66,11 @@ class Folder:
         return table.read_csv(self._shard(shard), self.kinds)
 
     def pages(self) -> Iterator[list[Row]]:
-        """The rows of the runs in their order, a shard at a time, up to the first shard that is missing."""
+        """The rows of the runs in their order, a shard at a time, up to the first shard that is missing or the last of
+        the table."""
+        last = self._last()
         for shard in range(len(self.shards)):
-            if not self._shard(shard).exists():
+            if not self._shard(shard).exists() or (last is not None and shard > last):
                 return
             yield self.rows(shard)
 
@@ -74,10 +78,23 @@ class Folder:
         """The columns of the table, shape (n,) each."""
         return table.arrays(self.kinds, self.pages())
 
-    def end_after(self, shard: int) -> None:
-        """Forget the shards after this one: the campaign ends with it."""
-        for later in range(shard + 1, len(self.shards)):
-            self._shard(later).unlink(missing_ok=True)
+    def end_after(self, shard: int | None) -> None:
+        """The table ends with this shard, None: with the last; shards after it are kept, and left out.
+
+        Raises:
+            RunFailed: it cannot be written.
+        """
+        if shard is None:
+            (self.path / LAST).unlink(missing_ok=True)
+            return
+        with _kept(self.path / LAST) as file:
+            file.write_text(f"{shard}\n", encoding="utf-8")
+
+    def _last(self) -> int | None:
+        try:
+            return int((self.path / LAST).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
 
     def finish(self, csv: bool = False) -> str:
         """Write the table, with `csv` as CSV too; its digest, which no number, kind or order of workers changes.

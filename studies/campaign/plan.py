@@ -21,6 +21,7 @@ from studies.campaign.distributions import Distribution
 
 APART = 2**32  # seeds of two campaigns
 SEED = "run.seed"
+MOST = 10_000_000  # runs of a campaign
 
 
 class Plan(NamedTuple):
@@ -48,6 +49,11 @@ class Plan(NamedTuple):
     def seed_of(self, run: int) -> int:
         """The seed of all randomness within a run: 1, 2, ... of campaign 1; no two campaigns share one."""
         return (self.seed - 1) * APART + run + 1
+
+    def anywhere(self) -> "Plan":
+        """The same for workers whose working directory is another."""
+        path = Path(self.path)
+        return self._replace(path=str(path.absolute())) if path.is_file() else self
 
     def values(self, run: int) -> dict[str, Any]:
         """What a run draws, by key."""
@@ -100,8 +106,8 @@ def plan(
         raise ValueError("--design grid: expected a --vary with choice(...) or linspace(...)")
     if runs is None:
         runs = len(swept) or (points if design == "grid" else 100)
-    if runs < 1:
-        raise ValueError(f"--runs {runs}: expected at least 1")
+    if not 1 <= runs <= MOST:
+        raise ValueError(f"--runs {runs}: expected a number from 1 to {MOST}")
     if not 1 <= seed < 2**63 // APART:
         raise ValueError(f"--seed {seed}: expected a whole number from 1 to {2**63 // APART - 1}")
     return Plan(path, overrides, seed, runs, varied, swept, design)
@@ -166,10 +172,12 @@ def _read(path: Path) -> tuple[dict[str, Any], ...]:
         ValueError: it cannot be read, has no lines, or one of another length.
     """
     try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8")), skipinitialspace=True))
+        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")), skipinitialspace=True))
     except (OSError, UnicodeDecodeError) as fault:
         raise ValueError(f"--sweep {path}: cannot be read: {getattr(fault, 'strerror', None) or fault}") from None
     keys, *rows = [[cell.strip() for cell in line] for line in lines if line] or [[]]
+    if len(keys) == 1 and ";" in keys[0]:
+        raise ValueError(f"--sweep {path}: columns are separated by semicolons; expected commas")
     if not keys or not rows or len(set(keys)) != len(keys):
         raise ValueError(f"--sweep {path}: expected a line of keys, each once, and a line of values for each run")
     for number, row in enumerate(rows, 2):

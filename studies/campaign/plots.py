@@ -15,7 +15,7 @@ from studies.tracking import DEGREE
 
 ACROSS = 3  # panels beside each other
 BINS = 10  # of a parameter
-KEYS = 9  # parameters that are drawn
+KEYS = 9  # parameters that have a panel each
 MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
 PARALLEL = 300  # runs drawn as lines over all parameters
 LETTERS = 12  # of a line below an axis
@@ -118,7 +118,8 @@ def _touchdowns(found: Results) -> Plot:
 def success(found: Results) -> Plot:
     """Probability of success over each parameter."""
     panels, good = [], found["success"].astype(bool)
-    for k, key in enumerate(_parameters(found)):
+    keys, rest = _most(found)
+    for k, key in enumerate(keys):
         x, middles, groups = found.number(key), [], []
         for inside in _bins(x):
             middles.append(float(x[inside].mean()))
@@ -131,7 +132,8 @@ def success(found: Results) -> Plot:
         label = "probability of success" if k % ACROSS == 0 else ""
         place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS, "y_range": (-0.02, 1.02)}
         panels.append(Panel(marks, label, key, x_ticks=_texts(found, key), timed=False, **place))
-    return _grid(panels, "Share of successes among the runs of each part of a parameter's range, of equal counts.")
+    caption = "Share of successes among the runs of each part of a parameter's range, of equal counts."
+    return _grid(panels, caption + rest)
 
 
 def matters(found: Results) -> Plot:
@@ -178,7 +180,8 @@ def matters(found: Results) -> Plot:
 
 def parallel(found: Results) -> Plot:
     """Every run as a line over all parameters and what matters, each scaled to its range."""
-    names = [*_parameters(found), *(name for name in MATTERS if name in found.figures)]
+    keys, rest = _most(found)
+    names = [*keys, *(name for name in MATTERS if name in found.figures)]
     columns, ticks = [], []
     for name in names:
         values, (label, scale) = found.number(name), shown(name) if name in FIGURES else (name, 1.0)
@@ -196,7 +199,8 @@ def parallel(found: Results) -> Plot:
             x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
             marks.append(Line(x, broken.ravel(), name, colour, 0.7))
     panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
-    return Plot((panel,), f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures.", 4.2)
+    caption = f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures."
+    return Plot((panel,), caption + rest, 4.2)
 
 
 def _some(n: int, most: int) -> np.ndarray:
@@ -209,7 +213,24 @@ def _parameters(found: Results) -> list[str]:
     keys = [key for key in found.folder.plan.keys if len(np.unique(found[key])) > 1]
     if not keys:
         raise NotRecordedError("no parameter varies; --vary KEY=DISTRIBUTION lets one")
-    return keys[:KEYS]
+    return keys
+
+
+def _most(found: Results) -> tuple[list[str], str]:
+    """The parameters that go most with what matters, as many as have a panel, and a sentence about the others."""
+    keys = _parameters(found)
+    if len(keys) <= KEYS:
+        return keys, ""
+    aims = [found[name].astype(float) for name in ("success", *MATTERS) if name == "success" or name in found.figures]
+
+    def strength(key: str) -> float:
+        x = found.number(key)
+        every = (abs(rank_correlation(x[there], y[there]).value) for y in aims if (there := np.isfinite(y)).any())
+        return max((value for value in every if np.isfinite(value)), default=0.0)
+
+    chosen = set(sorted(keys, key=strength, reverse=True)[:KEYS])
+    left = [key for key in keys if key not in chosen]
+    return [key for key in keys if key in chosen], f" Left out, as they go least with it: {', '.join(left)}."
 
 
 def _bins(x: np.ndarray) -> Iterator[np.ndarray]:

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import math
 import platform
+import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
@@ -26,7 +27,8 @@ from studies.figures import FIGURES, check_success, figures, joint_end_state
 from studies.fly import fly_each
 
 REFUSED = "refused"  # the verdict on a run whose values the scene refuses
-TRIED = 16  # runs, of which the scene has to take one at least
+TRIED = 16  # first runs, of which the scene has to take one at least, or else of as many all over the campaign
+_FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # of an absolute path
 _OURS = ("cosim", "dynamics", "messages", "services", "studies")
 _NUMBERS_OF = ("llvmlite", "numba", "numpy", "scipy")
 
@@ -71,10 +73,11 @@ def first_setup(plan: Plan) -> tuple[int, Setup]:
     """The first run that the scene takes, and its set-up.
 
     Raises:
-        SceneError: the scene is not sound, or refuses what each of the first runs draws.
+        SceneError: the scene is not sound, or refuses what each of `TRIED` first runs draws and of as many others.
     """
     refusal = None
-    for run in range(min(plan.runs, TRIED)):
+    others = np.linspace(0, plan.runs - 1, TRIED, dtype=int).tolist()  # of a grid the first runs are much alike
+    for run in dict.fromkeys([*range(min(plan.runs, TRIED)), *others]):
         try:
             return run, setup_of(plan, run)
         except SceneError as error:
@@ -130,7 +133,7 @@ def _refusal(error: SceneError) -> str:
     source = error.source
     if source.path is not None:
         source = source._replace(path=Path(source.path.name))
-    return str(SceneError(error.key, error.message, error.expected, source))
+    return _FOLDER.sub("", str(SceneError(error.key, error.message, error.expected, source)))
 
 
 def _of_refused(names: tuple[str, ...]) -> Row:
@@ -201,6 +204,10 @@ _agreed: set[str] = set()  # end states of references that this process has flow
 def _check(plan: Plan, reference: Reference) -> None:
     """Refuse to fly where the first run goes another way than where the campaign was begun."""
     where = f"worker on {platform.node()}"
+    try:
+        scene_of(plan)
+    except SceneError as error:
+        raise ValueError(f"{where}: {error}") from None
     for name, wanted in reference.versions.items():
         if (found := versions().get(name)) != wanted:
             raise ValueError(f"{where}: has {name} {found}; the campaign was begun with {wanted}")

@@ -72,14 +72,19 @@ def campaign(
 
     Returns:
         What all runs of the table came to.
+
+    Raises:
+        RunFailed: what was flown cannot be written, or a worker is lost.
     """
+    folder.end_after(None)
     absent = set(folder.missing())
     missing = sorted(absent if part is None else absent.intersection(part))
     done = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in absent}
     total, ending = sum(done.values(), Count()), Ending(until)
     if not ending.reached(done):
         progress(total)
-        tasks = [(folder.plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
+        plan = folder.plan.anywhere()
+        tasks = [(plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
         results = workers(fly_runs, tasks)
         for place, rows in results:
             folder.write(missing[place], rows)

@@ -48,7 +48,8 @@ def read_csv(path: Path, kinds: Mapping[str, type]) -> list[dict[str, Any]]:
             {name: _value(cell, kind) for (name, kind), cell in zip(kinds.items(), line, strict=True)} for line in lines
         ]
     except (OSError, ValueError, csv.Error) as fault:
-        raise ValueError(f"{path}: is no table of this campaign: {fault}") from None
+        message = f"is no table of this campaign: {fault}; without this file its runs are flown again"
+        raise ValueError(f"{path}: {message}") from None
 
 
 def write_parquet(

@@ -12,7 +12,7 @@ LANE = 0.32  # [inch] of a timeline
 
 
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
-    """Both in one; a panel that only one has stays as it is, one that only the second has is not shown, and told."""
+    """Two plots in one; a panel of the first alone stays as it is, one of the second alone is named, not shown."""
     others = {_key(panel): panel for panel in second.panels}
     panels = []
     for panel in first.panels:

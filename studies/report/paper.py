@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
+from matplotlib.ticker import MaxNLocator
 
 from studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch, cube, lowest
 from studies.report.style import DPI, SHADE, WIDTH
@@ -36,6 +37,8 @@ _PARAMETERS: dict[Any, Any] = {
     "ytick.color": "#444444",
     "figure.facecolor": "white",
 }
+NUMBERS = 14  # along the width of a plot, of five digits each
+STEPS = (1, 2, 2.5, 5, 10)  # between them
 _DASHES: dict[str, Any] = {"solid": "-", "dash": (0, (4, 3)), "dot": (0, (1, 1.5)), "dashdot": (0, (6, 2, 1, 2))}
 _MARKERS = {"": "", "circle": "o", "open": "o", "square": "s"}
 
@@ -99,6 +102,8 @@ def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
     if panel.log_x:
         axes.set_xscale("log")
+    elif not panel.timed:
+        axes.xaxis.set_major_locator(MaxNLocator(NUMBERS // len(plot.widths), steps=STEPS))
     if panel.log_y:
         axes.set_yscale("log")
     else:

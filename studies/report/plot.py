@@ -104,7 +104,7 @@ def column(panels: Iterable[Panel], height: float = 1.7, **looks: object) -> dic
 
 
 def reference(x: np.ndarray, y: np.ndarray, hidden: bool = False, name: str = "reference") -> Line:
-    """How what was asked for is drawn."""
+    """The dashed line by which a reference is drawn; x and y have shape (n,)."""
     return Line(x, y, name, REFERENCE, 1.1, "dash", hidden=hidden)
 
 

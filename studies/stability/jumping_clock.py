@@ -13,7 +13,7 @@ VICTIM = "autopilot"
 
 
 def wall(seconds: float) -> int:
-    """What the wall clock is wrong by at that time [s]: an hour too late, an hour too early, in turn."""
+    """Error of the wall clock [s] at a time [s]: an hour too late, an hour too early, in turn."""
     return HOUR if int(seconds / OFTEN) % 2 else -HOUR
 
 

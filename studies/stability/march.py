@@ -27,7 +27,7 @@ def marched(method: str, p: Any, x: Any, duration: float, steps: int, samples: i
 
 
 def worst(values: np.ndarray) -> float:
-    """The largest size; NaN if any is."""
+    """The largest absolute value; NaN if any value is NaN, 0 of none."""
     return float(np.abs(values).max()) if len(values) else 0.0
 
 

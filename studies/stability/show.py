@@ -19,7 +19,7 @@ def figure(value: float) -> str:
 
 
 def verdict(passes: bool) -> str:
-    """As the issue tracker and the JSON have it."""
+    """How a row has done in one word, "pass" or "fail", as it is printed and as JSON has it."""
     return "pass" if passes else "fail"
 
 

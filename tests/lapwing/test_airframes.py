@@ -34,6 +34,7 @@ def test_it_flies_and_lands(scene):
     assert np.degrees(flight.rmse["yaw"]) < 1.0
 
 
+@pytest.mark.long
 def test_a_hexacopter_without_a_rotor_holds_height_and_heading():
     flight = lapwing.fly("hexacopter", {"effects.rotor_damage.time": 7.0, "run.duration": 10.0})
     after = flight.truth.times > 7.5

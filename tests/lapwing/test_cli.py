@@ -16,6 +16,7 @@ ROOT = Path.cwd()
 HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
 PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 
+OPEN = ("--peers", "foxglove=unixsock-stream/x")
 
 BAD = {
     "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
@@ -57,6 +58,10 @@ BAD = {
     "too few peers": ([HOVER, "--peers", PEERS, "--insecure"], "no endpoint for trajectory, recorder, mission"),
     "open door": ([HOVER, "--open", "tcp/0.0.0.0:1"], "--open tcp/0.0.0.0:1: anybody could join there: expected tls/"),
     "no keys": ([HOVER, "--open", "tls/0.0.0.0:1"], "expected --keys FOLDER with it; `lapwing keys FOLDER` makes one"),
+    "viewers": (
+        [HOVER, "--foxglove", "0.0.0.0:8799"],
+        "--foxglove 0.0.0.0:8799: anybody could look on there: expected",
+    ),
     "view alone": ([HOVER, "--mode", "single", "--view"], "--view: belongs to a run in processes"),
     "ROS 2 alone": ([HOVER, "--mode", "single", "--ros2", "0"], "--ros2: belongs to a run in processes"),
     "ROS 2 in a scene": (
@@ -100,6 +105,15 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["report", "none.mcap", "none.mcap"], "the second FILE none.mcap: is the same file as FILE; choose another"),
         (["run", "hover", "--report", "a.txt"], "--report a.txt: expected a name that ends in .html, .pdf or .png"),
         (["replay", "none.mcap"], "none.mcap"),
+        (["replay", "none.mcap", "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
+        (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999"], "tcp/0.0.0.0:7999: anybody could listen there: exp"),
+        (["replay", "none.mcap", "--listen", "tcp/[::]:7999"], "127.0.0.1:7447, or --insecure"),
+        (["replay", "none.mcap", "--listen", "tcp/[::1]:7999"], "none.mcap: cannot read the log"),
+        (["replay", "none.mcap", "--listen", "tcp/localhost:7999"], "none.mcap: cannot read the log"),
+        (["replay", "none.mcap", "--listen", "unixsock-stream/x"], "none.mcap: cannot read the log"),
+        (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999", "--insecure"], "none.mcap: cannot read the log"),
+        (["replay", "none.mcap", "--foxglove", "[::]:8799"], "--foxglove [::]:8799: anybody could look on there"),
+        (["service", "foxglove", HOVER, *OPEN, "--foxglove", "0.0.0.0:8765"], "anybody could look on there: expected"),
         (["service", "plnt", HOVER, "--peers", PEERS], "unknown service plnt; expected one of"),
         (["service", "sensors", HOVER, "--peers", PEERS], "no endpoint for sensors itself"),
         (["service", "plant", HOVER, "--peers", PEERS, "--key-prefix", "a b"], "--key-prefix a b: expected letters"),
@@ -205,6 +219,25 @@ def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
     assert result.returncode == 1
     assert "Traceback" not in result.stderr
     assert log.stat().st_size > 1000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_flight_in_processes_whose_standard_files_are_closed_is_flown(tmp_path, closed):
+    lapwing.fly(HOVER, {"run.duration": 0.1})
+    log, report = tmp_path / "log.mcap", tmp_path / "report.html"
+    words = f"-m lapwing run {HOVER} --set run.duration=1 --log {log} --report {report} {closed}"
+    result = subprocess.run(f"{sys.executable} {words}", shell=True, capture_output=True, text=True, check=False)
+    assert (result.returncode, "Traceback" in result.stderr) == (0, False)
+    assert log.exists()
+    assert report.exists()
+
+
+@pytest.mark.long
+def test_a_study_whose_output_is_closed_has_its_exit_code():
+    command = f"{sys.executable} -m lapwing stability exact_time"
+    result = subprocess.run(f"{command} >&-", shell=True, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 def test_whoever_stops_reading_ends_the_command_quietly():

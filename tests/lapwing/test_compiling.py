@@ -3,18 +3,21 @@
 import io
 import json
 import random
+from pathlib import Path
 
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
 from dynamics.kernel import kernel
+from lapwing.cli.main import app
 from lapwing.cli.progress import Display
 from lapwing.runs import ahead, compiling
 from lapwing.runs.ahead import compile_ahead
-from lapwing.runs.compiling import EACH, FILE, told
+from lapwing.runs.compiling import EACH, FILE, Compilation, told
 from services.table import load, resolve
 
-SERVICES = 3  # of the hover scene
+SERVICES = ("plant", "autopilot", "trajectory")  # of the hover scene
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +60,7 @@ def test_it_is_said_once_and_only_where_something_compiles(setup, folder):
     assert not (folder / FILE).exists()
     with told(setup, said.append):
         compile_something()
-    assert said == [EACH * SERVICES]
+    assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
 
 
 def test_the_guess_is_the_time_that_it_took_before(setup, folder):
@@ -69,7 +72,8 @@ def test_the_guess_is_the_time_that_it_took_before(setup, folder):
     said = []
     with told(setup, said.append):
         compile_something()
-    assert said == [81.5]
+    assert [what.seconds for what in said] == [81.5]
+    assert json.loads((folder / FILE).read_text()) == {key: 81.5}
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"a": []}'])
@@ -78,14 +82,17 @@ def test_a_damaged_memory_is_none(setup, folder, content):
     said = []
     with told(setup, said.append):
         compile_something()
-    assert said == [EACH * SERVICES]
+    assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
 
 
 def test_a_terminal_has_a_bar_and_anything_else_a_line():
-    for terminal, expected in ((True, "of about 40 s"), (False, "compiling kernels, about 40 s")):
+    for terminal, expected in (
+        (True, "of about 40 s"),
+        (False, "hover: compiling kernels of plant, sensors, about 40 s"),
+    ):
         console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
         with Display(console, 20.0) as display:
-            display.compiling(40.0)
+            display.compiling(Compilation("hover", ("plant", "sensors"), 40.0))
             if display._bar:
                 display._bar.refresh()
             said = console.file.getvalue()
@@ -100,5 +107,18 @@ def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monk
     compile_ahead({"one": setup, "two": setup}, console)
     said = console.file.getvalue()
     assert said.count("ready after") == 2
-    assert ("of about 72 s  " in said) == terminal
-    assert ("one: compiling kernels, about 36 s" in said) == (not terminal)
+    assert ("of about 30 s  " in said) == terminal
+    assert ("hover: compiling kernels of plant, autopilot, trajectory, about 15 s" in said) == (not terminal)
+
+
+def test_one_broken_scene_of_a_folder_stops_no_other(tmp_path, monkeypatch):
+    compiled = []
+    monkeypatch.setattr("lapwing.runs.ahead.compile_ahead", lambda setups, console: compiled.extend(setups))
+    for name in ("a", "c"):
+        (tmp_path / f"{name}.toml").write_text("[run")
+    (tmp_path / "b.toml").write_bytes(Path("scenes/hover.toml").read_bytes())
+    result = CliRunner().invoke(app, ["warm", str(tmp_path)])
+    assert (result.exit_code, compiled) == (2, [str(tmp_path / "b.toml")])
+    assert [line.partition(": not valid TOML")[0] for line in result.output.splitlines()] == [
+        f"lapwing: {tmp_path / name}.toml" for name in ("a", "c")
+    ]

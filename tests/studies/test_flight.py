@@ -1,7 +1,6 @@
 """One type for a flight, whether it was recorded or flown in memory."""
 
 import pickle
-import sys
 
 import made_up
 import numpy as np
@@ -18,7 +17,6 @@ from services.processes import create_all
 from services.table import load, resolve
 from studies.flight import Flight
 from studies.fly import fly
-from studies.topic_view import TopicView
 
 SCENE = "hover"
 TICKS = 500
@@ -79,29 +77,6 @@ def test_a_flight_goes_from_process_to_process(run):
     assert again.energy == found.energy
 
 
-def test_fields_are_attributes(in_memory):
-    truth, setpoint = in_memory.truth, in_memory.setpoint
-    n = TICKS + 1
-    assert (truth.position.shape, truth.orientation.shape, truth.attitude.shape) == ((n, 3), (n, 4), (n, 3))
-    assert np.array_equal(truth.position, in_memory.column("truth", "pose.position"))
-    assert np.array_equal(truth["pose.position.z"], truth.position[:, 2])
-    assert (setpoint.position.shape, setpoint.yaw.shape, truth.rotor_speed.shape) == ((n, 3), (n,), (n, 4))
-    assert setpoint.phase[0] == "climb"
-    assert {"velocity", "rotor_speed"} <= set(dir(truth))
-    assert truth.stamps == pytest.approx(truth.times)
-    with pytest.raises(AttributeError, match="no field speed"):
-        truth.speed  # noqa: B018
-    with pytest.raises(AttributeError, match="no field position"):
-        in_memory.status.position  # noqa: B018
-
-
-def test_poses_of_several_bodies():
-    pose = np.arange(2 * 3 * 7, dtype=float).reshape(2, 3, 7)
-    view = TopicView(np.arange(2), {"pose": pose})
-    assert np.array_equal(view.position, pose[:, :, :3])
-    assert np.array_equal(view.orientation, pose[:, :, 3:])
-
-
 def test_a_failure_is_told():
     found = fly(load("gyrostat_feedback", ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]))
     assert "not finite" in found.failure
@@ -141,20 +116,3 @@ def test_landed_needs_the_autopilots_word():
 def test_a_flight_lands(in_memory):
     assert not in_memory.landed  # two seconds are not enough
     assert fly(load(SCENE)).landed
-
-
-def test_dataframe_without_pandas(in_memory, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match=r"pandas is not installed; pip install lapwing\[dataframe\]"):
-        in_memory.to_dataframe()
-
-
-def test_dataframe_has_a_column_for_every_number(in_memory):
-    pytest.importorskip("pandas")
-    frame = in_memory.to_dataframe("truth")
-    assert len(frame) == TICKS + 1
-    assert frame.index.name == "time"
-    assert {"pose.position.x", "velocity.z", "rotor_speed.3", "ground_contact"} <= set(frame.columns)
-    assert np.array_equal(frame["rotor_speed.3"], in_memory.truth.rotor_speed[:, 3])
-    assert "pose.position" not in frame.columns
-    assert "phase" in in_memory.to_dataframe("setpoint").columns

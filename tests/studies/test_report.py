@@ -225,6 +225,7 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout.strip() == b"[]"
 
 
+@pytest.mark.long
 def test_the_same_plots_on_paper(log, page, tmp_path):
     pdf = write(Flight.read(log), tmp_path / "circle.pdf").read_bytes()
     assert pdf.startswith(b"%PDF")

@@ -1,5 +1,6 @@
 """Worker processes end with the process that they fly for, however that ends."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -8,6 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
+
+from studies.workers import workers
 
 pytestmark = pytest.mark.long
 
@@ -62,3 +65,13 @@ def test_workers_end_with_an_interrupted_or_killed_parent(tmp_path, number):
                 os.kill(pid, signal.SIGKILL)
         parent.stdout.close()
         parent.wait()
+
+
+def test_workers_that_cannot_be_had_are_refused_in_one_line(monkeypatch):
+    def fails(*_):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr("studies.workers.ProcessPoolExecutor", fails)
+    said = "worker processes need semaphores: read-only file system; expected a /dev/shm to write to"
+    with pytest.raises(ValueError, match=said), workers(2):
+        pass

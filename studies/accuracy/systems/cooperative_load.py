@@ -28,7 +28,7 @@ def _parameters(drive: LiftCommand) -> CooperativeLoadParameters:
 
 
 def problems() -> dict[str, Problem]:
-    """Two: with steady thrusts and moments, and without any."""
+    """The problems of this file: a carried load under steady thrusts and moments, and falling with the rotors off."""
     return {
         "cooperative_load": _problem("steady thrusts and moments", _parameters(PUSHED), {}),
         "cooperative_load_falling": _problem("rotors off", _parameters(OFF), {"energy": energy}),

@@ -80,7 +80,7 @@ def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, 
 
 
 def problems() -> dict[str, Problem]:
-    """One."""
+    """The problem of this file: the delivery drone, in the air and tumbling, as one rigid body and as five."""
     frame = load_airframe(AIRFRAME)
     gyro = effects.from_scene({"gyroscopic_torque": {}}, frame)
     volts = (SPEED * frame.motor.rotor_constant,) * 4

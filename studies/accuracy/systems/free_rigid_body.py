@@ -17,7 +17,7 @@ DURATION = 60.0  # [s]
 
 
 def problems() -> dict[str, Problem]:
-    """One: a body of three different moments, tumbling about its largest."""
+    """The problem of this file: a body of three different moments of inertia, tumbling."""
     problem = Problem(
         "free rigid body, three different moments of inertia",
         "s",

@@ -34,7 +34,7 @@ BLOCKED = SPINNING._replace(rotor_momentum=NONE)
 
 
 def problems() -> dict[str, Problem]:
-    """One for each case."""
+    """The problems of this file: a satellite with rotors blocked, spinning, under friction, and under feedback."""
     momentum = {"momentum": lambda t, y: total_momentum(SPINNING, t, y)}
     steady = {"energy": lambda t, y: energy(STEADY, t, y), "momentum": lambda t, y: total_momentum(STEADY, t, y)}
     free = {"energy": lambda t, y: energy(BLOCKED, t, y), "momentum": lambda t, y: total_momentum(BLOCKED, t, y)}

@@ -48,7 +48,7 @@ RATES[HeavyTopParameters] = rate
 
 
 def problems() -> dict[str, Problem]:
-    """One: spinning about its arm, nutating."""
+    """The problem of this file: a heavy top that spins about its arm and nutates."""
     p = HeavyTopParameters(INERTIA, (ARM, 0.0, 0.0), (0.0, 0.0, -MASS * GRAVITY))
     problem = Problem(
         "heavy top, spinning and nutating",

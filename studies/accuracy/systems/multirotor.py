@@ -27,7 +27,7 @@ RATES[MultirotorDrive] = rate
 
 
 def problems() -> dict[str, Problem]:
-    """One."""
+    """The problem of this file: the bare delivery drone, tumbling."""
     drive = bare_drive()
     problem = Problem(
         "delivery drone, bare and tumbling",

@@ -32,7 +32,7 @@ EXPERIMENTS_RPM = {
 
 
 def problems() -> dict[str, Problem]:
-    """One for each experiment."""
+    """The problems of this file, one for each experiment of the source."""
     return {f"os4_experiment_{number}": _problem(number, rpm) for number, rpm in EXPERIMENTS_RPM.items()}
 
 

@@ -38,7 +38,7 @@ SPRING = 1e5  # [N/m] of the naive way
 
 
 def start(name: str) -> tuple[Any, CooperativeLoadState]:
-    """(parameters, state) of one, thrown without thrust."""
+    """(parameters, state at the start) of one of `CASES`: thrown without thrust."""
     load, angles, rates = CASES[name]
     p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), LENGTH, load, G, OFF)
     swings = tuple(
@@ -130,7 +130,7 @@ def run() -> Found:
 
 
 def lost(values: np.ndarray) -> float:
-    """The largest that was still a number."""
+    """The largest of the values that are finite."""
     return float(np.nanmax(np.where(np.isfinite(values), values, np.nan)))
 
 

@@ -50,7 +50,7 @@ def gained(distance: float, rise: float, speed: float = SPEED, step: float = STE
 
 
 def naive_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """The same of a point mass on a height field: beyond the riser it is as deep as the step is high."""
+    """As `gained`, of a point mass on a height field: beyond the riser it is as deep as the step is high."""
     mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
     highest = 0.0
     for _ in range(round(1.0 / step)):
@@ -75,7 +75,7 @@ def lifted(share: float) -> float:
 
 
 def exact(share: float) -> float:
-    """By Newton's law: friction goes with what the rotors leave of the weight, until they lift it off."""
+    """Acceleration [m/s^2] as of `lifted`, by Newton's law: friction goes with what the rotors leave of the weight."""
     return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
 
 

@@ -49,7 +49,7 @@ def sliding(degrees: float) -> float:
 
 
 def energy(p: Any, m: Any) -> float:
-    """Kinetic and potential [J]."""
+    """Kinetic and potential energy [J] of a vehicle with parameters p and motion m."""
     spin = np.dot(p.body.inertia, np.square(m.omega_body))
     return float(
         p.body.mass * (G * m.position_world[2] + np.dot(m.velocity_world, m.velocity_world) / 2.0) + spin / 2.0

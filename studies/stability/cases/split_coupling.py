@@ -30,7 +30,7 @@ def together(steps: int) -> np.ndarray:
 
 @cache
 def apart(rate: int, coupling: str) -> np.ndarray:
-    """The same with plant and control as two that exchange at a rate [Hz]; rows of NaN after its numbers have ended."""
+    """As `together`, with plant and control in two processes that exchange at a rate [Hz]; NaN after the run's end."""
     slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "operator")]
     interval = 1.0 / rate
     solver = f"solver.step={interval / round(interval / STEP)!r}"

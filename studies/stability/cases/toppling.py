@@ -39,7 +39,7 @@ def edge(axis: int) -> float:
 
 
 def unit(axis: int) -> tuple[float, float, float]:
-    """The axis of roll or pitch."""
+    """Unit vector of the body's axis x (0) or y (1)."""
     return (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0)
 
 

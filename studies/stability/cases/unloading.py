@@ -31,7 +31,7 @@ def off(step: float) -> float:
 
 
 def naive(step: float) -> float:
-    """The same of steps whose error nobody controls."""
+    """As `off`, of steps whose error nobody controls; infinite where the run ends with an error."""
     p, start = unloading.system(load("unload"))
     try:
         _, rows = integrators.simulate(integrators.get("rk4_renormalised"), p, start, step, round(TAKEN / step), 100)

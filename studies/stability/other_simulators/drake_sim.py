@@ -53,7 +53,7 @@ class Model:
         self.context = self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
 
     def run_on(self, seconds: float) -> None:
-        """Advance by so much."""
+        """Advance the simulation by `seconds`."""
         self.simulator.AdvanceTo(self.simulator.get_context().get_time() + seconds)
 
     def attitude_matrix(self) -> np.ndarray:
@@ -61,11 +61,11 @@ class Model:
         return np.array(self.plant.EvalBodyPoseInWorld(self.context, self.body).rotation().matrix())
 
     def position_world(self) -> np.ndarray:
-        """Of the free body [m], shape (3,)."""
+        """Position of the free body [m], world, shape (3,)."""
         return np.array(self.joint.get_translation(self.context))
 
     def velocity_world(self) -> np.ndarray:
-        """Of the free body [m/s], shape (3,)."""
+        """Velocity of the free body [m/s], world, shape (3,)."""
         return np.array(self.joint.get_translational_velocity(self.context))
 
 

@@ -12,6 +12,7 @@ import studies.campaign.folder
 import studies.campaign.table
 from lapwing.cli.main import app
 from studies.campaign import local, table
+from studies.campaign.compare import compare
 from studies.campaign.distributions import choice, normal, uniform
 from studies.campaign.folder import begin, manifest, read
 from studies.campaign.plan import plan
@@ -176,6 +177,23 @@ def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
     assert 0 < counts[0].runs < RUNS
 
 
+def test_what_was_flown_beyond_what_is_enough_is_kept(tmp_path):
+    def nobody(call, tasks):
+        assert not list(tasks)
+        yield from ()
+
+    folder, first = started(tmp_path / "all")
+    whole = campaign(folder, first, local.here)
+    digest = folder.finish()
+    enough = campaign(folder, first, nobody, until=0.2)
+    assert enough.runs < RUNS
+    assert folder.finish() != digest
+    assert sum(map(len, read(folder.path).pages())) == enough.runs
+    assert not folder.missing()
+    assert campaign(folder, first, nobody) == whole
+    assert folder.finish() == digest
+
+
 def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
     asked = []
     monkeypatch.setattr("studies.campaign.study.interval", lambda k, n: asked.append(n) or interval(k, n))
@@ -238,6 +256,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     campaign(other, first, local.here)
     code, said = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in said) == (0, True)
+    assert "the campaigns differ in: overrides\n" in said
     assert "…" not in said  # 80 columns are enough for all numbers
     (row,) = [line.split() for line in said.splitlines() if line.split()[:1] == ["energy"]]
     assert row[:3] == ["energy", "[J]", "*"]
@@ -250,12 +269,16 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     alone = abs(energy["difference"]["high"] - energy["difference"]["low"])
     assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
     assert lapwing("compare", folder.path, tmp_path)[0] == 2
+    others, first = started(tmp_path / "laid_out", design="lhs")
+    campaign(others, first, local.here)
+    drawn = [f"{key} (drawn otherwise)" for key in sorted(VARY)]
+    assert compare(folder.path, others.path).differing == ["design", *drawn]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["hover", "--runs", "0"], "--runs 0: expected at least 1"),
+        (["hover", "--runs", "0"], "--runs 0: expected a number from 1 to 10000000"),
         (["hover", "--vary", "vehicle.mass"], "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
         (["hover", "--vary", "vehicle.mass=gauss(1)"], "--vary vehicle.mass=gauss(1): expected a distribution"),
         (["hover", "--vary", "vehicle.mas=normal(10,1)"], "--vary vehicle.mas: unknown key 'mas'; did you mean mass?"),
@@ -275,6 +298,8 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
         (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
         (["hover", "--report", "c.gif"], "--report c.gif: expected a name that ends in .html, .pdf or .png"),
         (["hover", "--until-ci", "2"], "--until-ci 2: expected a probability between 0 and 1"),
+        (["hover", "--until-ci", "0.1", "--shard", "1/2"], "--until-ci: a part does not know how the others end"),
+        (["hover", "--workers", "2", "--cluster", "tcp://127.0.0.1:1"], "--workers: a cluster has its own"),
         (["hover", "--workers", "0"], "--workers 0: expected at least 1"),
         (["hover", "--runs", "4", "--out", "{}", "--shard", "3/500"], "has 4 shards; expected at most I/4"),
         (["hover", "--runs", "4", "--out", "{}", "--shard", "5/4"], "--shard 5/4: expected I/N with I from 1 to N"),

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cosim.scene import SceneError
 from studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
 from studies.campaign.plan import plan
+from studies.campaign.runs import _refusal, first_setup
 
 
 def drawn(made, key):
@@ -34,6 +36,7 @@ def test_quantiles_are_those_of_scipy(distribution, reference):
         ("choice(rtk, standard)", ("rtk", "standard")),
         ("choice(a.toml,sets/b.toml)", ("a.toml", "sets/b.toml")),
         ("choice([1.0, 2.0], [3.0, 4.0])", ([1.0, 2.0], [3.0, 4.0])),
+        ("choice([[1, 2], 3], [1, 2, 3])", ([[1, 2], 3], [1, 2, 3])),
         ('choice("a, b", true, 3)', ("a, b", True, 3)),
         ("linspace(0, 1, 3)", (0.0, 0.5, 1.0)),
     ],
@@ -54,6 +57,9 @@ def test_values_that_are_finitely_many(text, values):
         ("uniform(2, 1)", "uniform: expected low <= high, got 2, 1"),
         ("loguniform(0, 1)", "loguniform: expected 0 < low <= high"),
         ("linspace(0, 1, 0)", "expected a whole number of values"),
+        ("linspace(0, 1, 1000000000)", "expected a whole number of values, up to 1000000"),
+        (f"uniform(0, 1{400 * '0'})", "expected low <= high"),
+        ("choice([1, 2)", "is not a TOML value"),
         ("choice()", "choice: expected at least one value"),
         ("gauss(1, 2)", f"expected a distribution, {', '.join(KINDS)}"),
         ("3.0", "expected a distribution"),
@@ -125,10 +131,28 @@ def test_no_sweep(tmp_path, text, said):
         plan("hover", sweep=tmp_path / "s.csv")
 
 
+def test_a_sweep_may_begin_with_the_mark_that_spreadsheets_put_there(tmp_path):
+    (tmp_path / "s.csv").write_text("\ufeffa,b\n1,2\n", encoding="utf-8")
+    assert plan("hover", sweep=tmp_path / "s.csv").sweep == ({"a": 1, "b": 2},)
+
+
+def test_a_grid_is_flown_though_its_first_runs_are_all_refused():
+    vary = {"effects.wind_random.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
+    made = plan("delivery_mission", vary=vary, design="grid")
+    assert made.runs == 40
+    assert first_setup(made)[0] >= 20
+
+
+def test_what_is_refused_is_told_alike_wherever_files_lie():
+    told = [_refusal(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")]
+    assert told == ["autopilot.gains: no file nix.toml"] * 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"runs": 0}, "--runs 0: expected at least 1"),
+        ({"runs": 40_000_000_000}, "--runs 40000000000: expected a number from 1 to 10000000"),
+        ({"runs": 0}, "--runs 0: expected a number from 1 to 10000000"),
         ({"seed": 0}, "--seed 0: expected a whole number from 1 to 2147483647"),
         ({"design": "halton"}, "--design halton: expected one of random, lhs, sobol, grid"),
         ({"design": "lhs"}, "--design lhs: expected a --vary"),

@@ -1,9 +1,11 @@
 """The plots of a campaign's report, of tables that are made up."""
 
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from studies.campaign import plots
 from studies.campaign.distributions import uniform
@@ -12,15 +14,17 @@ from studies.campaign.plots import errors, matters, parallel
 from studies.campaign.results import Results
 from studies.campaign.statistics import Interval, has_sobol
 from studies.figures import FIGURES
+from studies.report import paper
 
 KEYS = ("a", "b")
+MANY = tuple("abcdefghijkl")
 
 
-def table(runs, sweep=None, **values):
-    """The results of a campaign over two parameters; figures that are not given are NaN."""
-    made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(KEYS, uniform(0, 1)), sweep=sweep)
-    drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in KEYS}
-    kinds = {"run": int, "seed": int, **dict.fromkeys(KEYS, float), "success": bool}
+def table(runs, sweep=None, keys=KEYS, **values):
+    """The results of a campaign over some parameters; figures that are not given are NaN."""
+    made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
+    drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in keys}
+    kinds = {"run": int, "seed": int, **dict.fromkeys(keys, float), "success": bool}
     kinds |= {name: str if name in ("verdict", "told") else float for name in FIGURES}
     found = {name: np.full(runs, np.nan) for name in kinds}
     found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "verdict": np.full(runs, "landed", object)}
@@ -99,3 +103,29 @@ def test_errors_stand_as_shares_beside_what_is_required():
     assert (x.x_label, x.marks[0].x.tolist()) == ("rmse.x [m]", list(range(11)))
     assert x.marks[0].y[-1] == 1.0
     assert roll.marks[1].x == pytest.approx(np.degrees([0.1, 0.1]))
+
+
+def test_of_many_parameters_those_that_matter_are_drawn_and_the_others_named():
+    found = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
+    assert len(bars(matters(found), "rank", "energy")) == len(MANY)
+    for draw in (plots.success, parallel):
+        plot = draw(found)
+        told = plot.caption.partition("Left out, as they go least with it: ")[2].rstrip(".").split(", ")
+        assert len(told) == len(MANY) - plots.KEYS
+        assert not {"k", "l"} & set(told)
+    assert [panel.x_label for panel in plots.success(found).panels] == [key for key in MANY if key not in told]
+
+
+def test_on_paper_numbers_below_panels_beside_each_other_do_not_touch():
+    rmse = {f"rmse.{axis}": lambda drawn: 0.01 + 0.16 * drawn["a"] for axis in ("x", "y", "z")}
+    with paper.styled():
+        canvas = FigureCanvasAgg(paper.figure(errors(table(50, **rmse))))
+        canvas.draw()
+        boxes = [
+            label.get_window_extent()
+            for axes in canvas.figure.axes
+            for label in axes.get_xticklabels()
+            if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
+        ]
+    assert len(boxes) >= 9
+    assert not [1 for a, b in combinations(boxes, 2) if a.padded(2.0).overlaps(b)]
