@@ -6,6 +6,8 @@ Each module of this folder with a `main()` is one; what it returns are its rows 
 """
 
 import argparse
+import sys
+import traceback
 
 import benchmarks
 from benchmarks._bars import show
@@ -18,11 +20,17 @@ parser.add_argument("--quick", action="store_true", help="leave out those that t
 given = parser.parse_args()
 if unknown := set(given.names) - found.keys():
     parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(found)}")
-rows = []
+rows, failed = [], []
 for name, module in found.items():
     if (given.names and name not in given.names) or (given.quick and getattr(module, "SLOW", False)):
         continue
     print(f"== {name}", flush=True)
-    rows += module.main() or []
+    try:
+        rows += module.main() or []
+    except Exception:  # what the others have measured for an hour is shown all the same
+        traceback.print_exc()
+        failed.append(name)
 print("== beside their bars")
 show(rows)
+if failed:
+    sys.exit(f"not measured: {', '.join(failed)}")

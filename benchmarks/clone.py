@@ -3,14 +3,16 @@
 python -m benchmarks.clone
 """
 
+import re
 import subprocess
 import tempfile
 from pathlib import Path
 
-from benchmarks._bars import Row, empty_cache, show, wall
+from benchmarks._bars import Row, empty_cache, said_within, show, wall
 
 SLOW = True  # left out by `python -m benchmarks --quick`
 ROOT = Path(__file__).parent.parent
+PEAK = re.compile(r"peak memory: .*")
 
 
 def rows():
@@ -18,17 +20,32 @@ def rows():
         clone = Path(folder, "clone")
         subprocess.run(["git", "clone", "--quiet", str(ROOT), str(clone)], check=True)
         subprocess.run(["make", "--silent", ".venv/.clients"], cwd=clone, check=True)
-        for target, bar in (("mission", 35.0), ("test", 600.0)):
-            with empty_cache() as environment:
-                taken = wall(["make", target], cwd=clone, env=environment)
-            yield Row(f"make {target} in a fresh clone, packages installed", taken, "s", bar)
+        with empty_cache() as environment:
+            taken = wall(["make", "mission"], cwd=clone, env=environment)
+        yield Row("make mission in a fresh clone, packages installed", taken, "s", 35.0)
+        with empty_cache() as environment:
+            taken, said = said_within(["make", "test"], cwd=clone, env=environment)
+            yield Row("make test in a fresh clone, packages installed", taken, "s", 600.0)
+            yield Row("the largest worker of make test", peak_mb(said), "MB", 1500.0)
+            taken, _ = said_within(["make", "quick"], cwd=clone, env=environment)
+            yield Row("make quick, warm", taken, "s", 90.0)
         with empty_cache() as environment:
             yield Row("the whole of .ci/run", wall([".ci/run"], cwd=clone, env=environment), "s", 1080.0)
 
 
+def peak_mb(said: str) -> float:
+    """Of the largest worker [MB], of what `make test` has said."""
+    (line,) = PEAK.findall(said)
+    return max(float(number) for number in re.findall(r"(\d+) MB", line))
+
+
 def main():
-    found = list(rows())
-    show(found)
+    found = []
+    try:
+        for row in rows():
+            found.append(row)
+    finally:
+        show(found)
     return found
 
 

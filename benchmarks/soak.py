@@ -90,19 +90,20 @@ def sample(wall: float, simulated: float, log: Path) -> Sample:
 
 
 def rows(samples: list[Sample], name: str) -> list[Row]:
-    """The last quarter of the samples beside the second, in which all that is loaded once is there."""
+    """The last quarter of the samples beside the second, in which all that is loaded once is there; speed beside the
+    first."""
     quarter = len(samples) // 4
-    early, late = samples[quarter : 2 * quarter + 1], samples[-quarter - 1 :]
+    first, early, late = samples[: quarter + 1], samples[quarter : 2 * quarter + 1], samples[-quarter - 1 :]
 
     def rate(some: list[Sample], what: str, per: str) -> float:
-        first, last = some[0]._asdict(), some[-1]._asdict()
-        return (last[what] - first[what]) / (last[per] - first[per])
+        begin, end = some[0]._asdict(), some[-1]._asdict()
+        return (end[what] - begin[what]) / (end[per] - begin[per])
 
     def grown(what: str) -> float:
         return mean(getattr(s, what) for s in late) / mean(getattr(s, what) for s in early)
 
-    def ratio(what: str) -> float:
-        return rate(late, what, "simulated") / rate(early, what, "simulated")
+    def ratio(what: str, per: str, former: list[Sample]) -> float:
+        return rate(late, what, per) / rate(former, what, per)
 
     speed, last = rate(samples, "simulated", "wall"), samples[-1]
     cost, size = rate(samples, "processor", "simulated"), rate(samples, "log", "simulated")
@@ -112,8 +113,10 @@ def rows(samples: list[Sample], name: str) -> list[Row]:
         Row(f"{name}: memory", grown("memory"), "", 1.02),
         Row(f"{name}: open files", grown("files"), "", 1.0),
         Row(f"{name}: threads", grown("threads"), "", 1.0),
-        Row(f"{name}: processor time", ratio("processor"), "", 1.1),
-        Row(f"{name}: log", ratio("log"), "", 1.02),
+        Row(f"{name}: processor time", ratio("processor", "simulated", early), "", 1.1),
+        Row(f"{name}: log", ratio("log", "simulated", early), "", 1.02),
+        Row(f"{name}: processor time, to the first", ratio("processor", "simulated", first), "", 1.1),
+        Row(f"{name}: speed, to the first", ratio("simulated", "wall", first), "", 0.9, more=True),
     ]
 
 

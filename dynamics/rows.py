@@ -56,7 +56,10 @@ def columns(like: Any, rows: np.ndarray) -> Any:
 
 
 def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
-    """Those of a part of the tree from the next column on; no inner function, whose cycle would keep the rows."""
+    """Columns of `rows` that belong to this part of the tree, from the next one on.
+
+    No inner function: its cycle of references would keep the rows.
+    """
     if not isinstance(part, tuple):
         return rows[:, next(left)]
     if not any(isinstance(item, tuple) for item in part) and (not hasattr(part, "_fields") or _alike(part)):

@@ -103,12 +103,12 @@ class Batch:
 
     @property
     def weight(self) -> float:
-        """Of the nominal vehicle [N]."""
+        """Weight of the nominal vehicle [N]."""
         return self._steered.mass * self._steered.gravity
 
     @property
     def hover_speed(self) -> np.ndarray:
-        """Of each rotor, [rad/s], under an equal part of the nominal weight; shape (rotors,)."""
+        """Speed of each rotor [rad/s] at which all carry equal parts of the nominal weight; shape (rotors,)."""
         thrust = self.weight / law.lift(self._steered)
         return np.full(len(self._like.voltage), np.sqrt(thrust / self._steered.motor.thrust_coefficient))
 

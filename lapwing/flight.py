@@ -13,7 +13,7 @@ from cosim.recording import Recording
 from lapwing.runs.events import event_messages
 from messages.topics import EVENTS
 from studies import flight as studied
-from studies.flight import topic_of
+from studies.flight_topics import topic_of
 from studies.report import write
 from studies.report.overview import overview
 

@@ -22,7 +22,7 @@ KEEP = 64  # ticks that can be looked at
 
 
 class Observation(NamedTuple):
-    """What is known after a step."""
+    """Time, true state, readings and estimate after a step of the simulator."""
 
     time: float  # [s] simulation time
     truth: TrueState  # SI, world ENU, body FLU

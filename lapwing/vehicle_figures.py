@@ -143,7 +143,7 @@ FIGURES = (
 
 
 def _thrust(v: Values) -> float:
-    """Of a common propeller [N] on the stand: 5.1 N at 628.3 rad/s of one of 10 inches."""
+    """Guessed thrust [N] on the stand: 5.1 N for 10 inches at 628.3 rad/s, scaled with density, speed and diameter."""
     return 5.1 * v["stand_density"] / 1.225 * (v["stand_speed"] / 628.3) ** 2 * (v["diameter"] / 0.254) ** 4
 
 

@@ -8,9 +8,13 @@ _HEAD = "MSG: "
 
 
 def otherwise(type_name: str, text: str) -> str:
-    """What a definition (schema encoding `ros2msg`) has otherwise than ours; "" where messages are read the same.
+    """First difference between a recorded definition and ours, in words; "" where both read the same.
 
-    Comments, constants and defaults are not part of a message. A type that is not ours is never otherwise.
+    Comments, constants and defaults are not part of a message. A type that is not ours has no difference.
+
+    Args:
+        type_name: full name, "sensor_msgs/msg/Imu".
+        text: the recorded definition, in the schema encoding `ros2msg`.
     """
     if type_name not in TYPES or not text.strip() or text == TYPES[type_name].schema_text:
         return ""

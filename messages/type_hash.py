@@ -45,7 +45,7 @@ def type_hash(type_name: str, definitions: Mapping[str, Definition]) -> str:
 
 @cache
 def known_type_hash(type_name: str) -> str:
-    """The same of a type of `messages/msg`."""
+    """The hash, as of `type_hash`, of a type of `messages/msg` by its full name."""
     return type_hash(type_name, DEFINITIONS)
 
 

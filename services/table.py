@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from operator import index
 from pathlib import Path
@@ -108,9 +108,11 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             with vehicle.located():
                 members.append(_resolve(vehicle, plans))
         with scene.located():
-            return fleet.joined(_acquainted(members, "vehicle.{}."), scene.resolved)
+            names = dict.fromkeys(name for member in members for name in member.services)
+            return fleet.joined(_acquainted(members, "vehicle.{}."), _restarts_listed(scene, names))
     with scene.located():
-        return _acquainted([_resolve(scene, plans)], "")[0]
+        (setup,) = _acquainted([_resolve(scene, plans)], "")
+        return setup._replace(resolved=_restarts_listed(scene, setup.services))
 
 
 def _acquainted(members: list[Setup], key: str) -> list[Setup]:
@@ -142,8 +144,6 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
             given = importlib.import_module(f"{process.package}.resolve").resolve(scene)
             if given is not None:
                 (found if process.lock_step else beside)[process.name] = given
-    if unknown := [name for name in run.restart if name not in found]:
-        raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(found)}")
     if plan := plans.get(scene[Vehicle].name):
         autopilot = found["autopilot"]
         found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
@@ -160,3 +160,17 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
         beside,
         dict(scene.resolved),
     )
+
+
+def _restarts_listed(scene: Scene, services: Collection[str]) -> dict[str, Any]:
+    """What a scene of these services resolves to, with a list of those that are started again.
+
+    Raises:
+        SceneError: one of them is none of these services.
+    """
+    wanted = scene[Run].restart
+    names = (list(services) if wanted else []) if isinstance(wanted, bool) else list(wanted)
+    if unknown := [name for name in names if name not in services]:
+        raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(services)}")
+    run = {**scene.resolved[Run.TABLE], "restart": names}
+    return {**scene.resolved, Run.TABLE: run}

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from dynamics.kernel._files import SHIPPED
+
 ROOT = Path(__file__).parent.parent
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
 
@@ -15,3 +17,8 @@ def test_data_files_are_packaged(folder):
     packaged = {path for glob in SETUPTOOLS["package-data"][folder] for path in (ROOT / folder).glob(glob)}
     there = {path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
     assert there <= packaged
+
+
+def test_kernels_that_a_wheel_is_to_carry_are_packaged():
+    (glob,) = SETUPTOOLS["package-data"]["dynamics"]
+    assert (ROOT / "dynamics" / glob).is_relative_to(SHIPPED)

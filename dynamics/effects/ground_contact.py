@@ -92,7 +92,7 @@ def _push(e, stance, feet_body, memory):
 
 @leaf
 def _in_turn(start, four):
-    """The sum of vectors in four lanes and what was before, one after the other."""
+    """`start` plus the four lanes' vectors, added in the order of the feet."""
     a, b, c, d = separate(four)
     return add(add(add(add(start, a), b), c), d)
 

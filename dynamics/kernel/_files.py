@@ -1,5 +1,7 @@
 """Files of the cache: each carries a checksum and appears whole or not at all; none of it ever raises.
 
+What is not there may be in the package itself: `make wheel` makes one that has kernels with it.
+
 Several processes may read and write at once: a file is written under a name of its own and then renamed.
 """
 
@@ -11,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 CHECKSUM = 32  # bytes, before the content
+SHIPPED = Path(__file__).parent / "shipped"  # what a wheel carries, laid out as in `root()`
 KEPT = 4  # versions of one file, so that two checkouts do not take it from each other
 
 
@@ -35,11 +38,13 @@ def _ours(status: os.stat_result) -> bool:
 
 def read(folder: str, name: str, version: str) -> bytes | None:
     """The content that `write` was given; None if there is none, it is damaged, or others could have written it."""
-    base = root()
-    if base is None:
-        return None
+    places = [base / folder / f"{name}-{version}" for base in (root(), SHIPPED) if base is not None]
+    return next((content for place in places if (content := _content(place)) is not None), None)
+
+
+def _content(path: Path) -> bytes | None:
     try:
-        with (base / folder / f"{name}-{version}").open("rb") as file:
+        with path.open("rb") as file:
             if not _ours(os.fstat(file.fileno())):
                 return None
             data = file.read()

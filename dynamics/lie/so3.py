@@ -1,13 +1,12 @@
 """Rotations as matrices (nine floats in row order) and rotation vectors [rad]: the closed forms on SO(3)."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from dynamics.kernel import leaf
 from dynamics.lie import quaternion
 from dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio, sine_ratio
 from dynamics.tree import MANIFOLDS, Manifold
-from dynamics.vector import IDENTITY, add, apply, cross, dot, matmul, scale, transpose
+from dynamics.vector import add, apply, cross, dot, matmul, scale, transpose
 
 
 class Rotation(NamedTuple):
@@ -82,20 +81,6 @@ def dexpinv(u, v):
 def determinant(m):
     """Determinant of a 3x3 matrix: +1 for a rotation, -1 for a reflection."""
     return dot((m[0], m[1], m[2]), cross((m[3], m[4], m[5]), (m[6], m[7], m[8])))
-
-
-def given_rotation(rows: Sequence[Sequence[float]], name: str = "attitude", allowed: float = 1e-6) -> Rotation:
-    """The rotation nearest to a matrix that was typed in; ValueError with its defect if it is none within `allowed`."""
-    m = tuple(float(value) for row in rows for value in row)
-    if len(m) != 9:
-        raise ValueError(f"{name}: {len(m)} numbers, a rotation matrix has 3 rows of 3")
-    gram = matmul(transpose(m), m)
-    defect = max(abs(g - i) for g, i in zip(gram, IDENTITY, strict=True))
-    if not defect <= allowed or determinant(m) < 0.0:
-        raise ValueError(
-            f"{name} is no rotation: R^T R differs from the identity by {defect:.3g}, determinant {determinant(m):.6g}"
-        )
-    return normalise(m)
 
 
 @leaf

@@ -108,13 +108,13 @@ def solve_symmetric(m, b):
 
 @leaf
 def _all(a):
-    """The sum over the leaves."""
+    """Sum over the four lanes of each of the three components of a vector."""
     return (total(a[0]), total(a[1]), total(a[2]))
 
 
 @leaf
 def _sum(m):
-    """The same for a symmetric matrix."""
+    """Sum over the four lanes of each of the six entries of a symmetric matrix."""
     return (total(m[0]), total(m[1]), total(m[2]), total(m[3]), total(m[4]), total(m[5]))
 
 

@@ -121,11 +121,6 @@ def delivery_drone(
     )
 
 
-def without_propeller(drone: Drone, k: int) -> Drone:
-    """The drone after propeller k (0 to 3) was torn off; its angle and speed in the state mean nothing any more."""
-    return drone._replace(held=tuple(0.0 if i == k else held for i, held in enumerate(drone.held)))
-
-
 @leaf
 def _double(angles):
     """Cosines and sines of twice the angles."""

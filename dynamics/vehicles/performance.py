@@ -37,7 +37,7 @@ class Trim(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """By which the loads of a rotor differ from those of one by itself at the same speed."""
+    """Thrust and torque that a rotor in a wake has more than a free one at the same speed."""
 
     thrust: float  # [N]
     torque: float  # [N m]

@@ -52,11 +52,6 @@ def hover_speed(p: Os4Parameters) -> float:
     return math.sqrt(p.mass * p.gravity / (4.0 * p.lift_constant))
 
 
-def steady_voltage(p: Os4Parameters, constant: float, resistance: float, speed: float) -> float:
-    """Voltage [V] that holds a rotor at a speed [rad/s] (theory.md, eq. (7.14) at rest)."""
-    return resistance * p.drag_constant * speed * speed / constant + constant * speed
-
-
 @leaf
 def _acceleration(p, motors, speed, voltage):
     current = (voltage - motors.constant * speed) / motors.resistance

@@ -32,7 +32,7 @@ class ReleasedLoadState(NamedTuple):
 
 
 def release(p: CooperativeLoadParameters, x: CooperativeLoadState) -> tuple[ReleasedLoadParameters, ReleasedLoadState]:
-    """The same bodies, none of which moves otherwise, without their links; under a command that is given."""
+    """The load and vehicles as separate free bodies once the links are gone; their motion and command stay."""
     quads = range(len(x.link))
     positions = tuple(formation.quad_position(p, x, i) for i in quads)
     velocities = tuple(formation.quad_velocity(p, x, i) for i in quads)

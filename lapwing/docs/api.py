@@ -65,7 +65,7 @@ READINGS = (
 
 
 def api() -> str:
-    """The page."""
+    """The page docs/api.md: the Python interface (Markdown)."""
     chapters = {
         "Functions": [_function(f"lapwing.{name}", getattr(lapwing, name)) for name in FUNCTIONS],
         "Classes": [*(_class(f"lapwing.{name}", getattr(lapwing, name), SHOWN.get(name)) for name in CLASSES)],

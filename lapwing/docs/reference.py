@@ -47,7 +47,7 @@ OF_MODEL = {"cooperative_load": ("cooperative_load", "formation")}
 
 
 def reference() -> str:
-    """The page."""
+    """The page docs/reference.md: every key of the TOML files (Markdown)."""
     sections = {name: s for name, s in vocabulary().sections.items() if not s.FROM_FILE}
     by_model = _tables_by_model()
     general = [

@@ -28,7 +28,7 @@ OWN: Schema = {
 
 
 def scene_schema() -> Schema:
-    """Of a scene as it is written, before the files that it names become part of it."""
+    """The JSON schema of a scene as it is written, before the files that it names become part of it."""
     known = vocabulary().sections
     sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
     tables = {name: _section(section) for name, section in sections.items()}
@@ -55,12 +55,12 @@ def scene_schema() -> Schema:
 
 
 def airframe_schema() -> Schema:
-    """Of an airframe's file."""
+    """The JSON schema of an airframe's file."""
     return {**_head("Lapwing airframe"), **table_schema(Airframe)}
 
 
 def gains_schema() -> Schema:
-    """Of a gain set's file."""
+    """The JSON schema of a gain set's file."""
     return {**_head("Lapwing gain set"), **table_schema(GainSet)}
 
 

@@ -37,7 +37,7 @@ class Hover:
         return _around(random, np.array([0.0, 0.0, ground + HIGH]), n), np.zeros((n, 1))
 
     def target(self, time: np.ndarray, memory: np.ndarray, ground: float) -> Target:
-        """At these times [s] of the episodes."""
+        """Where every vehicle ought to be at these times [s] of the episodes, shape (n,)."""
         place = np.tile([0.0, 0.0, ground + HIGH], (len(time), 1))
         return Target(place, np.zeros_like(place), place)
 
@@ -53,7 +53,7 @@ class Track(Hover):
     half = np.array([4.0, 2.0, 0.0])  # [m]
 
     def target(self, time: np.ndarray, memory: np.ndarray, ground: float) -> Target:
-        """On the figure."""
+        """The points of the figure of eight at these times [s] of the episodes, shape (n,)."""
         place, speed = self._at(time, ground)
         return Target(place, speed, self._at(time + self.ahead, ground)[0])
 
@@ -69,7 +69,7 @@ class Land(Hover):
     """Touch down softly at the origin."""
 
     def target(self, time: np.ndarray, memory: np.ndarray, ground: float) -> Target:
-        """The ground."""
+        """The origin on the ground, for every vehicle."""
         place = np.tile([0.0, 0.0, ground], (len(time), 1))
         return Target(place, np.zeros_like(place), place)
 

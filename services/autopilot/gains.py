@@ -40,7 +40,7 @@ class GainSet(Section):
     feed_forward: bool  # weight, tilt, setpoint acceleration, and the torque that the tilt references need
 
     def plain(self) -> Gains:
-        """The numbers."""
+        """The gains as a NamedTuple of numbers, as the control law takes them."""
         return Gains(*(getattr(self, name) for name in Gains._fields))
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from cosim.scene import SceneError, Source
 from services.common.parameters import Parameter
 
-SUFFIX = ".params"
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
 _HEADER = ("# Onboard parameters for Vehicle 1", "#", "# Vehicle-Id Component-Id Name Value Type")
 

@@ -4,15 +4,17 @@ import importlib.resources
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 import scenes
 from cosim.scene import Files, Scene, Section
+from dynamics.errors import KeyedError
 
 SHIPPED = Path(str(importlib.resources.files(scenes)))  # folder of the scenes that ship
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]  # along x and y
+Names = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class Run(Section):
@@ -24,8 +26,16 @@ class Run(Section):
     seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
     duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
     settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
-    restart: tuple[str, ...] = Field(default=(), strict=False)  # services that are started again where they are killed
+    restart: bool | Names = ()  # services that are started again where they are killed; true: all of the lock step
     speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
+
+    @field_validator("restart", mode="before")
+    @classmethod
+    def _all_or_names(cls, value: object) -> object:
+        names = isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
+        if not (names or isinstance(value, bool)):
+            raise KeyedError("", f"got {value!r}", "true, false or a list of services")
+        return value
 
 
 def title(scene: Path) -> str:

@@ -1,5 +1,6 @@
 """The server that Foxglove and Lichtblick connect to: payloads go on as they are, with the simulation's time."""
 
+import ipaddress
 import re
 from typing import Any, Self
 
@@ -20,15 +21,40 @@ def parse_address(text: str) -> tuple[str, int]:
     return found[1], int(found[2])
 
 
+def check_address(text: str, insecure: bool) -> None:
+    """Refuse an address that other machines reach, since a viewer does not prove who he is, unless that is asked for.
+
+    Raises:
+        ValueError: that, or not of the form HOST:PORT.
+    """
+    if not is_loopback(parse_address(text)[0]) and not insecure:
+        expected = "expected an address of this machine alone, 127.0.0.1:8765, or --insecure"
+        raise ValueError(f"--foxglove {text}: anybody could look on there: {expected}")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches a host, a number or a name."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 class Server:
     """A context manager; serves what is put."""
 
-    def __init__(self, address: str):
+    def __init__(self, address: str, insecure: bool = False):
         """Begin to listen.
 
+        Args:
+            address: HOST:PORT.
+            insecure: other machines may reach it.
+
         Raises:
-            ValueError: no address, it cannot be listened on, or foxglove-sdk is not installed.
+            ValueError: no address, one that other machines reach without `insecure`, it cannot be listened on, or
+                foxglove-sdk is not installed.
         """
+        check_address(address, insecure)
         host, port = parse_address(address)
         try:
             import foxglove

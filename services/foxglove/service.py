@@ -17,7 +17,7 @@ def run(process: Process, given: Any) -> None:
         ValueError: the address cannot be listened on.
     """
     setup = process.setup
-    with Server(given.foxglove) as server:
+    with Server(given.foxglove, given.insecure) as server:
         events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
         watcher = dict.fromkeys(events, process.participants.mark(WATCHER))
         arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)

@@ -38,7 +38,7 @@ def to_local(standing_height: float, position_world: Vec3) -> Vec3:
 
 
 def from_local(standing_height: float, position_ned: Vec3) -> Vec3:
-    """The way back: world-frame position [m]."""
+    """Position [m] in the world frame of one from the local origin in NED [m]; inverse of `to_local`."""
     north, east, down = position_ned
     return east, north, standing_height - down
 

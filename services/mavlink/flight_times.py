@@ -4,7 +4,7 @@ from messages import Status
 
 
 class FlightTimes:
-    """Of the last flight, in simulation time [ns]; 0: not yet."""
+    """When the last flight was armed, took off and landed: simulation time [ns], 0 for what has not happened."""
 
     def __init__(self) -> None:
         self.armed_ns = self.takeoff_ns = self.landing_ns = 0
@@ -12,7 +12,7 @@ class FlightTimes:
         self._before = Status(landed=True)
 
     def update(self, status: Status, time_ns: int) -> None:
-        """There is a new status."""
+        """Take in a newer status of the autopilot and its simulation time [ns]."""
         before, self._before = self._before, status
         if status.armed and not before.armed:
             self.armed_ns, self.takeoff_ns, self.landing_ns = time_ns, 0, 0

@@ -1,6 +1,7 @@
 """Who of a fleet knows of whom: what the plants of its vehicles are told, and who moves the load that they share."""
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import Any
 
 from cosim.fleet import of_other
@@ -9,6 +10,7 @@ from dynamics import integrators
 from dynamics.effects import _hooks as hooks
 from dynamics.effects._interaction import interacts, presence
 from dynamics.effects.carried_load import CarriedLoad
+from dynamics.effects.collision import Collision
 from dynamics.errors import KeyedError
 from dynamics.lie.quaternion import rotate
 from dynamics.terrain import surface
@@ -27,8 +29,10 @@ def told(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[st
     """The plants of a run's vehicles, by their names: whose effects know of others are told who else has such.
 
     Raises:
-        KeyedError: vehicles do not agree on their load, or cannot reach it; `keys` has what each one's keys begin with.
+        KeyedError: vehicles touch at the start, do not agree on their load, or cannot reach it; `keys` has what each
+            one's keys begin with.
     """
+    _check_apart(shares, keys)
     having = [name for name, given in shares.items() if interacts(effects_of(given))]
     carriers = {name: sling for name in having if (sling := _sling(shares[name]))}
     owner = next(iter(carriers), "")
@@ -53,6 +57,21 @@ def effects_of(given: ServiceSetup) -> tuple:
     """The effects of a multirotor's plant; () of any other."""
     core = given.parameters.core
     return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
+
+
+def _check_apart(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> None:
+    """Refuse vehicles that would be in one another's collision sphere from the beginning."""
+    spheres = {
+        name: (e.radius, given.parameters.start.vehicle.motion.position_world)
+        for name, given in shares.items()
+        for e in effects_of(given)
+        if isinstance(e, Collision)
+    }
+    for (one, (r, position)), (other, (other_r, other_position)) in combinations(spheres.items(), 2):
+        away = norm(subtract(position, other_position))
+        if away < r + other_r:
+            message = f"got a place {away:.3g} m from {one}: their collision spheres touch"
+            raise KeyedError(f"{keys[other]}start", message, f"at least {r + other_r:.3g} m between them")
 
 
 def _sling(given: ServiceSetup) -> Sling | None:

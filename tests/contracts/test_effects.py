@@ -144,6 +144,7 @@ def fly(tables, method=EULER, seconds=0.2, height=20.0):
     return state
 
 
+@pytest.mark.long
 def test_all_effects_at_once_fly():
     state = fly(ALL)
     numbers = np.concatenate([np.ravel(part) for part in state.motion])

@@ -1,5 +1,7 @@
 """What a step costs, as ratios of loops that take turns on one machine. The figures are in docs/benchmarks.md."""
 
+import pytest
+
 from benchmarks import batch, plant
 
 
@@ -9,6 +11,7 @@ def test_a_step_with_the_catalogue_costs_what_one_written_by_hand_costs():
     assert with_it < 1.15 * by_hand
 
 
+@pytest.mark.long
 def test_a_batch_steps_several_vehicles_in_the_time_of_one():
     """By 2.3 to 2.9 in vector registers, 1.4 where the processor's other thread has much to do; without them 0.8."""
     _, together, alone = batch.rates("delivery_mission")

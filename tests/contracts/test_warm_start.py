@@ -23,6 +23,25 @@ app(sys.argv[1:], standalone_mode=False)
 print(json.dumps([compiled, looked_up]))
 """
 
+# Children are forked: they have what is changed here. Each says what it compiles, and whether it has joined by then.
+JOINS = """
+import sys
+from pathlib import Path
+from cosim.process import Process
+from dynamics.kernel import on_compile
+from lapwing.cli.main import app
+joined, join, told = [], Process.join, Path(sys.argv[1])
+def watched(process, *given):
+    join(process, *given)
+    joined.append(process.name)
+def compiles(kernel):
+    with told.open("a") as stream:
+        stream.write(f"{kernel} {' '.join(joined)}\\n")
+Process.join = watched
+on_compile(compiles)
+app(sys.argv[2:], standalone_mode=False)
+"""
+
 
 def kernels(*words):
     """Of a command from its beginning to its end: (the kernels that it compiles, those that it looks up)."""
@@ -48,3 +67,14 @@ def test_a_run_needs_nothing_that_compiling_ahead_does_not_look_up(tmp_path):
     compiled, looked_up = flown(tmp_path)
     assert compiled == []
     assert set(looked_up) <= set(ahead)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are not forked")
+@pytest.mark.parametrize("scene", ["hover", "delivery_mission"])
+def test_no_process_compiles_once_the_run_has_begun(tmp_path, monkeypatch, scene):
+    monkeypatch.setenv("LAPWING_CACHE", str(tmp_path / "cache"))
+    words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
+    subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
+    told = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]
+    assert "cosim.part.run" in [kernel for kernel, _ in told]
+    assert [(kernel, process) for kernel, process in told if process] == []

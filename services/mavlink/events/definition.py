@@ -67,16 +67,16 @@ class Definition(NamedTuple):
 
     @property
     def sub_id(self) -> int:
-        """The 24 bits by which it is known: they follow from its name, and stay when others come and go."""
+        """The event's number within its component, 24 bits: a checksum of its name, which no other event changes."""
         return zlib.crc32(self.name.encode()) & 0xFFFFFF
 
     @property
     def id(self) -> int:
-        """With the component in front."""
+        """The event's number as messages carry it: the component's in the upper 8 bits, `sub_id` below."""
         return _COMPONENT << 24 | self.sub_id
 
     def encode(self, values: Sequence[int]) -> bytes:
-        """The arguments as they travel, one after the other."""
+        """The values of the arguments as bytes, little-endian, in the order of `arguments`."""
         return struct.pack("<" + "".join(FORMATS[a.base] for a in self.arguments), *values)
 
 

@@ -50,7 +50,7 @@ class _Udp(Link):
                 self.hear(address, data)
 
     def hear(self, address: Address, data: bytes) -> None:
-        """A datagram of somebody."""
+        """Take in a datagram from an address."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -60,7 +60,7 @@ class _Udp(Link):
 
 
 class UdpOut(_Udp):
-    """To one endpoint, which need not have sent anything."""
+    """A link to one UDP endpoint, which need not have sent anything."""
 
     SCHEME: ClassVar[str] = "udpout"
     FORM: ClassVar[str] = "udpout:HOST:PORT"
@@ -71,7 +71,7 @@ class UdpOut(_Udp):
         self.endpoints[address] = self.meet(address)
 
     def hear(self, address: Address, data: bytes) -> None:
-        """Only that endpoint is listened to."""
+        """Take in a datagram of the endpoint of this link; count those of others."""
         endpoint = self.endpoints.get(address)
         if endpoint:
             self.adapter.receive(endpoint, data)
@@ -80,7 +80,7 @@ class UdpOut(_Udp):
 
 
 class UdpIn(_Udp):
-    """On a port of our own: whoever says something sensible there is an endpoint."""
+    """A link that listens on a UDP port: whoever sends a sound message there is an endpoint."""
 
     SCHEME: ClassVar[str] = "udpin"
     FORM: ClassVar[str] = "udpin:HOST:PORT"

@@ -10,14 +10,14 @@ from services.mavlink.session import Session
 
 @handles("REQUEST_EVENT")
 def request_events(session: Session, m: Any) -> None:
-    """Events once more; free to everybody, as all telemetry."""
+    """Send events once more; free to everybody, as all telemetry."""
     for message in session.vehicle.events.replies(m.first_sequence, m.last_sequence, session.address):
         session.send(message)
 
 
 @rule(mavlink.MAV_CMD_RUN_PREARM_CHECKS, changes=False)
 def report(session: Session, c: Command) -> Outcome:
-    """They are checked all the time; the report comes with the next status."""
+    """Ask for a report of the arming checks, which run all the time; it comes with the next status."""
     if not session.vehicle.flavour.EVENTS:
         return UNSUPPORTED
     session.vehicle.reports_asked += 1

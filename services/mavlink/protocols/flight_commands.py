@@ -51,7 +51,7 @@ FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the check
 
 @rule(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
 def arm_disarm(session: Session, c: Command) -> Outcome:
-    """Motors ready or off."""
+    """Arm or disarm the motors."""
     if c.params[0] not in (0.0, 1.0):
         return DENIED
     return Request("arm" if c.params[0] else "disarm", (float(c.params[1] in FORCED),))
@@ -71,25 +71,25 @@ def takeoff(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 def land(session: Session, c: Command) -> Outcome:
-    """Down, where it is."""
+    """Land where the vehicle is."""
     return Request("land")
 
 
 @rule(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 def return_(session: Session, c: Command) -> Outcome:
-    """Home."""
+    """Return to where home is, and land."""
     return Request("return")
 
 
 @rule(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
 def loiter(session: Session, c: Command) -> Outcome:
-    """Stay here."""
+    """Hold the present position."""
     return Request("hold")
 
 
 @rule(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
 def pause(session: Session, c: Command) -> Outcome:
-    """Stay here, or go on with the mission."""
+    """Go on with the mission where the first parameter is 1; else hold the present position."""
     return Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
 
 
@@ -127,7 +127,7 @@ def set_roi(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_SET_ROI_NONE)
 def no_roi(session: Session, c: Command) -> Outcome:
-    """Point it nowhere any more."""
+    """Stop pointing the nose at a region of interest."""
     return Request("roi")
 
 

@@ -14,7 +14,7 @@ EXACT = 1e7  # whole numbers of MISSION_ITEM_INT to a degree
 
 @handles("MISSION_COUNT")
 def count(session: Session, m: Any) -> None:
-    """An upload begins."""
+    """Begin an upload of so many items; denied to endpoints that are not trusted."""
     if session.trusted:
         session.missions.begin(session.endpoint, m.mission_type, m.count)
     else:
@@ -46,7 +46,7 @@ def item_int(session: Session, m: Any) -> None:
 
 @handles("MISSION_ITEM")
 def item(session: Session, m: Any) -> None:
-    """The same with coordinates as floats."""
+    """Take an item with coordinates as floats, as `item_int` takes those with whole numbers."""
     if not (abs(m.x) <= 180.0 and abs(m.y) <= 180.0):
         _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID)
         session.missions.cancel(session.endpoint, m.mission_type)

@@ -8,17 +8,17 @@ from services.mavlink.session import Session
 
 @handles("PARAM_REQUEST_LIST")
 def request_list(session: Session, m: Any) -> None:
-    """All of them."""
+    """Send all parameters, a few at a time."""
     session.parameters.start_list(session.endpoint)
 
 
 @handles("PARAM_REQUEST_READ")
 def request_read(session: Session, m: Any) -> None:
-    """One of them."""
+    """Send one parameter, by its name or its index."""
     session.parameters.read(session.endpoint, m.param_id, m.param_index)
 
 
 @handles("PARAM_SET")
 def set_(session: Session, m: Any) -> None:
-    """Another value for one."""
+    """Ask the autopilot for another value of a parameter."""
     session.parameters.set(session.endpoint, m.param_id, m.param_value, session.trusted)

@@ -17,7 +17,7 @@ FIX_TYPES = {  # by what the receiver says of itself
     NavSatStatus.STATUS_GBAS_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,
 }
 SATELLITES = 16  # that a fix is said to come from
-UNKNOWN_16, UNKNOWN_32 = 0xFFFF, 0xFFFFFFFF
+UNKNOWN_16 = 0xFFFF
 
 
 def good_imu(v: VehicleView) -> bool:

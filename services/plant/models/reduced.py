@@ -11,7 +11,7 @@ from services.plant.models._common import check_integrator, multirotor_plant, ne
 
 
 def check(scene: Scene) -> None:
-    """The airframe's file is there and sound, somebody flies it, and the integrator is for such a state."""
+    """KeyedError where the airframe's file is missing or unsound, nobody flies it, or the integrator does not fit."""
     airframe(scene)
     needs(scene, "autopilot")
     if not scene.lookup("autopilot.operator"):

@@ -150,6 +150,7 @@ def test_goes_with_rotor_thrust(drone):
         effects.from_scene({"coaxial_wash": {}}, stacked(drone))
 
 
+@pytest.mark.long
 def test_eight_rotors_in_four_pairs_hover_and_land(drone):
     """Twice the vehicle on twice the rotors; the upper ones carry more, as much as the theory says of their speeds."""
     frame = stacked(drone)

@@ -43,6 +43,7 @@ def still(motion):
     return np.abs(motion.velocity_world + motion.omega_body).max() < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", [(0.05, 0.02), (0.4, 0.3), (-0.3, 0.9)])
 def test_lands_on_bumps_on_three_feet_at_least(drone, place):
     p = vehicle(drone, BUMPS)

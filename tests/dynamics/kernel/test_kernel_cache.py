@@ -238,3 +238,12 @@ def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_f
     shutil.copytree(package.folder, other, dirs_exist_ok=True)
     package.folder, kept = other, package.cache
     assert package.run(OUTER, LAPWING_CACHE=str(kept))["compiled"] == 0
+
+
+def test_what_a_wheel_carries_is_read_where_nothing_is_kept(package, tmp_path):
+    package.run(ALL)
+    shipped = package.cache.rename(tmp_path / "shipped")
+    placed = f"from pathlib import Path; from dynamics.kernel import _files; _files.SHIPPED = Path({str(shipped)!r})\n"
+    run = package.run(placed + ALL)
+    assert (run["values"], run["compiled"]) == (VALUES, 0)
+    assert not files(package)

@@ -121,18 +121,3 @@ def test_retract_stays_a_rotation_over_many_equal_steps():
         m = so3.retract(m, (0.0123, -0.021, 0.0087))
     r = np.array(m).reshape(3, 3)
     assert abs(r.T @ r - np.eye(3)).max() < 1e-15
-
-
-def test_a_given_matrix_is_checked():
-    m = np.array(so3.exp((0.7, -2.0, 0.3))).reshape(3, 3)
-    assert so3.given_rotation(np.round(m, 8)) == pytest.approx(tuple(m.ravel()), abs=1e-7)
-    with pytest.raises(
-        ValueError, match=r"attitude is no rotation: R\^T R differs from the identity by 0\.2.*, determinant"
-    ):
-        so3.given_rotation(m * 1.1)
-    with pytest.raises(ValueError, match=r"no rotation: .*, determinant -1"):
-        so3.given_rotation(-m)
-    with pytest.raises(ValueError, match=r"attitude is no rotation: .* nan"):
-        so3.given_rotation(m * math.nan)
-    with pytest.raises(ValueError, match="4 numbers, a rotation matrix has 3 rows of 3"):
-        so3.given_rotation([[1.0, 0.0], [0.0, 1.0]])

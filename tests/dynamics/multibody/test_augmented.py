@@ -3,6 +3,7 @@
 import multibody_embedding as embedding
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion
 
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody import augmented, pivoted_qr
@@ -11,7 +12,6 @@ from dynamics.multibody.delivery_drone import delivery_drone
 from dynamics.multibody.five_bodies import BodyState, arrays, machine
 from dynamics.multibody.hold import together
 from dynamics.multibody.mechanisms import bricard, drone_system
-from dynamics.multibody.placement import euler_from_quaternion
 from dynamics.multibody.stabilisation import rows
 from dynamics.multibody.system import assemble
 
@@ -43,6 +43,7 @@ def state(rng):
     return drone, *arrays(x), wrench, np.stack([speeds, 10.0 * rng.normal(size=4)], axis=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("driven", "rank", "count"), [(True, 24, 32), (False, 20, 20)])
 def test_the_drone_against_a_dense_pseudo_inverse(driven, rank, count):
     """30 coordinates, 32 rows of rank 24: unique accelerations, shortest multipliers; 10 freedoms undriven."""

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion
 from test_augmented import state
 
 from dynamics.multibody.consistency import check, consistent
 from dynamics.multibody.mechanisms import bricard, drone_system, four_bars
-from dynamics.multibody.placement import displaced, euler_from_quaternion
+from dynamics.multibody.placement import displaced
 
 
 def test_violated_rows_are_named():

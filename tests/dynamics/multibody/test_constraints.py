@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion, quaternion_from_euler
 
 from dynamics.multibody.constraints import velocity_defect
-from dynamics.multibody.placement import displaced, euler_from_quaternion, place, quaternion_from_euler
+from dynamics.multibody.placement import displaced, place
 from dynamics.multibody.stabilisation import rows
 from dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble
 

@@ -8,7 +8,7 @@ from test_augmented import PAPER
 
 from dynamics.integrators import get, march
 from dynamics.lie import quaternion
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve, without_propeller
+from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
 from dynamics.multibody.five_bodies import BodyState, Wrench, arrays, machine, rate
 from dynamics.multibody.hold import together
 
@@ -104,6 +104,11 @@ def test_hover():
     for values in (m.acceleration_world, m.angular_acceleration_body, m.spin_acceleration):
         np.testing.assert_allclose(values, 0.0, atol=1e-12)
     np.testing.assert_allclose([f[2] for f in m.reaction_force_body], -9.81 * drone.mass / 4, atol=1e-12)
+
+
+def without_propeller(drone, k):
+    """The drone after propeller k (0 to 3) was torn off; its angle and speed in the state mean nothing any more."""
+    return drone._replace(held=tuple(0.0 if i == k else held for i, held in enumerate(drone.held)))
 
 
 def test_a_torn_off_propeller_is_gone():

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from multibody_reactions import reactions
 from test_augmented import PAPER
+from test_delivery_drone import without_propeller
 
 from dynamics.lie.quaternion import Quaternion
 from dynamics.multibody import augmented
 from dynamics.multibody.augmented import accelerations
-from dynamics.multibody.delivery_drone import delivery_drone, without_propeller
+from dynamics.multibody.delivery_drone import delivery_drone
 from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
 from dynamics.multibody.five_bodies import reactions as from_chassis
 from dynamics.multibody.hold import together

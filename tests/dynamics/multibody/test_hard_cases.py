@@ -3,17 +3,18 @@ propellers, locked, free and torn-off propellers, a redundant loop."""
 
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion
 from test_augmented import PAPER
-from test_delivery_drone import momentum
+from test_delivery_drone import momentum, without_propeller
 
 from dynamics.integrators import get, march
 from dynamics.lie import quaternion
 from dynamics.multibody.augmented import ANY, RANK_TOLERANCE, accelerations, solve
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, without_propeller
+from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone
 from dynamics.multibody.five_bodies import BodyState, arrays, machine
 from dynamics.multibody.hold import NONE, PARTITION, PROJECTION, advance, together, violation
 from dynamics.multibody.mechanisms import bricard, drone_system
-from dynamics.multibody.placement import displaced, euler_from_quaternion
+from dynamics.multibody.placement import displaced
 from dynamics.multibody.simulation import energy, simulate
 
 GRAVITY, NOWHERE = (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion
 from multibody_reactions import reactions
 from test_augmented import state
 
 from dynamics.multibody.augmented import accelerations
 from dynamics.multibody.mechanisms import drone_system, pendulum
-from dynamics.multibody.placement import euler_from_quaternion, place
+from dynamics.multibody.placement import place
 
 G = 9.81
 

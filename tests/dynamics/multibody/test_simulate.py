@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from multibody_angles import euler_from_quaternion, quaternion_from_euler
 from test_augmented import PAPER
 
 from dynamics.lie.quaternion import Quaternion
@@ -9,7 +10,6 @@ from dynamics.multibody.delivery_drone import delivery_drone
 from dynamics.multibody.five_bodies import BodyState, arrays, machine
 from dynamics.multibody.hold import together
 from dynamics.multibody.mechanisms import drone_system, four_bars
-from dynamics.multibody.placement import euler_from_quaternion, quaternion_from_euler
 from dynamics.multibody.simulation import energy, simulate
 
 SPEEDS = (40.0, -30.0, 35.0, -45.0)

@@ -14,7 +14,6 @@ from dynamics.vehicles.quadrotor_os4 import (
     Os4State,
     hover_speed,
     net_force,
-    steady_voltage,
 )
 
 ZERO = (0.0, 0.0, 0.0)
@@ -102,6 +101,11 @@ def test_free_fall_and_momentum_without_rotors():
     x = Os4State(ZERO, exp((0.3, 0.2, -0.5)), (1.0, 0.0, 2.0), (1.0, -2.0, 3.0), (0.0,) * 4)
     _, states = simulate(get("rkmk4"), p, x, 1e-2, 100, every=100)
     assert states[-1, :3] == pytest.approx([1.0, 0.0, 2.0 - 9.81 / 2], abs=1e-10)
+
+
+def steady_voltage(p, constant, resistance, speed):
+    """Voltage [V] that holds a rotor at a speed [rad/s] (theory.md, eq. (7.14) at rest)."""
+    return resistance * p.drag_constant * speed * speed / constant + constant * speed
 
 
 def test_motors_reach_the_speed_of_their_voltage_and_push_the_body_back():

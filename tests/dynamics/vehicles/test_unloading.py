@@ -54,6 +54,7 @@ def test_the_contact_of_two_that_move_as_one_does_no_work():
     assert (ahead - behind) / (2 * step) == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_the_door_alone_swings_with_its_period():
     p = P._replace(gravity=0.0, floor_height=1.0, ramp_start=-1.0, pickup=0.0, door_damping=0.0, door_preload=-1.5)
     x = run(p, initial_state(p)._replace(position_world=(0.0, 0.0, 5.0), door=(1.0, 0.0)), 1.0)
@@ -101,6 +102,7 @@ def test_a_fall_bounces_lower_every_time():
     assert at[-1] == pytest.approx(HALF[2], abs=1e-3)
 
 
+@pytest.mark.long
 def test_the_whole_unloading_converges_and_the_door_shuts():
     coarse, fine = (
         march_controlled(Controlled(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)

@@ -43,6 +43,7 @@ def test_on_level_ground_the_vehicle_starts_where_it_did():
     assert start_height(load("hover")) == 0.35
 
 
+@pytest.mark.long
 def test_on_a_slope_the_vehicle_starts_at_rest_and_stays():
     scene = load("hover", ["environment.terrain.slope=[0.1, 0.0]"])
     position, attitude = start_pose(scene)

@@ -1,5 +1,6 @@
 """What a client of the Foxglove WebSocket protocol gets: the topics, their payloads as they are, and the time."""
 
+import re
 import socket
 import struct
 import subprocess
@@ -9,7 +10,7 @@ import pytest
 
 from cosim.log import LogReader, LogWriter
 from messages import Clock, Imu, header, stamp
-from services.foxglove.server import Server, parse_address
+from services.foxglove.server import Server, check_address, parse_address
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import Client, patient
 
@@ -102,8 +103,30 @@ def test_an_address_that_is_taken_is_told():
             Server(f"127.0.0.1:{port}")
 
 
-@pytest.mark.parametrize(("scene", "vehicle"), [("hover", "drone1"), ("fleet", "right")])
-def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle):
+@pytest.mark.parametrize("text", ["0.0.0.0:1", "[::]:1", "10.0.0.1:1", "robot:1", "127.0.0.1.org:1", "localhost.org:1"])
+def test_only_who_asks_for_it_lets_other_machines_look_on(text):
+    with pytest.raises(ValueError, match=r"anybody could look on there: expected .* or --insecure"):
+        Server(text)
+    check_address(text, True)
+
+
+@pytest.mark.parametrize("text", ["127.0.0.1:1", "127.8.0.1:1", "[::1]:1", "localhost:1"])
+def test_this_machine_alone_may_always_look_on(text):
+    check_address(text, False)
+
+
+def test_a_run_that_other_machines_could_look_on_is_refused(tmp_path):
+    words = ["run", "hover", "--foxglove", "0.0.0.0:8799", "--log", str(tmp_path / "a.mcap")]
+    run = subprocess.run([sys.executable, "-m", "lapwing", *words], capture_output=True, text=True, timeout=300)
+    assert run.returncode == 2
+    assert re.fullmatch(r"lapwing: --foxglove 0.0.0.0:8799: anybody could look on there: .*\n", run.stderr)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("scene", "vehicle", "more"), [("hover", "drone1", []), ("fleet", "right", ["--insecure"])], ids=["hover", "fleet"]
+)
+def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
     (door,) = loopback_endpoints(["a"]).values()
     port = int(door.rpartition(":")[2])
     path = tmp_path / "flight.mcap"
@@ -118,6 +141,7 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle):
         str(path),
         "--json",
         str(tmp_path / "a.json"),
+        *more,
     ]
     with subprocess.Popen([sys.executable, "-m", "lapwing", *words, "--foxglove", f"127.0.0.1:{port}"]) as run:
         client = patient(port, run)

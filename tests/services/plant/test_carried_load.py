@@ -60,6 +60,7 @@ def flown(setup):
     return fly(setup)
 
 
+@pytest.mark.long
 def test_under_one_vehicle_it_moves_as_where_both_are_one_system(tmp_path):
     """`slung_load` integrates vehicle and load together, and looks at nothing from ahead."""
     alone = '[vehicle]\nairframe = "delivery_drone"\n'

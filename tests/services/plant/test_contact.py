@@ -58,6 +58,7 @@ def test_on_a_slope_friction_and_normal_forces_make_the_weight():
     assert lower > 1.05 * upper  # the centre of mass is over the lower feet
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["multibody", "slung_load"])
 def test_of_vehicles_of_several_bodies_too(model):
     scene = {"multibody": "hover", "slung_load": "slung_load"}[model]

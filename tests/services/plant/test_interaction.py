@@ -96,3 +96,10 @@ def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
     radius = resolve(scene(tmp_path).vehicles[0]).services["plant"].parameters.core.vehicle.effects[1].radius
     assert gap.min() == pytest.approx(2.0 * radius, rel=0.02)
     assert b[-1, 1] > 3.1  # pushed aside
+
+
+@pytest.mark.parametrize(("start", "away"), [("[0.0, 0.0]", "0"), ("[0.0, 0.9]", "0.9")])
+def test_vehicles_that_touch_at_the_start_are_refused(tmp_path, start, away):
+    said = f"vehicle.1.start: expected at least 1.55 m between them, got a place {away} m from above"
+    with pytest.raises(ValueError, match=said):
+        resolve(scene(tmp_path, f"vehicle.1.start={start}"))

@@ -1,0 +1,30 @@
+"""States of bodies in Euler angles from those with quaternions, and back."""
+
+import numpy as np
+
+from dynamics.lie import quaternion
+from dynamics.multibody import euler
+from dynamics.multibody.placement import place
+
+
+def euler_from_quaternion(configuration, velocity):
+    """The same state in Euler angles: configuration (n, 7) to (n, 6), velocity (n, 6) to (n, 6).
+
+    Raises:
+        ValueError: a body's pitch is at 90 degrees.
+    """
+    angles_out, rates_out = np.array(configuration[:, :6]), np.array(velocity, float)
+    for i in range(len(configuration)):
+        angles = euler.angles_of(quaternion.rotation_matrix(tuple(configuration[i, 3:])))
+        if abs(np.cos(angles[1])) < euler.SINGULAR:
+            raise ValueError(f"body {i}: pitch is at 90 degrees, where XYZ Euler angles are singular: use quaternions")
+        angles_out[i, 3:] = angles
+        rates_out[i, 3:] = euler.rates_of(angles, tuple(velocity[i, 3:]))
+    return angles_out, rates_out
+
+
+def quaternion_from_euler(configuration, velocity):
+    """The same state with quaternions: configuration (n, 6) to (n, 7), velocity (n, 6) to (n, 6)."""
+    placed = place(np.asarray(configuration, float), np.asarray(velocity, float))
+    q = [quaternion.from_matrix(tuple(R)) for R in placed.rotation[:-1]]
+    return np.hstack([placed.position[:-1], np.array(q)]), np.hstack([placed.velocity[:-1], placed.omega[:-1]])
