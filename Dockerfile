@@ -3,9 +3,9 @@
 #   make docker-build            also where no image can be pulled and no package index is reached from a container
 #   docker compose build         where both can
 #
-# BASE is any image with Debian bookworm, Python 3.11 with pip, and passwd; deploy/base-image.sh makes one. Debian's
-# release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder of
-# older engines takes it too: no mounts, no here-documents.
+# BASE is any image with Debian bookworm, Python 3.11 with pip, passwd and openssl; deploy/base-image.sh makes one.
+# Debian's release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder
+# of older engines takes it too: no mounts, no here-documents.
 ARG BASE=python:3.11-slim-bookworm
 # An image with the pinned wheels in /wheels (deploy/wheels.sh): in the context they would be sent again for each image.
 ARG WHEELS
@@ -72,7 +72,7 @@ COPY benchmarks benchmarks
 COPY deploy deploy
 COPY docs docs
 COPY examples examples
-COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose*.yml ./
+COPY .dockerignore .gitignore CHANGELOG.m[d] CONTRIBUTING.m[d] Dockerfile Makefile docker-compose.yml ./
 COPY tests tests
 
 

@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Without their byte code on the disk, processes take half a second longer to start, and tests start many.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test quick check stability bench sbom audit docker-build docker-test clean
+.PHONY: mission test quick check stability bench wheel sbom audit docker-build docker-test clean
 
 # The lock file pins what was tested, by version and hash. pip takes no hashes where it installs a folder, so what is
 # installed with this one has the versions alone.
@@ -29,14 +29,16 @@ $(VENV)/.clients: $(VENV)/.installed
 	-$(INSTALL) --no-deps --target $(VENV)/ros2-sdk "zenoh-ros2-sdk>=0.1.8"
 	touch $@
 
-# Two workers more than cores: tests wait for a third of their time.
-WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 20 --durations-min 1
+# Two workers more than cores: tests wait for a third of their time; those of `quick` for less.
+CORES := $(shell getconf _NPROCESSORS_ONLN)
+WORKERS ?= $(shell expr $(CORES) + 2)
+PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 20 --durations-min 1
 
 test: $(VENV)/.clients
 	$(PYTEST)
 
 # What a change most likely breaks: all but the tests that are marked long.
+quick: WORKERS = $(shell expr $(CORES) + 1)
 quick: $(VENV)/.installed
 	$(PYTEST) -m "not long"
 
@@ -69,11 +71,18 @@ sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
 	cat $(SHIPPED) | $(VENV)/audit/bin/cyclonedx-py requirements - --pyproject pyproject.toml \
 		--output-reproducible --output-format JSON --output-file build/sbom.json
 
-DATABASE := https://pypi.org/pypi/pip/25.0/json
+DATABASE := https://api.osv.dev/v1/vulns/OSV-2020-111
 audit: $(VENV)/audit/bin/pip-audit
 	@$(VENV)/audit/bin/python -c "from urllib.request import urlopen; urlopen('$(DATABASE)', timeout=15)" 2> /dev/null || \
 		{ echo "audit: $(DATABASE) gives no answer: known faults cannot be looked up from here" >&2; exit 2; }
-	$(VENV)/audit/bin/pip-audit --strict --require-hashes --disable-pip $(addprefix --requirement ,$(SHIPPED))
+	$(VENV)/audit/bin/pip-audit --vulnerability-service osv --strict --require-hashes --disable-pip $(addprefix --requirement ,$(SHIPPED))
+
+# A wheel that has the kernels of a scene with it, for processors like this one's; others compile their own.
+SHIPS ?= scenes/delivery_mission.toml
+wheel: $(VENV)/.installed
+	LAPWING_CACHE=dynamics/kernel/shipped $(BIN)/lapwing warm $(SHIPS)
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	rm -r build/lib dynamics/kernel/shipped
 
 docker-build:
 	PYTHON=$(PYTHON) deploy/build.sh
