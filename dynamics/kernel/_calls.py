@@ -9,6 +9,7 @@ was given. Once a function is inlined nothing of either way is left.
 # mypy: disable-error-code="attr-defined"
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 from llvmlite import ir as llvm
@@ -111,6 +112,11 @@ def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
     context._defns[entry].append(call, fndesc.argtypes)  # of several for the same arguments the last one counts
 
 
+@cache
+def _holds_arrays(models: Any, kind: types.Type) -> bool:
+    return models[kind].contains_nrt_meminfo()
+
+
 class KernelLower(Lower):
     """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
 
@@ -129,7 +135,7 @@ class KernelLower(Lower):
             super().decref(typ, val)
 
     def _is_counted(self, typ: types.Type) -> bool:
-        return self.context.data_model_manager[typ].contains_nrt_meminfo()
+        return _holds_arrays(self.context.data_model_manager, typ)
 
 
 class InnerLower(KernelLower):

@@ -19,7 +19,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
 
 from dynamics.kernel._calls import InnerLower, KernelLower, is_whole, offer
 from dynamics.kernel._libraries import InnerLibrary, KernelLibrary
@@ -155,14 +155,27 @@ class InnerLowering(KernelLowering):
         return True
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelRewrites(NopythonRewrites):
+    """numba's rewrites of what has types: of expressions with arrays, and of those indexed by texts."""
+
+    _name = "kernel_rewrites"
+
+    def run_pass(self, state: Any) -> bool:
+        """Rewrite the function of `state` where it holds either."""
+        if any(isinstance(kind, types.Array | types.misc.StringLiteral) for kind in state.typemap.values()):
+            return super().run_pass(state)
+        return False
+
+
 class Pipeline(Compiler):
-    """numba's pipeline, with the lowering passes of this module."""
+    """numba's pipeline, with the passes of this module."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one."""
-        lowering = InnerLowering if _depth.value > 1 else KernelLowering
+        ours = {NativeLowering: InnerLowering if _depth.value > 1 else KernelLowering, NopythonRewrites: KernelRewrites}
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        pipeline.passes = [(lowering, text) if p is NativeLowering else (p, text) for p, text in pipeline.passes]
+        pipeline.passes = [(ours.get(each, each), text) for each, text in pipeline.passes]
         pipeline.finalize()
         return [pipeline]
 
