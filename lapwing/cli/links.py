@@ -22,7 +22,7 @@ def check_endpoints(option: str, endpoints: Iterable[str], keys: Path | None, in
 def check_published(option: str, endpoint: str, insecure: bool) -> None:
     """Refuse a Zenoh endpoint that other machines reach, and at which nobody proves who he is, unless asked for."""
     from lapwing.runs.joined import check_endpoint
-    from services.foxglove.server import is_loopback
+    from services.common.address import is_loopback
 
     check_endpoint(option, endpoint)
     kind, _, address = endpoint.partition("/")

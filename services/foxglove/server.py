@@ -1,10 +1,9 @@
 """The server that Foxglove and Lichtblick connect to: payloads go on as they are, with the simulation's time."""
 
-import ipaddress
-import re
 from typing import Any, Self
 
 from messages import TYPES
+from services.common.address import host_and_port, is_loopback
 
 BACKLOG = 16384  # messages kept for a client; the oldest go where it is too slow
 
@@ -15,10 +14,10 @@ def parse_address(text: str) -> tuple[str, int]:
     Raises:
         ValueError: not of the form HOST:PORT.
     """
-    found = re.fullmatch(r"\[?([\w.:-]+?)\]?:(\d{1,5})", text)
-    if found is None or int(found[2]) > 65535:
+    found = host_and_port(text)
+    if found is None:
         raise ValueError(f"--foxglove {text}: expected HOST:PORT, for example 127.0.0.1:8765")
-    return found[1], int(found[2])
+    return found
 
 
 def check_address(text: str, insecure: bool) -> None:
@@ -30,14 +29,6 @@ def check_address(text: str, insecure: bool) -> None:
     if not is_loopback(parse_address(text)[0]) and not insecure:
         expected = "expected an address of this machine alone, 127.0.0.1:8765, or --insecure"
         raise ValueError(f"--foxglove {text}: anybody could look on there: {expected}")
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a host, a number or a name."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 class Server:

@@ -1,7 +1,5 @@
 """A node of a ROS 2 graph: a Zenoh session of its own, with what rmw_zenoh expects of one."""
 
-import ipaddress
-import re
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -9,6 +7,7 @@ from cosim.bus import ZenohBus
 from cosim.errors import BusError
 from cosim.subscription import Subscription
 from messages import TYPES
+from services.common.address import host_and_port, is_loopback
 from services.ros2.names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 
 ROUTER = "127.0.0.1:7447"  # where nodes of rmw_zenoh look for their router
@@ -22,21 +21,15 @@ def parse_router(text: str, insecure: bool) -> tuple[str, bool]:
     Raises:
         ValueError: not of this form, or another machine, where nobody proves who he is, without `insecure`.
     """
-    found = re.fullmatch(r"\[?([\w.:-]+?)\]?:(\d{1,5})", text)
-    if found is None or int(found[2]) > 65535:
+    found = host_and_port(text)
+    if found is None:
         raise ValueError(f"--ros2-router {text}: expected HOST:PORT, for example {ROUTER}")
-    local = _is_loopback(found[1])
+    host, port = found
+    local = is_loopback(host)
     if not local and not insecure:
         raise ValueError(f"--ros2-router {text}: is not this machine, and anybody there could command: add --insecure")
-    host = f"[{found[1]}]" if ":" in found[1] else found[1]
-    return f"tcp/{host}:{found[2]}", local
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+    written = f"[{host}]" if ":" in host else host
+    return f"tcp/{written}:{port}", local
 
 
 class Asked:

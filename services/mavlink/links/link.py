@@ -1,6 +1,5 @@
 """What all links have in common."""
 
-import ipaddress
 import re
 import socket
 import time
@@ -76,8 +75,3 @@ def socket_address(rest: str) -> tuple[str, int]:
     """Host, as a number, and port; raises OSError for a host that nobody knows."""
     host, _, port = rest.rpartition(":")
     return socket.gethostbyname(host), int(port)
-
-
-def is_local(host: str) -> bool:
-    """Whether an address is this machine's own."""
-    return ipaddress.ip_address(host).is_loopback

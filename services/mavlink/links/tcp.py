@@ -4,8 +4,9 @@ import socket
 from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
+from services.common.address import is_loopback
 from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link, is_local, next_port, socket_address
+from services.mavlink.links.link import Link, next_port, socket_address
 from services.mavlink.links.stream import ByteStream
 
 MAX_ENDPOINTS = 8
@@ -46,7 +47,7 @@ class TcpIn(Link):
             connection.close()
 
         self._streams[connection] = ByteStream(
-            connection.fileno(), is_local(address[0]), self.adapter, self.selector, self.affords, gone
+            connection.fileno(), is_loopback(address[0]), self.adapter, self.selector, self.affords, gone
         )
 
     def close(self) -> None:

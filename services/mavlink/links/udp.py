@@ -5,9 +5,10 @@ import time
 from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
+from services.common.address import is_loopback
 from services.mavlink.adapter import Adapter
 from services.mavlink.endpoint import Endpoint
-from services.mavlink.links.link import PIECE, ROUND, Link, is_local, next_port, socket_address
+from services.mavlink.links.link import PIECE, ROUND, Link, next_port, socket_address
 
 MAX_ENDPOINTS = 8
 SILENT = 10.0  # [s] of wall time after which an endpoint makes room for another
@@ -35,7 +36,7 @@ class _Udp(Link):
             except OSError:  # nobody listens there now, or the way is full: UDP may lose what it likes
                 self.adapter.counts["not sent"] += 1
 
-        return self.adapter.connect(is_local(address[0]), True, put)
+        return self.adapter.connect(is_loopback(address[0]), True, put)
 
     def read(self) -> None:
         """Take what has come, within bounds."""
