@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import subprocess
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -49,6 +50,17 @@ def _bound() -> dict[str, str]:
                 elif words[3] == ("0A" if table.startswith("tcp") else "07"):
                     found[words[9]] = f"{table} port {int(words[1].rpartition(':')[2], 16)}"
     return found
+
+
+def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
+    """What is wrong where a process has not ended after so many seconds; it has ended then."""
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        return [f"the {name} has not ended after {seconds:g} s"]
+    return []
 
 
 def left(folder: Path, taken: dict[str, str], cache: Path | None, seconds: float) -> list[str]:

@@ -74,13 +74,7 @@ def fly(
                 os.killpg(begun.pid, signal.SIGINT)
             elif victim == "command" and not over:
                 os.kill(begun.pid, signal.SIGINT if kind == INTERRUPT else signal.SIGKILL)
-        wrong = []
-        try:
-            begun.wait(timeout)
-        except subprocess.TimeoutExpired:
-            wrong.append(f"the command has not ended after {timeout:g} s")
-            begun.kill()
-            begun.wait()
+        wrong = after.ended(begun, "command", timeout)
         wrong += after.left(folder, taken, kernels, timeout)
         seconds = time.monotonic() - struck
         for process in after.of_trial(folder):

@@ -122,16 +122,10 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
         elif trial.kind not in RESTARTED or victim != LAUNCHER:  # all that can be started again have ended
             KINDS[trial.kind].strike(everybody[victim])
         struck = time.monotonic()
-        wrong = []
         if (victim, trial.kind) == (LAUNCHER, "freeze"):
             _gone(participants(launcher.pid) | children, FROZEN)
             os.kill(launcher.pid, signal.SIGCONT)
-        try:
-            launcher.wait(timeout)
-        except subprocess.TimeoutExpired:
-            wrong.append(f"the launcher has not ended after {timeout:g} s")
-            launcher.kill()
-            launcher.wait()
+        wrong = after.ended(launcher, "launcher", timeout)
         left = _gone(children, timeout)
         seconds = time.monotonic() - struck
         wrong += [f"{name} is left" for name in left]
