@@ -35,9 +35,7 @@ class Comparison(NamedTuple):
     """Two campaigns, paired."""
 
     names: tuple[str, str]
-    differing: list[
-        str
-    ]  # in what the campaigns differ: entries of their plans, and keys that pairs have drawn otherwise
+    differing: list[str]  # entries of their plans, and keys that pairs have drawn otherwise
     pairs: int
     left_out: int  # runs that only one has, or that one refuses
     failures: tuple[Interval, Interval]
