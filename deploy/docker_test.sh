@@ -45,6 +45,25 @@ fail() {
 }
 passed() { echo "docker-test: $*"; }
 
+containers() { docker ps --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" "$@"; }
+container() { # SERVICE [OPTION]
+    service=$1
+    shift
+    containers --filter "label=com.docker.compose.service=$service" "$@"
+}
+remove_containers() {
+    # shellcheck disable=SC2046
+    docker rm --force $(containers --all) > /dev/null
+}
+until_it_flies() { # WHAT : waits for the first line of a flight, compose.log
+    waited=0
+    until grep -q "t = " compose.log; do
+        sleep 1
+        waited=$((waited + 1))
+        [ $waited -lt $TIMEOUT ] || fail "$1 has not begun"
+    done
+}
+
 for image in "$IMAGE" "$IMAGE-tests"; do
     size=$(docker image inspect --format '{{.Size}}' "$image")
     [ "$size" -lt $LIMIT ] || fail "$image has $size bytes, allowed are $LIMIT"
@@ -65,8 +84,7 @@ begun=$(date +%s)
 # shellcheck disable=SC2086  # may be two words
 timeout $TIMEOUT $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null ||
     fail "compose up mission ended with exit code $?"
-containers=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME")
-for container in $containers; do
+for container in $(containers --all); do
     name=$(docker inspect --format '{{index .Config.Labels "com.docker.compose.service"}}' "$container")
     code=$(timeout 30 docker wait "$container") || fail "$name did not end by itself"
     [ "$code" -eq 0 ] || { docker logs --tail 20 "$container" >&2; fail "$name ended with exit code $code"; }
@@ -100,13 +118,6 @@ RUNS=4 timeout $TIMEOUT $COMPOSE --profile cluster up --no-build --exit-code-fro
     { tail -5 local.log >&2; fail "the local campaign failed"; }
 cmp recordings/campaign/runs.csv campaign/runs.csv || fail "the campaign has another table than the local one"
 passed "a campaign on two workers: the local one's table"
-
-container() { docker ps --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" \
-    --filter "label=com.docker.compose.service=$1"; }
-remove_containers() {
-    # shellcheck disable=SC2046
-    docker rm --force $(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME") > /dev/null
-}
 
 # A flight live in Foxglove: a client on this host is shown it to its end. Nobody else in the containers' network, also
 # with the certificate of one that only reads, reads more than he may, or changes a bit of it; a viewer on this host reads.
@@ -195,7 +206,7 @@ VIEWER
 passed "who has no certificate is refused, who has the viewer's reads topics alone, at $ends"
 wait $client || fail "$(tail -1 shown.txt)"
 wait $up || fail "compose --profile view up ended with exit code $?"
-for container in $(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME"); do
+for container in $(containers --all); do
     code=$(docker inspect --format '{{.State.ExitCode}}' "$container")
     [ "$code" -eq 0 ] || { docker logs --tail 20 "$container" >&2; fail "a container of the view ended with exit code $code"; }
     if docker logs "$container" 2>&1 | grep "refused"; then fail "somebody was sent what a stranger had made up"; fi
@@ -209,12 +220,7 @@ remove_containers
 # shellcheck disable=SC2086
 SPEED=1 LOG=recordings/killed.mcap JSON=recordings/killed.json $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null &
 up=$!
-waited=0
-until grep -q "t = " compose.log; do
-    sleep 1
-    waited=$((waited + 1))
-    [ $waited -lt $TIMEOUT ] || fail "the mission to be killed has not begun"
-done
+until_it_flies "the mission to be killed"
 victim=$(container sensors)
 [ -n "$victim" ] || fail "no container of sensors runs"
 if docker exec "$victim" touch /app/here 2> /dev/null; then fail "a container writes to its image"; fi
@@ -246,17 +252,10 @@ remove_containers
 SCHEME=tcp LINKS=--insecure SPEED=1 LOG=recordings/open.mcap JSON=recordings/open.json \
     timeout $TIMEOUT $COMPOSE up --no-build mission > compose.log 2>&1 < /dev/null &
 up=$!
-waited=0
-until grep -q "t = " compose.log; do
-    sleep 1
-    waited=$((waited + 1))
-    [ $waited -lt $TIMEOUT ] || fail "the mission without certificates has not begun"
-done
+until_it_flies "the mission without certificates"
 intruder run --rm -i --network "$network" "$IMAGE" python - nobody tcp/mission:7447
 wait $up || true
-mission=$(docker ps --all --quiet --filter "label=com.docker.compose.project=$COMPOSE_PROJECT_NAME" \
-    --filter "label=com.docker.compose.service=mission")
-[ "$(docker inspect --format '{{.State.ExitCode}}' "$mission")" -ne 0 ] || # of his messages, whichever arrives first ends it
+[ "$(docker inspect --format '{{.State.ExitCode}}' "$(container mission --all)")" -ne 0 ] || # of his messages, whichever arrives first ends it
     fail "the intruder of an open network is not heard: $(cat intruder.txt)"
 passed "certificates are made anew where one is missing; without them an intruder ended the flight"
 
