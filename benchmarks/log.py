@@ -67,7 +67,7 @@ def batch(given, first, stop):
             if record.dtype.names and name in record.dtype.names:
                 columns[name] = noise.normal(size=(len(ticks), *record.dtype[name].shape))
         pages.append(Page(topic, ticks, record.encode(len(ticks), columns)))
-    return pack_batch(pages, stop)
+    return pack_batch(pages, first, stop)
 
 
 def hand_over(given, endpoints, seconds):
@@ -89,7 +89,7 @@ def hand_over(given, endpoints, seconds):
             first = stop
         taken = time.perf_counter() - started
         put(b"", end * given.interval_ns)
-        time.sleep(1.0)  # what was put is delivered before the session ends
+        process.leave(lambda: put(b"", end * given.interval_ns))
         return end * len(SAMPLES), taken
 
 

@@ -25,6 +25,10 @@ class Teller:
         self._recorded = tick
         self._put(_PROGRESS.pack(tick, False), 0)
 
+    def end(self) -> None:
+        """Publish that the log is complete."""
+        self._put(b"", 0)
+
     def waiting(self) -> None:
         """Publish that the recorder waits for the disk."""
         self._put(_PROGRESS.pack(self._recorded, True), 0)
@@ -32,7 +36,7 @@ class Teller:
 
 def waits_for_disk(payload: bytes) -> bool:
     """Whether the recorder waits for the disk, by a payload that a `Teller` has published."""
-    return _PROGRESS.unpack(payload)[1]
+    return bool(payload) and _PROGRESS.unpack(payload)[1]
 
 
 class Backlog:

@@ -5,7 +5,7 @@ A bundle is the rows of the service's ports that are due at the tick, in the ord
 little-endian float64, nothing between them. One of several ticks (`cosim.spans`) has, port by port, all rows that are
 due in them. A service that gives nothing in these ticks sends none. An empty bundle says that there will be no other.
 
-A batch is the tick before which all messages have been handed over (int64), then pages: length of the topic's
+A batch is the ticks [start, stop) of which it has all messages (two int64), then pages: length of the topic's
 name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
 """
 
@@ -23,7 +23,7 @@ from dynamics.rows import width
 from messages.topics import topic_named
 
 _PAGE = struct.Struct("<HII")
-_STOP = struct.Struct("<q")
+_TICKS = struct.Struct("<qq")
 
 
 class BundleError(ValueError):
@@ -106,9 +106,9 @@ class Bundles:
         return self._known[numbers]
 
 
-def pack_batch(pages: Iterable[Page], stop: int) -> bytes:
-    """A batch of pages; all messages before the tick `stop` have been handed over with it."""
-    parts = [_STOP.pack(stop)]
+def pack_batch(pages: Iterable[Page], start: int, stop: int) -> bytes:
+    """A batch of pages, which have all messages of the ticks [start, stop)."""
+    parts = [_TICKS.pack(start, stop)]
     for page in pages:
         payloads = np.ascontiguousarray(page.payloads)
         size = payloads.nbytes // len(page.ticks)
@@ -117,15 +117,15 @@ def pack_batch(pages: Iterable[Page], stop: int) -> bytes:
     return b"".join(parts)
 
 
-def unpack_batch(payload: bytes) -> tuple[int, list[Page]]:
-    """The tick before which all has come, and the pages, payloads of shape (n, size).
+def unpack_batch(payload: bytes) -> tuple[int, int, list[Page]]:
+    """The ticks [start, stop) of which it has all messages, and the pages, payloads of shape (n, size).
 
     Raises:
         BundleError: no batch.
     """
     try:
-        (stop,) = _STOP.unpack_from(payload)
-        place, pages = _STOP.size, []
+        start, stop = _TICKS.unpack_from(payload)
+        place, pages = _TICKS.size, []
         while place < len(payload):
             length, n, size = _PAGE.unpack_from(payload, place)
             place += _PAGE.size
@@ -136,6 +136,6 @@ def unpack_batch(payload: bytes) -> tuple[int, list[Page]]:
             payloads = np.frombuffer(payload, np.uint8, n * size, place).reshape(n, size)
             place += n * size
             pages.append(Page(topic, ticks, payloads))
-        return stop, pages
+        return start, stop, pages
     except (struct.error, ValueError, IndexError) as error:
         raise BundleError(f"a batch of {len(payload)} bytes: {error}") from None

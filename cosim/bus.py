@@ -220,7 +220,8 @@ class ZenohBus:
         return sorted(missing)
 
     def close(self) -> None:
-        """Close the session; what was put before is delivered, but to those whom nothing reaches any more."""
+        """Close the session. What was put just before may be lost (`tests/cosim/test_close.py`): whoever publishes what
+        must arrive waits until the others have confirmed it, as `cosim.process.Process.leave` does."""
         self._closed.set()
         with suppress(zenoh.ZError):  # it has waited for one of these
             self._session.close()

@@ -16,12 +16,13 @@ from cosim.keys import ALIVE_KEY
 from cosim.participants import Participants
 from cosim.private import private_endpoints
 from cosim.restarts import Restarts
-from cosim.starvation import Starvation
-from cosim.watch import STALL, WATCHER, Watch
+from cosim.starvation import Starvation, waited
+from cosim.watch import LONGEST, STALL, WATCHER, Watch
 
 GRACE = 1.5  # [s] a process gets to end after SIGTERM
 LAST_NEWS = 0.05  # [s] for what the processes said at their end
 FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick, or the last news after it
+BRIEF = 0.005  # [s] between two looks at whether all have ended
 REFUSED = 2  # exit code of a service whose user can mend what is wrong
 
 
@@ -34,6 +35,7 @@ def launch(
     external: Mapping[str, str] = MappingProxyType({}),
     restarts: Restarts | None = None,
     started: dict[str, Child] | None = None,
+    services: Iterable[str] = (),
 ) -> dict[str, str]:
     """Run the processes `names` as children of this one until the run has ended; what those beside had to say.
 
@@ -46,6 +48,7 @@ def launch(
         external: endpoints of those among `names` that somebody else starts; everybody connects to them.
         restarts: who is started again where it is killed or stopped; None: nobody.
         started: processes that are there already (`started_early`); those that are not needed are ended.
+        services: those that hand over messages.
 
     Raises:
         RunFailed: a service died or froze, or the run ended before its time.
@@ -75,13 +78,14 @@ def launch(
         listen, connect = mesh(WATCHER, endpoints)
         with ZenohBus(listen, connect, mark=participants.mark(WATCHER), awaits=False) as bus:
             try:
-                watch = Watch(bus, participants, [*names, *beside, *external])
+                watch = Watch(bus, participants, [*names, *beside, *external], services=services)
                 bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it
                 ready = [name for name in everybody if name in (started or ())]
                 begin(ready)
                 begin([name for name in everybody if name not in ready])
                 dismiss(started or {})
                 _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
+                _await({name: children[name] for name in beside if name in watch.confirmed}, FAREWELL)
             finally:
                 early = {
                     name: code for name in beside if name in children and (code := children[name].poll()) is not None
@@ -151,11 +155,13 @@ def _follow(
             ended_at = ended_at or time.monotonic()
             if time.monotonic() - ended_at > STALL:
                 _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
-            if time.monotonic() - max(ended_at, watch.last_news) > FAREWELL:
+            silence = time.monotonic() - max(ended_at, watch.last_news)
+            if silence > LONGEST or silence - starvation.of(children) > FAREWELL:
                 if early := watch.broken_off():  # the first fault is told
                     raise RunFailed(early)
-                left = ", ".join(name for name, child in children.items() if child.poll() is None)
-                raise RunFailed(f"{left}: did not end within {FAREWELL:g} s of the last news")
+                left = [name for name, child in children.items() if child.poll() is None]
+                silent = [name for name in left if name not in watch.confirmed] or left
+                raise RunFailed(f"{', '.join(silent)}: did not end within {FAREWELL:g} s of the last news")
     watch.poll(LAST_NEWS)
     observe(watch)
     if early := watch.broken_off():
@@ -227,14 +233,24 @@ def _ask_to_end(children: dict[str, subprocess.Popen | Forked]) -> None:
             child.terminate()
 
 
+def _await(children: Mapping[str, subprocess.Popen | Forked], seconds: float) -> None:
+    """Wait until all have ended, `seconds` at most, in which the time that they wait for a processor does not count."""
+    began = time.monotonic()
+    before = {name: waited(child.pid) for name, child in children.items()}
+    while left := [name for name, child in children.items() if child.poll() is None]:
+        passed = time.monotonic() - began
+        starved = sum(max(0.0, waited(children[name].pid) - before[name]) for name in left)
+        if passed > LONGEST or passed - starved > seconds:
+            return
+        time.sleep(BRIEF)
+
+
 def _end(children: dict[str, subprocess.Popen | Forked]) -> None:
     """End what still runs: first asked, then forced."""
     _ask_to_end(children)
-    deadline = time.monotonic() + GRACE
+    _await(children, GRACE)
     for child in children.values():
-        try:
-            child.wait(timeout=max(0.0, deadline - time.monotonic()))
-        except subprocess.TimeoutExpired:
+        if child.poll() is None:
             child.kill()
             child.wait()
         if child.stdin:

@@ -71,19 +71,26 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
             if allowed is not None and not owns_time:
                 deadlines.note(time.perf_counter() - begun - allowed * (graph.tick - tick))
         if owns_time:
-            process.say(ENDED_KEY)
+            process.say_last(ENDED_KEY)
     except EndOfRun as end:
         if owns_time:
-            process.say(ENDED_KEY, f"{end} ended before the run did")
+            process.say_last(ENDED_KEY, f"{end} ended before the run did")
     except DivergedError as error:  # said before the end is
-        process.say(DIVERGED_KEY, str(error))
+        process.say_last(DIVERGED_KEY, str(error))
         raise
     finally:
         if allowed is not None:
-            process.say(DEADLINES_KEY, deadlines.told())
-        outlets.end(graph.tick)
+            process.say_last(DEADLINES_KEY, deadlines.told())
+        _leave(process, outlets, graph.tick)
     if linger:  # somebody may be started again who has missed the last bundles
         linger()
+
+
+def _leave(process: Process, outlets: Outlets, stop: int) -> None:
+    """Hand over what is left of the ticks before `stop`, and wait until everybody has received it."""
+    outlets.end(stop)
+    process.confirm()
+    process.leave(lambda: outlets.say_end(stop))
 
 
 def _catch_up(
@@ -146,7 +153,7 @@ def run_encoder(process: Process, service: Service) -> None:
     except EndOfRun:
         return
     finally:
-        outlets.end(graph.tick)
+        _leave(process, outlets, graph.tick)
     raise Stopped
 
 

@@ -4,12 +4,12 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TypeVar
 
 from cosim.bus import ZenohBus
 from cosim.errors import LockStepError
-from cosim.keys import ALIVE_KEY, COMPILING_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
+from cosim.keys import ALIVE_KEY, COMPILING_KEY, HEARD_KEY, LOGGED_KEY, REFUSED_KEY, SETUP_KEY, WAITING_KEY
 from cosim.participants import Participants
 from cosim.private import remove
 from cosim.restart import Journal
@@ -26,7 +26,10 @@ PATIENCE = 1.0  # [s] of waiting after which a service says what it waits for
 JOIN_TIMEOUT = 600.0  # [s] the others get to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] a participant gets to tell its set-up
 ASK_TIMEOUT = 1.0  # [s] one gets to tell what another has missed
-FAREWELL = 10.0  # [s] whoever watches gets to hear of the end
+CONFIRMED = 60.0  # [s] the others get to confirm a last message; a launcher, which knows who starves, is stricter
+INTERRUPTED = 1.0  # [s] the same where this process was asked to end
+FOREIGN = 2.0  # [s] a program of somebody else's gets to leave after the end
+REPEAT = 0.2  # [s] between two last messages, for those who joined after the first, or whose link was cut
 BRIEF = 0.02  # [s]
 ORPHANED = 10.0  # [s] a process gets to its end whose launcher is gone
 FOUND_OUT = 3.0  # [s] for everybody to find a difference
@@ -80,6 +83,10 @@ class Process:
         self.abandoned = ""  # who watched the run, and is gone
         self._compiling = False
         self._refused = 0
+        self._there = set(others) - {name}  # participants that have joined, or must, and have not left
+        self._confirmed: dict[str, set[str]] = {}  # participants by the key of the token that they have declared
+        self._changed = threading.Event()  # in one of the two
+        self._last_words: list[tuple[str, str]] = []
         on_compile(self._tell_of_compiling)
         signal.signal(signal.SIGTERM, self._stop)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
@@ -101,6 +108,11 @@ class Process:
     def say(self, key: str, text: str = "") -> None:
         """Tell those who watch the run, on a key of the lock step."""
         self.bus.publisher(f"{self.key_prefix}/{key}/{self.name}")(text.encode(), 0)
+
+    def say_last(self, key: str, text: str = "") -> None:
+        """The same at the end of this process; repeated until everybody has confirmed it (`leave`)."""
+        self._last_words.append((key, text))
+        self.say(key, text)
 
     def tell_of_refused(self) -> None:
         """Say how many messages of strangers were refused, when there are more than before."""
@@ -134,12 +146,71 @@ class Process:
 
         self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/{name}", changed)
 
-    def linger(self) -> None:
-        """Stay until whoever watches the run has left: what is said at the end is lost with the session of its sender
-        where the network is cut just then."""
-        deadline = time.monotonic() + FAREWELL
-        while not self.stopping and time.monotonic() < deadline:
-            time.sleep(BRIEF)
+    def confirm(self) -> None:
+        """Declare that this process has received the last message of everybody whose messages it takes.
+
+        The token stays as long as the session, so that a process whose link was cut sees it later.
+        """
+        self.bus.declare_alive(f"{self.key_prefix}/{HEARD_KEY}/{self.name}")
+
+    def leave(self, repeat: Callable[[], None], key: str = HEARD_KEY, only: Collection[str] | None = None) -> None:
+        """Wait until the others have confirmed the last message of this process, or have left.
+
+        Zenoh does not deliver what is still queued when a session closes, so no process closes its session before.
+
+        Args:
+            repeat: publishes the last message again; called until all have confirmed it.
+            key: of the token that confirms it.
+            only: participants that confirm it, None for all.
+
+        Raises:
+            LockStepError: names who did not confirm it in time.
+        """
+        began = repeated = time.monotonic()
+        while late := self._unconfirmed(key, only, time.monotonic() - began):
+            now = time.monotonic()
+            if now - began > (INTERRUPTED if self.stopping else CONFIRMED):
+                if self.stopping:
+                    return
+                raise LockStepError(f"{self.name}: {', '.join(late)} did not confirm its last message")
+            if now - repeated > REPEAT:
+                for word in self._last_words:
+                    self.say(*word)
+                repeat()
+                repeated = now
+            self._changed.wait(BRIEF)
+            self._changed.clear()
+
+    def _unconfirmed(self, key: str, only: Collection[str] | None, waited: float) -> list[str]:
+        """Who is there and has not confirmed; a program of somebody else's does so by leaving, for which it has less
+        time."""
+        late = self._there.copy() - self._confirmed.get(key, set())
+        if only is not None:
+            late &= set(only)
+        if waited > FOREIGN:
+            late -= set(self.participants.external)
+        return sorted(late)
+
+    def _follow_others(self) -> None:
+        """Keep track of who is there, and of who has confirmed what."""
+
+        def there(key: str, alive: bool) -> None:
+            name = key.rpartition("/")[2]
+            if not alive:
+                self._there.discard(name)
+            elif name != self.name:
+                self._there.add(name)
+            self._changed.set()
+
+        def confirmed(key: str, alive: bool) -> None:
+            head, name = key.split("/")[-2:]
+            if alive:
+                self._confirmed.setdefault(head, set()).add(name)
+            self._changed.set()
+
+        self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/*", there)
+        for key in (HEARD_KEY, LOGGED_KEY):
+            self.bus.watch_alive(f"{self.key_prefix}/{key}/*", confirmed)
 
     def ask(self, key: str, name: str, words: str) -> bytes | None:
         """What the participant `name` answers to these words on a key of the lock step, None where it does not."""
@@ -176,6 +247,7 @@ class Process:
             LockStepError: somebody did not come.
             ValueError: another participant has resolved something else; names the first difference.
         """
+        self._follow_others()
         packed = pack(self.setup)
         self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", lambda _: packed)
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")

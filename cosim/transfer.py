@@ -186,7 +186,7 @@ class Outlets:
         self._due = time.monotonic() + BATCH
         if stop > self._handed:
             pages = self._graph.pages(self._handed, stop)
-            self._put_batch(pack_batch(pages, stop), (stop - 1) * self._interval_ns)
+            self._put_batch(pack_batch(pages, self._handed, stop), (stop - 1) * self._interval_ns)
             self._handed = stop
 
     def end(self, stop: int) -> None:
@@ -198,9 +198,13 @@ class Outlets:
         self._delivery.close()
         self._hand_over(stop)
         self._process.tell_of_refused()
-        time_ns = stop * self._interval_ns
         if self._held:
-            self._held.add(b"", time_ns)
+            self._held.add(b"", stop * self._interval_ns)
+        self.say_end(stop)
+
+    def say_end(self, stop: int) -> None:
+        """Say that there will be no more from the tick `stop` on; whoever has heard it before takes no notice."""
+        time_ns = stop * self._interval_ns
         bundles = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
         for put in (*bundles, self._put_batch, *self._puts.values()):
             put(b"", time_ns)

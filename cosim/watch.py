@@ -12,6 +12,8 @@ from cosim.keys import (
     COMPILING_KEY,
     DIVERGED_KEY,
     ENDED_KEY,
+    HEARD_KEY,
+    LOGGED_KEY,
     RECORDED_KEY,
     REFUSED_KEY,
     WAITING_KEY,
@@ -29,11 +31,26 @@ HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDE
 class Watch:
     """What a launcher sees of a run: who is there, how far it is, what it waits for."""
 
-    def __init__(self, bus: ZenohBus, participants: Participants, names: Iterable[str], patience: float = STALL):
-        """Follow the participants `names`; after `patience` [s] without news one counts as frozen.
+    def __init__(
+        self,
+        bus: ZenohBus,
+        participants: Participants,
+        names: Iterable[str],
+        patience: float = STALL,
+        services: Iterable[str] = (),
+    ):
+        """Follow a run; `newest` holds the newest payload of each topic.
 
-        `newest` holds the newest payload of each topic.
+        Args:
+            bus: the session.
+            participants: of the run.
+            names: of the participants.
+            patience: time [s] without news after which one counts as frozen.
+            services: those that hand over messages; each waits until its last one is confirmed.
         """
+        self._going = set(services)  # those of which the last message has not come
+        self.confirmed: set[str] = set()  # participants that have received the last message of every service
+        self._logged = False  # the recorder's last message has come
         self._patience = patience
         self._bus, self._key_prefix, names = bus, participants.key_prefix, list(names)
         self.newest: dict[Topic, bytes] = {}
@@ -58,6 +75,7 @@ class Watch:
             senders |= participants.senders(key, names)
         self._news = bus.receive(senders)
         bus.watch_alive(f"{self._key_prefix}/{ALIVE_KEY}/*", self._alive)
+        bus.watch_alive(f"{self._key_prefix}/{HEARD_KEY}/*", self._confirms)
 
     def _alive(self, key: str, alive: bool) -> None:
         name = key.rsplit("/", 1)[1]
@@ -66,6 +84,10 @@ class Watch:
             self.gone.discard(name)
         elif name in self.present:
             self.gone.add(name)
+
+    def _confirms(self, key: str, alive: bool) -> None:
+        if alive:
+            self.confirmed.add(key.rsplit("/", 1)[1])
 
     def poll(self, seconds: float) -> None:
         """Take in what arrives during `seconds`."""
@@ -87,28 +109,44 @@ class Watch:
             elif head == RECORDED_KEY:
                 self.last_news = time.monotonic()
                 self.slow_disk = self.slow_disk or waits_for_disk(payload)
+                if not payload and not self._logged:
+                    self._logged = True
+                    self._declare(LOGGED_KEY)
             elif head == ENDED_KEY:
                 self.outcome = payload.decode(errors="replace")
             elif head == REFUSED_KEY and payload.isdigit():
                 self._refused[name] = int(payload)
 
     def _take_batch(self, name: str, time_ns: int, payload: bytes) -> None:
+        if not payload:
+            self._take_end(name)
+            return
         self.last_news = time.monotonic()
         self.waiting.clear()
-        if not payload:
-            self.ended = True
-            return
         self.began = self.began or self.last_news
         self.wall = self.last_news - self.began
         self._times[name] = max(time_ns, self._times.get(name, 0))
         self.time_ns = min(self._times.values())
-        stop, pages = unpack_batch(payload)
+        _, stop, pages = unpack_batch(payload)
         pages = later(pages, self._stops.get(name, 0))  # who was started again may give some a second time
         self._stops[name] = max(stop, self._stops.get(name, 0))
         for page in pages:
             self.newest[page.topic] = page.payloads[-1].tobytes()
         if self.listen:
             self.listen(pages)
+
+    def _take_end(self, name: str) -> None:
+        if name in self._going:
+            self._going.discard(name)
+            self.last_news = time.monotonic()
+            self.waiting.clear()
+            if not self._going:
+                self._declare(HEARD_KEY)
+        self.ended = True
+
+    def _declare(self, key: str) -> None:
+        """Confirm last messages, to whoever waits for that before it leaves."""
+        self._bus.declare_alive(f"{self._key_prefix}/{key}/{WATCHER}")
 
     def forget(self, name: str) -> None:
         """A participant is being started again: it is not there until it says so."""

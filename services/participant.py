@@ -126,8 +126,6 @@ def take_part(given: Participation) -> None:
             else:
                 module = __import__(f"{entry.package}.service", fromlist=["run"])
                 module.run(process, given)
-            if watched and (encoded or entry.lock_step):
-                process.linger()
         except Stopped:
             if process.abandoned:
                 raise LockStepError(f"{given.name}: {process.abandoned} is gone before the run has ended") from None

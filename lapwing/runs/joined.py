@@ -40,7 +40,7 @@ def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch],
     listen, connect = mesh(WATCHER, peers)
     mark, security = participants.mark(WATCHER), settings(setup, WATCHER, key_prefix, given.keys)
     with Stop() as stop, ZenohBus(listen, connect, mark=mark, security=security) as bus:
-        watch = Watch(bus, participants, peers, LOST)
+        watch = Watch(bus, participants, peers, LOST, setup.services)
         leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
         try:
             _follow(watch, clock, stop, names, live)

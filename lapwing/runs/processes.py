@@ -76,7 +76,9 @@ def fly_processes(
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
-        for name, words in launch(names, give, participants, ended, beside, external, restarts, early).items():
+        services = setup.services
+        said = launch(names, give, participants, ended, beside, external, restarts, early, services)
+        for name, words in said.items():
             for line in words.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()

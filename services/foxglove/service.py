@@ -24,21 +24,24 @@ def run(process: Process, given: Any) -> None:
         for topic in events.values():
             server.declare(topic, EVENTS.message.type_name)
         process.join()
-        while not process.stopping:
+        flying = set(process.setup.services)  # those whose last batch has not come
+        while flying and not process.stopping:
             news = arrived.get_with_key(POLL)
             if news is None:
                 continue
             key, time_ns, payload = news
             if not payload:
-                return
+                flying.discard(key.rpartition("/")[2])
+                continue
             if key in events:
                 server.log(events[key], time_ns, payload)
                 continue
             messages = []
-            for page in unpack_batch(payload)[1]:
+            for page in unpack_batch(payload)[2]:
                 topic = page.topic.key(setup.vehicle)
                 server.declare(topic, page.topic.message.type_name)
                 times = page.ticks * setup.interval_ns
                 messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, page.payloads, strict=True)]
             for time_ns, topic, message in sorted(messages, key=lambda m: m[0]):
                 server.put(topic, time_ns, message)
+        process.confirm()

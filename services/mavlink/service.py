@@ -62,16 +62,19 @@ def run(process: Process, given: Any) -> None:
         estimated = process.bus.receive(estimates, notify=leading.wake)
         arrived = process.bus.receive(senders, notify=None if estimates else leading.wake)
         process.join(wait)  # endpoints may connect while the others still load or compile
-        flying = True
+        flying = set(setup.services)  # those whose last batch has not come
         while flying and not process.stopping:
             wait()
             while flying and (news := estimated.get_with_key(0.0) or arrived.get_with_key(0.0)) is not None:
                 name, time_ns, payload = news
-                flying = bool(payload)
-                if flying and name in woken:
-                    woken[name].take(ESTIMATE, time_ns, payload)
-                elif flying:
+                if name in woken:
+                    if payload:
+                        woken[name].take(ESTIMATE, time_ns, payload)
+                elif payload:
                     _take_batch(hubs, payload, at_once, setup.interval_ns)
+                else:
+                    flying.discard(name.rpartition("/")[2])
+        process.confirm()
         for name, hub in hubs.items():
             for line in hub.report():
                 print(f"{name}: {line}" if others else line, flush=True)
@@ -79,7 +82,7 @@ def run(process: Process, given: Any) -> None:
 
 def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: bool, interval_ns: int) -> None:
     """Every command, acknowledgement and status, estimates where they do not come at once, of all else the newest."""
-    _, pages = unpack_batch(payload)
+    *_, pages = unpack_batch(payload)
     for page in pages:
         topic = of_all(page.topic)
         if topic is ESTIMATE and at_once:

@@ -8,7 +8,8 @@ import numpy as np
 from cosim.backlog import Teller
 from cosim.bundle import unpack_batch
 from cosim.deadlines import Lateness, entries, lateness
-from cosim.keys import BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, HANDED_KEY, RESTARTED_KEY
+from cosim.errors import LockStepError
+from cosim.keys import BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, HANDED_KEY, LOGGED_KEY, RESTARTED_KEY
 from cosim.log import LogWriter
 from cosim.process import Process, Stopped
 from cosim.provenance import RESTARTS, WAITED, attachments, failure, metadata
@@ -39,7 +40,7 @@ def run(process: Process, given: Any) -> None:
         try:
             process.join()
             while not pending.ended:
-                key, _, payload = process.patient(news.get_with_key, pending.waits_for)
+                key, time_ns, payload = process.patient(news.get_with_key, pending.waits_for)
                 head, name = key.split("/")[-2:]
                 if head == DEADLINES_KEY:
                     late[name] = lateness(payload.decode(errors="replace"))
@@ -51,20 +52,26 @@ def run(process: Process, given: Any) -> None:
                     if payload:  # an end without a reason is that of the run
                         writer.metadata |= failure(payload.decode(errors="replace"), head == DIVERGED_KEY)
                     continue
-                pending.add(name, payload)
+                pending.add(name, payload, time_ns // setup.interval_ns)
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)
                     process.tell_of_refused()
                 progress.recorded(pending.written)  # also where a batch completes nothing: it still takes in
+            process.confirm()
         except Stopped:
             writer.metadata = failure("the run was ended") | writer.metadata
+            raise
+        except LockStepError as error:
+            writer.metadata = failure(str(error)) | writer.metadata
             raise
         finally:
             recording.finish()
             writer.metadata |= entries(late)
             if writer.waited >= TOLD:
                 writer.metadata[WAITED] = f"{writer.waited:.1f} s"
+    progress.end()
+    process.leave(progress.end, LOGGED_KEY, [WATCHER])
 
 
 class Pending:
@@ -82,14 +89,25 @@ class Pending:
         """Whether nobody will hand over more."""
         return not self._left
 
-    def add(self, name: str, payload: bytes) -> None:
-        """A batch of a service; an empty one is its last."""
+    def add(self, name: str, payload: bytes, end: int) -> None:
+        """A batch of a service; an empty one says that it has handed over all before the tick `end`.
+
+        Raises:
+            LockStepError: a batch before this one has not come.
+        """
         if not payload:
+            self._check(name, end)
             self._left.discard(name)
             return
-        stop, pages = unpack_batch(payload)
+        start, stop, pages = unpack_batch(payload)
+        self._check(name, start)
         self._pages += later(pages, self._stop[name])  # who was started again may give some a second time
         self._stop[name] = max(stop, self._stop[name])
+
+    def _check(self, name: str, tick: int) -> None:
+        if tick > self._stop[name]:
+            first = self._stop[name]
+            raise LockStepError(f"recorder: the messages of {name} of the ticks {first} to {tick - 1} are lost")
 
     def progress(self, name: str) -> bytes:
         """How far a service is, as it asks after it was started again."""

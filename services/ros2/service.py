@@ -56,6 +56,7 @@ def run(process: Process, given: Any) -> None:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
                 flying.discard(key)
+        process.confirm()
     for commands in dict.fromkeys(given_to.values()):
         if report := commands.report():
             print(report if setup.vehicle else f"{commands.vehicle}: {report}", flush=True)

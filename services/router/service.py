@@ -13,6 +13,7 @@ from services.processes import RECORDER
 def run(process: Process, given: Any) -> None:
     """Listen until the recorder has the whole run, or until asked to stop."""
     process.join()
+    process.confirm()  # it takes no messages, but passes them on
     process.end_with(RECORDER)
     while not process.stopping:
         time.sleep(POLL)

@@ -60,7 +60,8 @@ def fly_apart(setup, operator):
         ended = graphs[TIME_OWNER].ended
         for i, (name, graph) in enumerate(graphs.items()):
             if ended or graph.tick - handed[name] >= 11 + 6 * i:
-                stop, pages = unpack_batch(pack_batch(graph.pages(handed[name], graph.tick), graph.tick))
+                pages = graph.pages(handed[name], graph.tick)
+                _, stop, pages = unpack_batch(pack_batch(pages, handed[name], graph.tick))
                 log.write(pages, stop - 1)
                 handed[name] = stop
     return log

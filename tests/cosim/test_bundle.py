@@ -137,8 +137,8 @@ def records(n):
 
 def test_a_batch_comes_out_as_it_went_in():
     pages = [page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3), records(4), page(COMMAND_ACKS, 10, 2, 0)]
-    stop, found = unpack_batch(pack_batch(pages, 27))
-    assert stop == 27
+    start, stop, found = unpack_batch(pack_batch(pages, 20, 27))
+    assert (start, stop) == (20, 27)
     for before, after in zip(pages, found, strict=True):
         assert after.topic is before.topic
         assert after.ticks.tolist() == before.ticks.tolist()
@@ -146,13 +146,13 @@ def test_a_batch_comes_out_as_it_went_in():
 
 
 def test_a_batch_without_messages_says_how_far_it_goes():
-    assert unpack_batch(pack_batch([], 5)) == (5, [])
+    assert unpack_batch(pack_batch([], 3, 5)) == (3, 5, [])
 
 
-WHOLE = pack_batch([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 27)
+WHOLE = pack_batch([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 27)
 
 
-@given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (8, 8 + 10 + 20 * (8 + 256))))
+@given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (16, 16 + 10 + 20 * (8 + 256))))
 def test_a_batch_cut_short_is_refused(size):
     with pytest.raises(BundleError, match=rf"^a batch of {size} bytes: "):
         unpack_batch(WHOLE[:size])
@@ -160,4 +160,4 @@ def test_a_batch_cut_short_is_refused(size):
 
 def test_a_batch_of_an_unknown_topic_is_refused():
     with pytest.raises(BundleError, match=r"^a batch of "):
-        unpack_batch(WHOLE[:8] + b"\xff\xff" + WHOLE[10:])
+        unpack_batch(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])

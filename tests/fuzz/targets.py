@@ -74,7 +74,7 @@ def cdr() -> Target:
 
 def batches() -> Target:
     poses = np.frombuffer(2 * PoseStamped().encode(), np.uint8).reshape(2, -1)
-    return Target(unpack_batch, (pack_batch([Page(POSE, np.array([0, 5]), poses)], 7), pack_batch([], 3)))
+    return Target(unpack_batch, (pack_batch([Page(POSE, np.array([0, 5]), poses)], 0, 7), pack_batch([], 0, 3)))
 
 
 def attachments() -> Target:

@@ -1,18 +1,19 @@
 """The recorder holds messages back until every service has handed over their ticks, and loses none."""
 
 import numpy as np
+import pytest
 
 from cosim.bundle import pack_batch
+from cosim.errors import LockStepError
 from cosim.wire import Page
 from messages.topics import ACTUATORS, POSE, TRUTH
 from services.recorder.service import Pending
 
 
-def batch(topic, ticks, stop):
+def batch(topic, ticks, stop, start=0):
     ticks = np.array(ticks)
-    return pack_batch(
-        [Page(topic, ticks, ticks.astype("<i8").view(np.uint8).reshape(-1, 8))] if len(ticks) else [], stop
-    )
+    pages = [Page(topic, ticks, ticks.astype("<i8").view(np.uint8).reshape(-1, 8))] if len(ticks) else []
+    return pack_batch(pages, start, stop)
 
 
 def written(pending):
@@ -23,30 +24,49 @@ def written(pending):
 
 def test_messages_wait_for_the_slowest_service():
     pending = Pending(["plant", "autopilot"])
-    pending.add("plant", batch(TRUTH, range(10), 10))
+    pending.add("plant", batch(TRUTH, range(10), 10), 0)
     assert written(pending) == {}
-    pending.add("autopilot", batch(ACTUATORS, range(4), 4))
+    pending.add("autopilot", batch(ACTUATORS, range(4), 4), 0)
     assert written(pending) == {TRUTH.name: [0, 1, 2, 3], ACTUATORS.name: [0, 1, 2, 3]}
     assert written(pending) == {}
-    pending.add("autopilot", batch(ACTUATORS, range(4, 12), 12))
+    pending.add("autopilot", batch(ACTUATORS, range(4, 12), 12, 4), 0)
     assert written(pending) == {TRUTH.name: list(range(4, 10)), ACTUATORS.name: list(range(4, 10))}
     assert pending.written == 10
 
 
 def test_a_service_without_a_message_hands_over_its_ticks_too():
     pending = Pending(["plant", "trajectory"])
-    pending.add("plant", batch(POSE, [0, 5], 7))
+    pending.add("plant", batch(POSE, [0, 5], 7), 0)
     assert pending.waits_for() == "the messages of trajectory from tick 0 on"
-    pending.add("trajectory", batch(POSE, [], 6))
+    pending.add("trajectory", batch(POSE, [], 6), 0)
     assert written(pending) == {POSE.name: [0, 5]}
 
 
 def test_it_ends_once_every_service_has_said_so():
     pending = Pending(["plant", "autopilot"])
     for name, topic in (("plant", TRUTH), ("autopilot", ACTUATORS)):
-        pending.add(name, batch(topic, [0, 1], 2))
-    pending.add("plant", b"")
+        pending.add(name, batch(topic, [0, 1], 2), 0)
+    pending.add("plant", b"", 2)
     assert not pending.ended
-    pending.add("autopilot", b"")
+    pending.add("autopilot", b"", 2)
     assert pending.ended
     assert written(pending) == {TRUTH.name: [0, 1], ACTUATORS.name: [0, 1]}
+
+
+def test_a_lost_batch_is_an_error_that_names_its_service():
+    pending = Pending(["plant", "autopilot"])
+    pending.add("plant", batch(TRUTH, range(4), 4), 0)
+    with pytest.raises(LockStepError, match="the messages of plant of the ticks 4 to 7 are lost"):
+        pending.add("plant", batch(TRUTH, range(8, 12), 12, 8), 0)
+    with pytest.raises(LockStepError, match="the messages of autopilot of the ticks 0 to 2 are lost"):
+        pending.add("autopilot", b"", 3)
+
+
+def test_a_batch_and_an_end_that_come_again_change_nothing():
+    pending = Pending(["plant"])
+    for _ in range(2):
+        pending.add("plant", batch(TRUTH, range(4), 4), 0)
+    for _ in range(2):
+        pending.add("plant", b"", 4)
+    assert pending.ended
+    assert written(pending) == {TRUTH.name: [0, 1, 2, 3]}
