@@ -20,7 +20,7 @@ $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	touch $@
 
 mission: $(VENV)/.installed
-	$(BIN)/lapwing run scenes/delivery_mission.toml
+	$(BIN)/lapwing run lapwing/scenes/delivery_mission.toml
 
 # Ground stations and ROS 2 nodes that the tests fly with; where they cannot be had, those tests say so and are skipped.
 # zenoh-ros2-sdk has a folder to itself: it brings a package `messages`, which would stand before ours.
@@ -78,11 +78,11 @@ audit: $(VENV)/audit/bin/pip-audit
 	$(VENV)/audit/bin/pip-audit --vulnerability-service osv --strict --require-hashes --disable-pip $(addprefix --requirement ,$(SHIPPED))
 
 # A wheel that has the kernels of a scene with it, for processors like this one's; others compile their own.
-SHIPS ?= scenes/delivery_mission.toml
+SHIPS ?= lapwing/scenes/delivery_mission.toml
 wheel: $(VENV)/.installed
-	LAPWING_CACHE=dynamics/kernel/shipped $(BIN)/lapwing warm $(SHIPS)
+	LAPWING_CACHE=lapwing/kernels/shipped $(BIN)/lapwing warm $(SHIPS)
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
-	rm -r build/lib dynamics/kernel/shipped
+	rm -r build/lib lapwing/kernels/shipped
 
 docker-build:
 	PYTHON=$(PYTHON) deploy/build.sh

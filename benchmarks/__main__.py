@@ -10,8 +10,8 @@ import sys
 import traceback
 
 import benchmarks
-from benchmarks._bars import show
-from dynamics import discovery
+from benchmarks._targets import show
+from lapwing.dynamics import discovery
 
 found = discovery.modules(benchmarks)
 parser = argparse.ArgumentParser(prog="python -m benchmarks")

@@ -12,11 +12,11 @@ import llvmlite.binding as llvm
 import numpy as np
 
 import lapwing
-from benchmarks._bars import Row, show
-from dynamics import batch as kernels
-from dynamics.kernel import kernel
-from dynamics.vehicles import multirotor
-from services.table import load, resolve
+from benchmarks._targets import Row, show
+from lapwing.dynamics import simd_batch as kernels
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.kernels import kernel
+from lapwing.services.scene_resolver import load, resolve
 
 N, TICKS, REPETITIONS = 2048, 10, 300  # runs of a millisecond, so that most are not interrupted
 

@@ -19,7 +19,7 @@ from statistics import median
 import numpy as np
 
 import lapwing
-from benchmarks._bars import Row, show
+from benchmarks._targets import Row, show
 
 N, STEPS, REPEATS, ROUNDS, FINER = 512, 100, 5, 1, 8
 STEP, SECONDS = 1e-3, 0.5

@@ -10,22 +10,22 @@ import time
 from contextlib import ExitStack, contextmanager
 from statistics import median
 
-import studies.fly
-from benchmarks._bars import Row, show
-from cosim.graph import Graph
-from studies.campaign import runs as campaign_runs
-from studies.campaign.distributions import parse
-from studies.campaign.plan import plan
-from studies.campaign.runs import row_of
-from studies.flight import Flight
+import lapwing.studies.simulate
+from benchmarks._targets import Row, show
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.studies.campaign import runs as campaign_runs
+from lapwing.studies.campaign.distributions import parse
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.runs import row_of
+from lapwing.studies.flight_data import Flight
 
 SCENE = "delivery_mission"
 VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.wind_random.mean.0": parse("uniform(0, 12)")}
 FLIGHT = "flight"
 PARTS = {
     "scene and set-up": (campaign_runs, "setup_of"),
-    "services": (studies.fly, "create_all"),
-    "graph": (studies.fly, "Graph"),
+    "services": (lapwing.studies.simulate, "create_all"),
+    "graph": (lapwing.studies.simulate, "Graph"),
     FLIGHT: (Graph, "advance"),
     "rows as columns": (Flight, "of_each"),
     "figures": (campaign_runs, "figures"),

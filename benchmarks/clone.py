@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from benchmarks._bars import Row, empty_cache, said_within, show, wall
+from benchmarks._targets import Row, empty_cache, said_within, show, wall
 
 SLOW = True  # left out by `python -m benchmarks --quick`
 ROOT = Path(__file__).parent.parent

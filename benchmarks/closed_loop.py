@@ -18,13 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks._bars import Row, show
 from benchmarks._jsbsim import CONTROL, JsbsimQuad
-from services.table import load
-from studies.campaign.plan import plan
-from studies.campaign.runs import row_of
-from studies.campaign.setup import TOPICS, campaign_setup
-from studies.fly import fly
+from benchmarks._targets import Row, show
+from lapwing.services.scene_resolver import load
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.runs import row_of
+from lapwing.studies.simulate import fly
 
 SECONDS, RUNS, REPEATS = 2.0, 10, 3
 AWAY = 0.5  # [m] the others fly to a point so far

@@ -9,9 +9,9 @@ Shards of 250 runs whose rows are there at once, on one worker; scheduler and co
 import sys
 import time
 
-from studies.campaign.cluster import dask
-from studies.campaign.folder import MOST
-from studies.figures import FIGURES
+from lapwing.studies.campaign.cluster import dask
+from lapwing.studies.campaign.folder import MOST
+from lapwing.studies.metrics import FIGURES
 
 
 def rows(shard):

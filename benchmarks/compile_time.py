@@ -6,7 +6,7 @@ python -m benchmarks.compile_time
 import subprocess
 import sys
 
-from benchmarks._bars import Row, empty_cache, show
+from benchmarks._targets import Row, empty_cache, show
 
 DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.wind_random.beside_drag": True}
 EULER = {"vehicle.model": "multibody", "multibody.coordinates": "euler", "run.duration": 0.1}

@@ -11,10 +11,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks._bars import LAPWING, Row, show
-from benchmarks.growth import taken
-from lapwing.runs.single import fly_single
-from services.table import load, resolve
+from benchmarks._targets import LAPWING, Row, show
+from benchmarks.campaign_scaling import taken
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.scene_resolver import load, resolve
 
 BRIEF, LONG = 1.0, 11.0  # [s]
 APART = 3.0  # [m]

@@ -15,21 +15,21 @@ import time
 from itertools import pairwise
 from statistics import median
 
-from benchmarks._bars import Row, show
-from cosim.bus import ZenohBus, mesh
-from cosim.graph import Service
-from cosim.lockstep import pin, run_lockstep
-from cosim.participants import Participants
-from cosim.private import private_endpoints
-from cosim.process import Process
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup, Setup
-from dynamics.rows import to_row
-from services.common import ports
-from services.common.ports import MotorCommand, Reference, TrueState
-from services.plant.wire import PlantWiring
-from services.plant.wire import wires as plant_wires
-from services.trajectory.resolve import LEAD
+from benchmarks._targets import Row, show
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.config.run_config import ServiceSetup, Setup
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.executors.lockstep import pin, run_lockstep
+from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.kernels.row_packing import to_row
+from lapwing.services.common import ports
+from lapwing.services.common.ports import MotorCommand, Reference, TrueState
+from lapwing.services.plant.encoders import PlantWiring
+from lapwing.services.plant.encoders import wires as plant_wires
+from lapwing.services.trajectory.resolve import LEAD
 
 HOPS = 3
 NONE = PlantWiring(5, False, 0, 0.0, ())

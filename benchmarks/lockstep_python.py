@@ -10,11 +10,11 @@ import time
 from types import SimpleNamespace
 
 from benchmarks.lockstep import NONE, PARTS, Constant
-from cosim.graph import Graph, Service
-from cosim.participants import Participants
-from cosim.setup import ServiceSetup, Setup
-from cosim.transfer import PAGE, Outlets, sources
-from services.plant.wire import wires as plant_wires
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.config.run_config import ServiceSetup, Setup
+from lapwing.cosim.diagram.block_diagram import Graph, Service
+from lapwing.cosim.transport.packet_exchange import PAGE, Outlets, sources
+from lapwing.services.plant.encoders import wires as plant_wires
 
 
 class Idle:

@@ -16,21 +16,21 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from cosim.backlog import Backlog
-from cosim.bundle import pack_batch
-from cosim.bus import ZenohBus, mesh
-from cosim.keys import BATCH_KEY
-from cosim.log import LogReader
-from cosim.log.container import Container
-from cosim.participants import Participants
-from cosim.private import private_endpoints
-from cosim.process import Process
-from cosim.setup import Setup
-from cosim.wire import Page
-from messages import Imu, Odometry, PoseStamped, VehicleState, header
-from messages.records import Record, stamp_columns
-from messages.topics import IMU, ODOM, POSE, TRUTH
-from services.recorder import service as recorder
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.executors.log_backpressure import Backlog
+from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.log.mcap_writer import Container
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus_keys import BATCH_KEY
+from lapwing.cosim.transport.packets import pack_batch
+from lapwing.messages import Imu, Odometry, PoseStamped, VehicleState, header
+from lapwing.messages.cdr_arrays import Record, stamp_columns
+from lapwing.messages.topics import IMU, ODOM, POSE, TRUTH
+from lapwing.services.recorder import service as recorder
 
 SOURCE, RECORDER = "source", "recorder"
 PARTICIPANTS = Participants("bench-log")

@@ -21,7 +21,7 @@ import zstandard
 from mcap.records import Attachment, Chunk, MessageIndex
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
-from cosim.log import LogReader
+from lapwing.cosim.log import LogReader
 
 RECORD = struct.Struct("<BQH")  # opcode, length, channel of a message
 

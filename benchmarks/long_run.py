@@ -9,8 +9,8 @@ process of its own.
 import sys
 import tempfile
 
-from benchmarks._bars import LAPWING
-from benchmarks.growth import taken
+from benchmarks._targets import LAPWING
+from benchmarks.campaign_scaling import taken
 
 SLOW = True
 HOVERS = ["--set", "trajectory.phase.2.duration=1e6", "--set", "success.require=[\"verdict == 'timed out'\"]"]

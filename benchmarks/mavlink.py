@@ -21,10 +21,10 @@ from statistics import median
 
 from pymavlink import mavutil
 
-from benchmarks._bars import Row, show
+from benchmarks._targets import Row, show
 from tests.participants import participants
 
-MISSION, GROUND = "scenes/delivery_mission.toml", "scenes/groundstation.toml"
+MISSION, GROUND = "lapwing/scenes/delivery_mission.toml", "lapwing/scenes/groundstation.toml"
 SECONDS = 30.0  # of real time for jitter and processor time
 REPEATS = 5
 SOAK, SOAK_SPEED = 1800.0, 10.0  # [s] simulated, simulated seconds per second
@@ -107,7 +107,7 @@ def soak(folder):
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--speed", f"{SOAK_SPEED:g}", "--set", "autopilot.trajectory=false", "--set", f"run.duration={SOAK:g}"]
     gaps, last, flights, airborne, sent, now, asked = [0.0], None, 0, False, 0.0, 0.0, -1e9
-    with start("scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
+    with start("lapwing/scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
         began = None
         while run.poll() is None:
             message = station.recv_match(blocking=True, timeout=1.0)

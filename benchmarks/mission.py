@@ -12,9 +12,9 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
-from benchmarks._bars import Row, show, size_mb
+from benchmarks._targets import Row, show, size_mb
 
-SCENE = "scenes/delivery_mission.toml"
+SCENE = "lapwing/scenes/delivery_mission.toml"
 
 
 def fly(mode, folder):

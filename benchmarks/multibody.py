@@ -12,14 +12,14 @@ import time
 
 import numpy as np
 
-from dynamics.integrators import get, march
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.multibody import augmented, five_bodies, hold
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, motion
-from dynamics.multibody.delivery_drone import rate as delivery_drone_rate
-from dynamics.multibody.mechanisms import drone_system
-from dynamics.tree import axpy, embed
+from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.multibody import augmented, five_bodies, five_body_stabilisation
+from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, motion
+from lapwing.dynamics.multibody.delivery_drone import rate as delivery_drone_rate
+from lapwing.dynamics.multibody.mechanisms import drone_system
+from lapwing.kernels import kernel
+from lapwing.kernels.state_tree import axpy, embed
 
 INERTIA = (9.8e-6, 8.6e-4, 8.6e-4)
 PAPER = {
@@ -83,7 +83,7 @@ def times(repeats=200):
     """Seconds a call of every contestant, the best of interleaved repeats, each shorter than a time slice."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     p = five_bodies.machine(drone, GRAVITY)
-    x = hold.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    x = five_body_stabilisation.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
     system, (q, v) = drone_system(drone), five_bodies.arrays(x)
     wrench, drive = np.zeros((5, 6)), np.array([[s, 0.0] for s in SPEEDS])
     flight, h = Flight(drone, QUIET), 1e-4
@@ -91,10 +91,22 @@ def times(repeats=200):
         "general acceleration solve": (lambda n: general_solves(system.arrays, q, v.copy(), wrench, drive, n), 40),
         "fast path, five bodies": (lambda n: five_body_solves(p, x, n), 3000),
         "fast path, least coordinates": (lambda n: least_solves(flight, START, n), 3000),
-        "five-body RK4 step": (lambda n: hold.advance(METHOD, p, 0.0, x, h, n, hold.NONE), 300),
-        "five-body RK4 step, partitioning": (lambda n: hold.advance(METHOD, p, 0.0, x, h, n, hold.PARTITION), 200),
-        "five-body RK4 step, projection": (lambda n: hold.advance(METHOD, p, 0.0, x, h, n, hold.PROJECTION), 200),
-        "five-body RKMK4 step, projection": (lambda n: hold.advance(LIE, p, 0.0, x, h, n, hold.PROJECTION), 200),
+        "five-body RK4 step": (
+            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.NONE),
+            300,
+        ),
+        "five-body RK4 step, partitioning": (
+            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PARTITION),
+            200,
+        ),
+        "five-body RK4 step, projection": (
+            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION),
+            200,
+        ),
+        "five-body RKMK4 step, projection": (
+            lambda n: five_body_stabilisation.advance(LIE, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION),
+            200,
+        ),
         "least-coordinate RK4 step": (lambda n: march(METHOD, flight, 0.0, START, h, n), 1000),
     }
     try:
@@ -126,11 +138,15 @@ def errors(h=1e-3, seconds=2.0):
     true = np.array(march(METHOD, flight, 0.0, START, h / 16, 16 * n).attitude)
     out = {"least coordinates": np.array(march(METHOD, flight, 0.0, START, h, n).attitude)}
     p = five_bodies.machine(drone, GRAVITY)
-    x = hold.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
-    out["five bodies, projection"] = np.array(hold.advance(METHOD, p, 0.0, x, h, n, hold.PROJECTION).chassis.attitude)
-    out["five bodies, partitioning"] = np.array(hold.advance(METHOD, p, 0.0, x, h, n, hold.PARTITION).chassis.attitude)
+    x = five_body_stabilisation.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    out["five bodies, projection"] = np.array(
+        five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION).chassis.attitude
+    )
+    out["five bodies, partitioning"] = np.array(
+        five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PARTITION).chassis.attitude
+    )
     out["five bodies, projection, RKMK4"] = np.array(
-        hold.advance(LIE, p, 0.0, x, h, n, hold.PROJECTION).chassis.attitude
+        five_body_stabilisation.advance(LIE, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION).chassis.attitude
     )
     try:
         import mujoco

@@ -15,19 +15,19 @@ from pathlib import Path
 
 import numpy as np
 
-from dynamics import effects, noise
-from dynamics.effects._rotors import total
-from dynamics.effects._types import Motion
-from dynamics.integrators import get, rk4_renormalised
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotation_matrix
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
-from dynamics.vehicles.newton_euler import angular_acceleration
+from lapwing.dynamics import effects, noise
+from lapwing.dynamics.effects._rotor_sums import total
+from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.integrators import get, rk4_renormalised
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics.vehicles.newton_euler import angular_acceleration
+from lapwing.kernels import kernel, leaf
 
 HERE = Path(__file__).parent
-DRONE = load_airframe(HERE.parent / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(HERE.parent / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = noise.stream_key(1, "drone1", "effects")
 H, STEPS, REPETITIONS = 1e-3, 2000, 200  # runs short enough not to be interrupted, most of them

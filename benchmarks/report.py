@@ -13,17 +13,17 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
-from benchmarks._bars import Row
+from benchmarks._targets import Row
 
-SCENE = "scenes/delivery_mission.toml"
+SCENE = "lapwing/scenes/delivery_mission.toml"
 WRITE = """
 import json, sys, time
 from pathlib import Path
-from studies.flight import Flight
+from lapwing.studies.flight_data import Flight
 flight = Flight.read(sys.argv[1])
 flight.rmse, flight.landed
 wall, busy = time.perf_counter(), time.process_time()
-from studies.report import write
+from lapwing.studies.report import write
 path = write(flight, Path(sys.argv[2]))
 wall, busy = time.perf_counter() - wall, time.process_time() - busy
 print(json.dumps({"wall": wall, "busy": busy, "size": path.stat().st_size}))

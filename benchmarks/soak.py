@@ -16,15 +16,15 @@ from pathlib import Path
 from statistics import mean
 from typing import NamedTuple
 
-from benchmarks._bars import Row, show
-from cosim.interrupt import Interrupted
-from cosim.log import LogReader
-from cosim.watch import WATCHER
+from benchmarks._targets import Row, show
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.processes.interrupt import Interrupted
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.processes import fly_processes
-from lapwing.runs.single import fly_single
-from services.participant import Participation
-from services.table import load, resolve
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.process_main import Participation
+from lapwing.services.scene_resolver import load, resolve
 
 SCENE, HOVER = "delivery_mission", "trajectory.phase.2.duration=1e6"
 LINES = 40  # samples of a run

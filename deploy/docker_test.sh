@@ -14,7 +14,7 @@ $COMPOSE version > /dev/null 2>&1 || skip "no docker compose"
 
 ROOT=$PWD
 LAPWING=$(realpath --no-symlinks "${LAPWING:-.venv/bin/lapwing}")
-SCENE=scenes/delivery_mission.toml
+SCENE=lapwing/scenes/delivery_mission.toml
 IMAGE=${IMAGE:-lapwing}
 LIMIT=700000000 # [bytes] of an image
 TIMEOUT=300     # [s] for the mission to begin, fly and end

@@ -10,13 +10,13 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from cosim.bus import ZenohBus
-from cosim.certificates import AUTHORITY, CERTIFICATE, KEY, tls
-from cosim.errors import BusError
-from cosim.keys import DIVERGED_KEY, ENDED_KEY, STEP_KEY
-from cosim.participants import Participants
-from services.common.operator import OPERATOR_KEY
-from services.processes import MAVLINK
+from lapwing.cosim.access.certificates import AUTHORITY, CERTIFICATE, KEY, tls
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.run_errors import BusError
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.bus_keys import DIVERGED_KEY, ENDED_KEY, STEP_KEY
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.process_table import MAVLINK
 
 RUN, KEYS = Participants("lapwing"), Path("keys")
 FORGED = b"forged"

@@ -10,9 +10,9 @@ import argparse
 import json
 from typing import Any
 
-from cosim.watch import WATCHER
-from services import processes
-from services.table import load, resolve
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.services import process_table
+from lapwing.services.scene_resolver import load, resolve
 
 NAMESPACE, PORT, USER = "lapwing", 7447, 1000
 RECORDINGS = {"name": "recordings", "mountPath": "/app/recordings"}
@@ -22,7 +22,7 @@ LABELS = {"app.kubernetes.io/part-of": NAMESPACE}
 
 def manifests(scene: str, image: str) -> list[dict[str, Any]]:
     """All objects of a run of a scene."""
-    names = [*processes.needed(resolve(load(scene))), WATCHER]
+    names = [*process_table.needed(resolve(load(scene))), WATCHER]
     table = ",".join(f"{name}=tls/{name}:{PORT}" for name in names)
     found: list[dict[str, Any]] = [
         {
@@ -83,9 +83,9 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
     log = ["--log", "recordings/flight.mcap"]
     command = {
         WATCHER: ["lapwing", "run", scene, *log, "--json", "recordings/flight.json"],
-        processes.RECORDER: ["lapwing", "service", name, scene, *log],
+        process_table.RECORDER: ["lapwing", "service", name, scene, *log],
     }.get(name, ["lapwing", "service", name, scene])
-    writes = name in (WATCHER, processes.RECORDER)
+    writes = name in (WATCHER, process_table.RECORDER)
     keys = {"name": "keys", "mountPath": f"/app/keys/{name}"}
     restricted = {
         "allowPrivilegeEscalation": False,

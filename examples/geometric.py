@@ -9,10 +9,9 @@ Control Conference, 2013). The attitude that is commanded turns as fast as the l
 import math
 from typing import NamedTuple
 
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import rotation_matrix
-from dynamics.lie.so3 import vee
-from dynamics.vector import (
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.lie.so3 import vee
+from lapwing.dynamics.vector import (
     ZERO,
     Mat3,
     Vec3,
@@ -28,7 +27,8 @@ from dynamics.vector import (
     subtract,
     transpose,
 )
-from services.common.controllers import ThrustAndMoments, VehicleModel
+from lapwing.kernels import kernel
+from lapwing.services.common.controller_api import ThrustAndMoments, VehicleModel
 
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 

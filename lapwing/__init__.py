@@ -13,38 +13,38 @@ What is named here is the public interface; everything is imported when it is fi
 
 TYPE_CHECKING = False  # what type checkers take for true: nothing is imported before `lapwing` answers Ctrl-C
 if TYPE_CHECKING:
-    from cosim.errors import LockStepError
-    from cosim.scene import Scene, SceneError
     from lapwing.api import campaign, fly, load, read
-    from lapwing.batch import Batch, BatchState
+    from lapwing.batch_simulator import Batch, BatchState
+    from lapwing.cosim.run_errors import LockStepError
+    from lapwing.cosim.scene import Scene, SceneError
     from lapwing.flight import Flight
+    from lapwing.services.common.ports import Reference
     from lapwing.simulator import Observation, Simulator
-    from services.common.ports import Reference
-    from studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
-    from studies.events import Event
-    from studies.verdict import Verdict
+    from lapwing.studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
+    from lapwing.studies.flight_events import Event
+    from lapwing.studies.outcome import Verdict
 
 _WHERE = {
-    "Batch": "lapwing.batch",
-    "BatchState": "lapwing.batch",
-    "Event": "studies.events",
+    "Batch": "lapwing.batch_simulator",
+    "BatchState": "lapwing.batch_simulator",
+    "Event": "lapwing.studies.flight_events",
     "Flight": "lapwing.flight",
-    "LockStepError": "cosim.errors",
+    "LockStepError": "lapwing.cosim.run_errors",
     "Observation": "lapwing.simulator",
-    "Reference": "services.common.ports",
-    "Scene": "cosim.scene",
-    "SceneError": "cosim.scene",
+    "Reference": "lapwing.services.common.ports",
+    "Scene": "lapwing.cosim.scene",
+    "SceneError": "lapwing.cosim.scene",
     "Simulator": "lapwing.simulator",
-    "Verdict": "studies.verdict",
+    "Verdict": "lapwing.studies.outcome",
     "campaign": "lapwing.api",
-    "choice": "studies.campaign.distributions",
+    "choice": "lapwing.studies.campaign.distributions",
     "fly": "lapwing.api",
-    "linspace": "studies.campaign.distributions",
+    "linspace": "lapwing.studies.campaign.distributions",
     "load": "lapwing.api",
-    "loguniform": "studies.campaign.distributions",
-    "normal": "studies.campaign.distributions",
+    "loguniform": "lapwing.studies.campaign.distributions",
+    "normal": "lapwing.studies.campaign.distributions",
     "read": "lapwing.api",
-    "uniform": "studies.campaign.distributions",
+    "uniform": "lapwing.studies.campaign.distributions",
 }
 
 __all__ = [

@@ -1,6 +1,6 @@
 """`python -m lapwing` is the command `lapwing`."""
 
-from lapwing.cli.start import main
+from lapwing.cli.entry_point import main
 
 if __name__ == "__main__":
     main()

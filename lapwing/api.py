@@ -7,15 +7,15 @@ from os import cpu_count
 from pathlib import Path
 from typing import Any
 
-from cosim.scene import Overrides, Scene, SceneError
-from cosim.setup import Setup
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.flight import Flight
-from services import table
-from services.common.user_code import lent
-from services.table import reseed, resolve
-from studies import fly as studied
-from studies.campaign.distributions import Distribution
-from studies.campaign.plan import plan
+from lapwing.services import scene_resolver
+from lapwing.services.common.user_code import lent
+from lapwing.services.scene_resolver import reseed, resolve
+from lapwing.studies import simulate as studied
+from lapwing.studies.campaign.distributions import Distribution
+from lapwing.studies.campaign.plan import plan
 
 
 def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
@@ -29,7 +29,7 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     Raises:
         SceneError: what is wrong with which key, and what would be right.
     """
-    return table.load(scene, overrides)
+    return scene_resolver.load(scene, overrides)
 
 
 def fly(
@@ -53,10 +53,10 @@ def fly(
         seed: of all randomness, 0 to 2^63 - 1; None: the scene's.
         controller: one's own in the place of the scene's: a class, an object of one (each take-off begins with a copy
             of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
-            `services.common.controllers`. A class in a module of its own becomes part of the flight's set-up, so that
+            `lapwing.services.common.controller_api`. A class in a module of its own becomes part of the flight's set-up, so that
             `lapwing refly` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
         controller_options: of the constructor of the class: numbers, texts, lists of numbers, by name.
-        estimator: the same of an estimator, with `step(time, readings)`; see `services.common.estimators`.
+        estimator: the same of an estimator, with `step(time, readings)`; see `lapwing.services.common.estimator_api`.
         estimator_options: the same.
 
     Raises:
@@ -71,7 +71,7 @@ def fly(
                 own[f"autopilot.{key}"] = stack.enter_context(lent(thing, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        return _flown(resolve(load(table.load_one(scene, overrides), own)))
+        return _flown(resolve(load(scene_resolver.load_one(scene, overrides), own)))
 
 
 def read(log: str | Path) -> Flight:
@@ -110,7 +110,7 @@ def campaign(
         SceneError: the scene is not sound, or what was drawn does not fit it.
         ValueError: an argument is out of its range.
     """
-    base = table.load_one(scene, overrides)
+    base = scene_resolver.load_one(scene, overrides)
     for key, distribution in (vary or {}).items():
         if not isinstance(distribution, Distribution):
             raise SceneError(key, f"got {distribution!r}", "a distribution, for example lapwing.normal(10.4, 0.2)")

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.graph import pages_of
-from cosim.log import LogWriter
-from cosim.provenance import attachments, failure, metadata
-from cosim.recording import Recording
-from lapwing.runs.events import event_messages
-from messages.topics import EVENTS
-from studies import flight as studied
-from studies.flight_topics import topic_of
-from studies.report import write
-from studies.report.overview import overview
+from lapwing.cosim.config.provenance import attachments, failure, metadata
+from lapwing.cosim.diagram.block_diagram import pages_of
+from lapwing.cosim.log import LogWriter
+from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.messages.topics import EVENTS
+from lapwing.runs.log_events import event_messages
+from lapwing.studies import flight_data as studied
+from lapwing.studies.flight_topics import topic_of
+from lapwing.studies.report import write
+from lapwing.studies.report.overview import overview
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,7 +91,7 @@ class Flight(studied.Flight):
         Raises:
             ValueError: the picture cannot be written.
         """
-        from studies.report.paper import figure, styled  # matplotlib takes half a second to import
+        from lapwing.studies.report.matplotlib_figure import figure, styled  # matplotlib takes half a second to import
 
         with styled():
             drawn = figure(overview(self))

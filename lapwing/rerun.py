@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.log import LogReader
+from lapwing.cosim.log import LogReader
 
 APPLICATION = "lapwing"
 MISSING = "--rerun: Rerun is not installed; pip install lapwing[view]"

@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim.graph import NEVER, Graph, Service
-from cosim.scene import Overrides, Scene, SceneError, Source
-from cosim.schedule import KEPT, Port
-from cosim.setup import Setup
-from dynamics.rows import to_row, width
-from services.autopilot.core import NO_TRAJECTORY, ORDER, Order
-from services.common import ports
-from services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
-from services.processes import create
-from services.table import load, load_one, resolve
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.tick_schedule import KEPT, Port
+from lapwing.cosim.scene import Overrides, Scene, SceneError, Source
+from lapwing.kernels.row_packing import to_row, width
+from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, Order
+from lapwing.services.common import ports
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
+from lapwing.services.process_table import create
+from lapwing.services.scene_resolver import load, load_one, resolve
 
 KEEP = 64  # ticks that can be looked at
 

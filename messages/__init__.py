@@ -6,9 +6,9 @@ adding such a file.
 
 from typing import Any
 
-from messages import types
-from messages.instants import header, nanoseconds, stamp, stamp_ns
-from messages.types import TYPES, message_class
+from lapwing.messages import types
+from lapwing.messages.time_stamps import header, nanoseconds, stamp, stamp_ns
+from lapwing.messages.types import TYPES, message_class
 
 __all__ = ["TYPES", "header", "message_class", "nanoseconds", "stamp", "stamp_ns"]
 __all__ += [cls.__name__ for cls in TYPES.values()]

@@ -8,8 +8,8 @@ import struct
 from collections import namedtuple
 from typing import Any
 
-from messages.layout import ENCAPSULATION, Layouts
-from messages.parse import PRIMITIVES, Definition, Field, schema_text
+from lapwing.messages.cdr_layout import ENCAPSULATION, Layouts
+from lapwing.messages.parse import PRIMITIVES, Definition, Field, schema_text
 
 _ENCODE = """
 def encode(self):
@@ -50,7 +50,7 @@ def make_class(definition: Definition, definitions: dict[str, Definition], class
     name = definition.type_name.rsplit("/", 1)[1]
     defaults = [_default(field, classes) for field in definition.fields]
     fields = namedtuple(name, [field.name for field in definition.fields], defaults=defaults)  # type: ignore[misc]
-    members: dict[str, Any] = {"__slots__": (), "__module__": "messages.types", "__doc__": definition.text}
+    members: dict[str, Any] = {"__slots__": (), "__module__": "lapwing.messages.types", "__doc__": definition.text}
     members |= definition.constants
     members["type_name"] = definition.type_name
     members["schema_text"] = schema_text(definition.type_name, definitions)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from messages.types import (
+from lapwing.messages.types import (
     Actuators,
     BatteryState,
     BodyStates,

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from messages.parse import Definition, Field, dependencies
-from messages.types import DEFINITIONS
+from lapwing.messages.parse import Definition, Field, dependencies
+from lapwing.messages.types import DEFINITIONS
 
 # Numbers of type_description_interfaces/msg/FieldType; in a .msg file char is another name of uint8.
 _NESTED = 1

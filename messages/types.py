@@ -1,10 +1,10 @@
-"""Every message class, found from the `.msg` files beside this module: `messages.types.Imu` and so on."""
+"""Every message class, found from the `.msg` files beside this module: `lapwing.messages.types.Imu` and so on."""
 
 from pathlib import Path
 from typing import Any
 
-from messages.codec import make_class
-from messages.parse import read_folder
+from lapwing.messages.codec import make_class
+from lapwing.messages.parse import read_folder
 
 TYPES: dict[str, Any] = {}
 """Message class by full name ("sensor_msgs/msg/Imu")."""
@@ -35,4 +35,4 @@ def message_class(type_name: str) -> Any:
 
 def __getattr__(name: str) -> Any:
     """Reached only for names that do not exist; also tells type checkers that names are made at import."""
-    raise AttributeError(f"module 'messages.types' has no message {name!r}")
+    raise AttributeError(f"module 'lapwing.messages.types' has no message {name!r}")

@@ -3,7 +3,7 @@
 import re
 from functools import cache
 
-from messages.types import DEFINITIONS
+from lapwing.messages.types import DEFINITIONS
 
 _LINE = re.compile(r"\s*[A-Za-z][\w/]*(?:\[\d*\])?\s+(?P<name>[A-Za-z]\w*)[^#]*#[^\[]*\[(?P<unit>[^\]]+)\]")
 

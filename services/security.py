@@ -4,13 +4,13 @@ of its links that follow."""
 from pathlib import Path
 from typing import Any
 
-from cosim.access import by_certificate, door, withholding
-from cosim.certificates import tls
-from cosim.keys import ENCODER
-from cosim.setup import Setup
-from cosim.watch import WATCHER
-from messages.topics import EVENTS
-from services.processes import PROCESSES, ROUTER, create
+from lapwing.cosim.access.certificates import tls
+from lapwing.cosim.access.zenoh_access import by_certificate, door, withholding
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.transport.bus_keys import ENCODER
+from lapwing.messages.topics import EVENTS
+from lapwing.services.process_table import PROCESSES, ROUTER, create
 
 
 def names() -> list[str]:

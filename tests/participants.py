@@ -3,7 +3,7 @@
 from contextlib import suppress
 from pathlib import Path
 
-from services.processes import PROCESSES
+from lapwing.services.process_table import PROCESSES
 
 
 def participants(launcher):

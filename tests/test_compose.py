@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from cosim.access import VIEWER
-from cosim.certificates import make
-from cosim.watch import WATCHER
-from lapwing.runs.joined import parse_peers
-from services import processes, security
-from services.table import load, resolve
+from lapwing.cosim.access.certificates import make
+from lapwing.cosim.access.zenoh_access import VIEWER
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.runs.distributed_run import parse_peers
+from lapwing.services import process_table as processes
+from lapwing.services import security
+from lapwing.services.scene_resolver import load, resolve
 from tests.services.foxglove.client import patient
 
 pytestmark = pytest.mark.long
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.long
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
 ROOT = Path(__file__).parent.parent
-SET = {"SCENE": "scenes/groundstation.toml", "SPEED": "2"}
+SET = {"SCENE": "lapwing/scenes/groundstation.toml", "SPEED": "2"}
 
 
 def compose(**given):
@@ -175,7 +176,7 @@ def test_a_cluster_flies_a_campaign(tmp_path):
     def begun(name, *more):
         words = [word.replace("scheduler:8786", f"127.0.0.1:{port}") for word in services[name]["command"]]
         words = [port if word == "8786" else word.replace("recordings/", f"{tmp_path}/") for word in words]
-        other = {"/tmp": str(tmp_path), SET["SCENE"]: "scenes/hover.toml"}
+        other = {"/tmp": str(tmp_path), SET["SCENE"]: "lapwing/scenes/hover.toml"}
         words = [other.get(word, word) for word in words]
         program = [sys.executable, *words[1:]] if words[0] == "python" else [sys.executable, "-m", *words]
         with (tmp_path / f"{name}.txt").open("w") as said:
@@ -217,7 +218,7 @@ def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(t
     pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
     keys = tmp_path / "keys"
     make(keys, security.names(), 1)
-    services = compose(SCENE="scenes/hover.toml", SPEED="1", LINKS=f"--keys={keys}")
+    services = compose(SCENE="lapwing/scenes/hover.toml", SPEED="1", LINKS=f"--keys={keys}")
     with flying(services, "foxglove", tmp_path, "--set", "run.duration=6") as (running, ports):
         client = patient(ports["0.0.0.0:8765"], running["foxglove"])
         client.subscribe("/drone1/truth", "/drone1/events")

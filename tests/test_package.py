@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dynamics.kernel._files import SHIPPED
+from lapwing.kernels.compiler.cache_files import SHIPPED
 
 ROOT = Path(__file__).parent.parent
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]

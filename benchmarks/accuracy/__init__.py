@@ -6,11 +6,11 @@ from matplotlib.figure import Figure
 
 from benchmarks.accuracy import ten_hours
 from benchmarks.accuracy.other_simulators import installed
-from studies.accuracy.measure import Point, measure
-from studies.accuracy.plot import COLOURS, MARKERS
-from studies.accuracy.systems import problems
-from studies.report.paper import styled
-from studies.report.style import DPI
+from lapwing.studies.accuracy.systems import problems
+from lapwing.studies.accuracy.work_precision import Point, measure
+from lapwing.studies.accuracy.work_precision_plot import COLOURS, MARKERS
+from lapwing.studies.report.matplotlib_figure import styled
+from lapwing.studies.report.style import DPI
 
 CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
 LEVELS = [10.0**-k for k in range(2, 11)]

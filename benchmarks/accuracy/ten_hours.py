@@ -1,11 +1,11 @@
 """Ten hours of gyrostat: the compiled time of 60 000 steps of RKMK4, of the cheapest runs, and their errors."""
 
-from studies.accuracy.coordinates import of_state
-from studies.accuracy.integrate import ways
-from studies.accuracy.measure import Point, measure
-from studies.accuracy.problem import Problem
-from studies.accuracy.reference import DOP853, dop853
-from studies.accuracy.systems import gyrostat
+from lapwing.studies.accuracy.coordinates import of_state
+from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.reference import DOP853, dop853
+from lapwing.studies.accuracy.systems import gyrostat
+from lapwing.studies.accuracy.work_precision import Point, measure
 
 DURATION = 600.0  # [min]
 SEED_STEPS = 60_000  # of 0.01 min

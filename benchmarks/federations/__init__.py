@@ -17,7 +17,7 @@ from itertools import pairwise
 from statistics import median
 
 from benchmarks import lockstep
-from benchmarks._bars import Row, show
+from benchmarks._targets import Row, show
 from benchmarks.lockstep import PARTS
 
 OTHERS = {"HELICS": "helics", "mosaik": "mosaik"}  # package of each; the module of its name here has its processes

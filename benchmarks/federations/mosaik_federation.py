@@ -9,7 +9,7 @@ import mosaik_api_v3
 
 from benchmarks.federations import PATIENCE, pin
 from benchmarks.lockstep import PARTS
-from dynamics.rows import to_row
+from lapwing.kernels.row_packing import to_row
 
 MODULE = "benchmarks.federations.mosaik_federation"
 LATER = ("plant", "trajectory")  # take what was given at a tick before

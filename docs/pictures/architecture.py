@@ -13,11 +13,11 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 
-from cosim.part import Part
-from cosim.schedule import Input
-from cosim.setup import Setup
-from services.processes import PROCESSES, create_all
-from services.table import load, resolve
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.tick_schedule import Input
+from lapwing.services.process_table import PROCESSES, create_all
+from lapwing.services.scene_resolver import load, resolve
 
 BLUE, ORANGE, GREY, DARK, PALE = "#0072B2", "#D55E00", "#888888", "#333333", "#F3F6F9"
 

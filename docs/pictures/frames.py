@@ -13,11 +13,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
-from services.common.exchange import Exchange
-from services.common.vehicle import airframe
-from services.sensors.registry import parameters
-from services.table import load
+from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.scene_resolver import load
+from lapwing.services.sensors.registry import parameters
 
 RED, GREEN, BLUE, GREY, DARK = "#D55E00", "#009E73", "#0072B2", "#999999", "#333333"
 EAST = np.array([0.80, -0.34])  # of the picture's plane, for a unit along each axis of the world

@@ -6,22 +6,22 @@ from typing import Annotated
 import typer
 
 from lapwing.cli import (  # noqa: F401 (they register themselves)
-    again,
-    campaign,
-    docs,
-    keys,
-    logs,
-    look,
-    new,
+    campaign_commands,
+    certificates_command,
+    docs_command,
+    log_commands,
+    log_playback,
+    new_command,
     new_vehicle,
     protocol,
-    run,
-    serve,
-    studies,
+    run_command,
+    scene_commands,
+    service_command,
+    study_commands,
 )
 from lapwing.cli.app import app
-from lapwing.cli.errors import USER_ERROR, fail, user_errors
-from lapwing.cli.output import checked_output
+from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
+from lapwing.cli.stdout_guard import checked_output
 
 # Of unknown options and missing arguments; not every version of typer exports the class itself.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
@@ -29,7 +29,7 @@ UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: igno
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from cosim.provenance import package_version
+        from lapwing.cosim.config.provenance import package_version
 
         typer.echo(f"lapwing {package_version()}")
         raise typer.Exit
@@ -47,7 +47,7 @@ def options(
 def main() -> None:
     """Carry out what the command line says."""
     with user_errors(), checked_output():
-        from cosim.exit import leave_garbage
+        from lapwing.cosim.processes.gc_tuning import leave_garbage
 
         leave_garbage()
         try:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cosim.interrupt import Interrupted
-from dynamics.errors import KeyedError
-from lapwing.cli.errors import user_errors
-from lapwing.cli.new import new
+from lapwing.cli.error_exit import user_errors
+from lapwing.cli.new_command import new
+from lapwing.cosim.processes.interrupt import Interrupted
+from lapwing.dynamics.config_error import KeyedError
 
 if TYPE_CHECKING:
-    from lapwing.vehicle_figures import Figure
+    from lapwing.vehicle_measurements import Figure
 
 WEAK = 1.4  # thrust over weight below which too little is left for control
 
@@ -57,17 +57,17 @@ def write_vehicle(
 
     Args:
         name: of the vehicle.
-        given: figures of `lapwing.vehicle_figures.FIGURES` by name.
+        given: figures of `lapwing.vehicle_measurements.FIGURES` by name.
         folder: in whose folder `vehicles` it is written.
         ask: (figure, guess) -> what was measured, None where the guess will do; None: guesses are taken.
 
     Raises:
         ValueError: not a name, one that is taken, a figure that cannot be, or a vehicle that cannot hover.
     """
-    from dynamics.vehicles.performance import thrust_over_weight
-    from lapwing.vehicle_figures import FIGURES
-    from lapwing.vehicle_file import airframe_of, written
-    from services.common.sections import SHIPPED
+    from lapwing.airframe_writer import airframe_of, written
+    from lapwing.dynamics.vehicles.performance import thrust_over_weight
+    from lapwing.services.common.run_schema import SHIPPED
+    from lapwing.vehicle_measurements import FIGURES
 
     if not name.isidentifier() or name != name.lower():
         raise ValueError(f"NAME {name}: expected a name in small letters, for example my_quad")
@@ -144,7 +144,7 @@ def _answer(question: str) -> str:
 
 def _given(measured: list[str]) -> dict[str, float]:
     """Figures by name, of texts FIGURE=VALUE."""
-    from lapwing.vehicle_figures import FIGURES
+    from lapwing.vehicle_measurements import FIGURES
 
     names, found = [figure.name for figure in FIGURES], {}
     for text in measured:

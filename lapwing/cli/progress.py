@@ -7,8 +7,8 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.progress_bar import ProgressBar
 from rich.text import Text
 
-from lapwing.runs.compiling import Compilation
-from messages import PoseStamped, Status
+from lapwing.messages import PoseStamped, Status
+from lapwing.runs.compile_notice import Compilation
 
 NEARLY = 0.97  # of a guess that was too low, where the bar waits
 LINE_PERIOD = 2.0  # [s] of wall time between two lines where the output is no terminal

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.choice import decided
-from lapwing.cli.errors import user_errors
-from lapwing.cli.files import check_writable
+from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
+from lapwing.cli.output_paths import check_writable
+from lapwing.cli.preflight import decided
 
 
 @app.command()
@@ -22,8 +22,8 @@ def protocol(
     """What each service of a scene takes and gives: ports, periods, columns (docs/protocol.md)."""
     import json as json_module
 
-    from cosim.layout import layout
-    from services.table import resolve
+    from lapwing.cosim.transport.packet_layout import layout
+    from lapwing.services.scene_resolver import resolve
 
     with user_errors():
         check_writable(json)
@@ -31,7 +31,7 @@ def protocol(
         setup = resolve(decided(scene, set_ or []))
         found = layout(setup)
         if plot:
-            from studies.graph import draw
+            from lapwing.studies.service_diagram import draw
 
             draw(setup, plot)
         if json:

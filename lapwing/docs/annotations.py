@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from lapwing.docs.keys import REQUIRED, Key, is_table, keys
+from lapwing.docs.key_docs import REQUIRED, Key, is_table, keys
 
 Schema = dict[str, Any]
 PLAIN = {float: "number", int: "integer", str: "string", bool: "boolean", dict: "object"}

@@ -3,12 +3,12 @@
 import sys
 from types import ModuleType
 
-from dynamics import effects
-from services.autopilot import gains
-from services.common import parameters
-from services.common.parameters import Parameter
-from services.sensors.registry import sensors
-from services.table import load
+from lapwing.dynamics import effects
+from lapwing.services.autopilot import gains
+from lapwing.services.common import autopilot_parameters
+from lapwing.services.common.autopilot_parameters import Parameter
+from lapwing.services.scene_resolver import load
+from lapwing.services.sensors.registry import sensors
 
 
 def effect_tables() -> dict[str, tuple[type, type]]:
@@ -28,7 +28,7 @@ def sensor_tables() -> dict[str, tuple[ModuleType, type]]:
 
 def flight_parameters() -> tuple[list[Parameter], list[Parameter]]:
     """The autopilot's parameters: those that are the same with every gain set, and those that belong to one."""
-    tables = [parameters.table(load("hover", {"autopilot.gains": name})) for name in gains.names()]
+    tables = [autopilot_parameters.table(load("hover", {"autopilot.gains": name})) for name in gains.names()]
     first, *others = tables
     fixed = [p for name, p in first.items() if all(table[name] == p for table in others)]
     return fixed, [p for p in first.values() if p not in fixed]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lapwing.docs.annotations import Schema, schema_of
-from lapwing.docs.keys import REQUIRED, Key, is_table
+from lapwing.docs.key_docs import REQUIRED, Key, is_table
 
 KINDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "object": "table"}
 

@@ -11,7 +11,7 @@ one = gymnasium.make("lapwing/Race-v0")
 Needs `pip install lapwing[gym]`.
 """
 
-from lapwing.gym.environment import DroneEnv, DroneVectorEnv
 from lapwing.gym.tasks import TASKS
+from lapwing.gym.vector_env import DroneEnv, DroneVectorEnv
 
 __all__ = ["TASKS", "DroneEnv", "DroneVectorEnv"]

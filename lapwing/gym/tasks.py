@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.batch import BatchState
+from lapwing.batch_simulator import BatchState
 
 HIGH = 5.0  # [m] above the ground, where most episodes begin
 FAR = 6.0  # [m] from the target: the episode is lost

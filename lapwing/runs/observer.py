@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from lapwing.runs.compiling import Compilation
+from lapwing.runs.compile_notice import Compilation
 
 
 class Elapsed(NamedTuple):

@@ -7,10 +7,10 @@ that it gives by itself: where some stand in the wake of others, the effectivene
 
 import numpy as np
 
-from dynamics.effects._types import WakeSlopes
-from dynamics.vector import Vec3
-from services.autopilot.interface import PerRotor
-from services.autopilot.mixer import Share, Shares
+from lapwing.dynamics.effects._types import WakeSlopes
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.autopilot.interface import PerRotor
+from lapwing.services.autopilot.mixer import Share, Shares
 
 LEAST_LIFT = 0.05  # share of the lift that every rotor must have in hover, to be turned down for control
 WORST_CONDITION = 1e3  # of the scaled effectiveness, above which a torque counts as one that the rotors cannot give

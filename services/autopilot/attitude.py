@@ -2,9 +2,9 @@
 
 import math
 
-from dynamics.kernel import leaf
-from dynamics.lie.quaternion import Quaternion, conjugate, from_roll_pitch_yaw, log, multiply, rotate
-from dynamics.vector import Vec3, subtract
+from lapwing.dynamics.lie.quaternion import Quaternion, conjugate, from_roll_pitch_yaw, log, multiply, rotate
+from lapwing.dynamics.vector import Vec3, subtract
+from lapwing.kernels import leaf
 
 
 @leaf

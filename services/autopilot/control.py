@@ -5,16 +5,16 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import to_roll_pitch_yaw
-from dynamics.vector import ZERO, Vec3, subtract
-from services.autopilot.attitude import error_by_angle, error_on_so3
-from services.autopilot.interface import Command, Estimate, Setpoint
-from services.autopilot.mixer import Demands, Shares, at_rest, clamp, mix, possible, saturate, shares_in_force
-from services.autopilot.motor import Motor, voltages
-from services.autopilot.pid import Pid, integrate, output
-from services.autopilot.reference import AT_REST, Angle, Smoothing, advance
-from services.autopilot.stage import FLYING, INITIAL_STAGE, LANDED, Stage, advance_stage
+from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
+from lapwing.dynamics.vector import ZERO, Vec3, subtract
+from lapwing.kernels import kernel, leaf
+from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
+from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
+from lapwing.services.autopilot.interface import Command, Estimate, Setpoint
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LANDED, Stage, advance_stage
+from lapwing.services.autopilot.mixer import Demands, Shares, at_rest, clamp, mix, possible, saturate, shares_in_force
+from lapwing.services.autopilot.motor import Motor, voltages
+from lapwing.services.autopilot.pid import Pid, integrate, output
 
 
 class Parameters(NamedTuple):

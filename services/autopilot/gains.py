@@ -7,10 +7,10 @@ from typing import Annotated, ClassVar
 from annotated_types import Gt, Lt
 from pydantic import ConfigDict, Field, ValidationError
 
-from cosim.scene import Section
-from dynamics.errors import KeyedError
-from dynamics.validation import fault
-from services.autopilot.law import Gains
+from lapwing.cosim.scene import Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
+from lapwing.services.autopilot.controller_parameters import Gains
 
 FOLDER = Path(__file__).parent / "gains"
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from dynamics.lie.quaternion import Quaternion
-from dynamics.vector import Vec3
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.vector import Vec3
 
 PerRotor = tuple[float, ...]  # as many as the vehicle has rotors
 

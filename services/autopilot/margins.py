@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from services.autopilot.control import Parameters
-from services.autopilot.law import Airframe, lift, moments
-from services.autopilot.pid import Pid
+from lapwing.services.autopilot.control import Parameters
+from lapwing.services.autopilot.controller_parameters import Airframe, lift, moments
+from lapwing.services.autopilot.pid import Pid
 
 FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 250 Hz
 

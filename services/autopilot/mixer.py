@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
-from dynamics.generate import each
-from dynamics.kernel import leaf
-from services.autopilot.interface import PerRotor
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+from lapwing.services.autopilot.interface import PerRotor
 
 Share = tuple[float, float, float, float]  # of a rotor in the demands: collective, roll, pitch, yaw
 Shares = tuple[Share, ...]  # of every rotor

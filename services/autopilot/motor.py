@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
-from dynamics.generate import each
-from dynamics.kernel import leaf
-from services.autopilot.interface import PerRotor
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+from lapwing.services.autopilot.interface import PerRotor
 
 RPM = 30.0 / math.pi  # revolutions per minute of 1 rad/s
 

@@ -9,11 +9,11 @@ Theory.md, eqs. (4.25)-(4.26).
 import math
 from typing import NamedTuple
 
-from dynamics.generate import each
-from dynamics.kernel import leaf
-from dynamics.vector import Vec3
-from services.autopilot.interface import PerRotor
-from services.autopilot.law import Airframe, lift, rotor_effectiveness
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+from lapwing.services.autopilot.controller_parameters import Airframe, lift, rotor_effectiveness
+from lapwing.services.autopilot.interface import PerRotor
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
 LOST = 0.3  # share of its thrust that a rotor must lack

@@ -2,10 +2,10 @@
 
 import math
 
-from cosim.scene import Scene
-from dynamics.errors import KeyedError
-from services.autopilot.law import Airframe, hover_thrust, hover_torque
-from services.common.vehicle import Effects, airframe
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, hover_torque
+from lapwing.services.common.vehicle_schema import Effects, airframe
 
 
 def check(scene: Scene, known: Airframe) -> None:

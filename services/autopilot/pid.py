@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from dynamics.kernel import leaf
+from lapwing.kernels import leaf
 
 
 class Pid(NamedTuple):

@@ -2,25 +2,25 @@
 
 from collections.abc import Callable
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics.terrain import Level, surface
-from services.autopilot import estimator
-from services.autopilot.config import ESTIMATORS, Autopilot
-from services.autopilot.custom.build import controller_rate, estimator_rate, vehicle_model
-from services.autopilot.distance import distance_sensor
-from services.autopilot.estimate import EXACT
-from services.autopilot.estimator import Estimator
-from services.autopilot.gains import GainSet
-from services.autopilot.known_airframe import known_airframe
-from services.autopilot.setup import AutopilotSetup, CustomCode
-from services.common import modules, parameters, ports
-from services.common.environment import environment
-from services.common.exchange import Exchange, Rates, ticks
-from services.common.ports import AutopilotStatus, MotorCommand, Reference
-from services.common.sections import follows_trajectory
-from services.common.vehicle import gravity, start_place
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.terrain import Level, surface
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.custom.user_code_loader import controller_rate, estimator_rate, vehicle_model
+from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.height_sensor import distance_sensor
+from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot
+from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
+from lapwing.services.common import autopilot_parameters, ports, user_modules
+from lapwing.services.common.communication_schema import Exchange, Rates, ticks
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference
+from lapwing.services.common.run_schema import follows_trajectory
+from lapwing.services.common.vehicle_schema import gravity, start_place
 
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR, ports.RANGEFINDER, ports.OPTICAL_FLOW)
 
@@ -50,7 +50,7 @@ def resolve(scene: Scene) -> ServiceSetup | None:
         scene[GainSet].plain(),
         config.attitude == "so3",
         known_airframe(scene),
-        tuple(parameters.table(scene).values()),
+        tuple(autopilot_parameters.table(scene).values()),
         _phases(scene) if follows else (),
         config.operator,
         (),
@@ -83,7 +83,7 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """The code that the key names, tried."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Exchange].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
-    found = rate(name, modules.texts(scene), vehicle, options)
+    found = rate(name, user_modules.texts(scene), vehicle, options)
     return CustomCode(name, options, ticks(scene, found, f"autopilot.{key}"))
 
 

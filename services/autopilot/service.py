@@ -3,33 +3,33 @@
 import math
 from typing import Any
 
-from cosim.graph import Service
-from cosim.part import Part
-from cosim.schedule import Input, Port
-from cosim.setup import Setup
-from dynamics.cell import Cell
-from messages import topics as topic
-from services.autopilot import core, motor_failure
-from services.autopilot.attention import Attention
-from services.autopilot.commander.attention import battery_thresholds
-from services.autopilot.commanding import Commanding, Operator, controller
-from services.autopilot.core import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
-from services.autopilot.custom.parts import controller_parts, estimator_parts
-from services.autopilot.estimate import before
-from services.autopilot.injection.parts import Injection
-from services.autopilot.navigation.correction import Correction
-from services.autopilot.navigation.estimate import FilterEstimate
-from services.autopilot.navigation.gps import GpsFusion
-from services.autopilot.navigation.ground import GroundReference
-from services.autopilot.navigation.inertial import STANDSTILL_EVERY, InertialNavigation
-from services.autopilot.navigation.state import blank
-from services.autopilot.navigation.truth import TrueEstimate
-from services.autopilot.setup import AutopilotSetup
-from services.autopilot.wire import wires
-from services.common import ports
-from services.common.airspeed import airspeed_wire
-from services.common.failures import SOUND, Faults
-from services.common.parameters import GPS_HEIGHT, SONAR_HEIGHT
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.kernels.cell import Cell
+from lapwing.messages import topics as topic
+from lapwing.services.autopilot import block, motor_failure
+from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
+from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
+from lapwing.services.autopilot.commander_block import Commanding, Operator, controller
+from lapwing.services.autopilot.commander_wakeup import Attention
+from lapwing.services.autopilot.custom.custom_blocks import controller_parts, estimator_parts
+from lapwing.services.autopilot.encoders import wires
+from lapwing.services.autopilot.estimator.blocks.correction import Correction
+from lapwing.services.autopilot.estimator.blocks.estimate import FilterEstimate
+from lapwing.services.autopilot.estimator.blocks.gps_block import GpsFusion
+from lapwing.services.autopilot.estimator.blocks.ground_truth import TrueEstimate
+from lapwing.services.autopilot.estimator.blocks.inertial import STANDSTILL_EVERY, InertialNavigation
+from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
+from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
+from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
+from lapwing.services.autopilot.initial_estimate import before
+from lapwing.services.autopilot.service_config import AutopilotSetup
+from lapwing.services.common import ports
+from lapwing.services.common.airspeed_encoder import airspeed_wire
+from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
+from lapwing.services.common.failure_types import SOUND, Faults
 
 NAME = "autopilot"
 NO_HEIGHT = 1e8  # [m^2] variance of a height that tells nothing
@@ -60,7 +60,7 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(battery), Input(reference))
     gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
     if given.controller is None:
-        control = [Part(f"{NAME}.control", common, Cell(core.start(common)), inputs, gives)]
+        control = [Part(f"{NAME}.control", common, Cell(block.start(common)), inputs, gives)]
     else:
         control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
     navigation = _navigation(setup, given, attention, outputs[ports.ESTIMATE], injection)

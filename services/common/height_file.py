@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from dynamics.errors import KeyedError
-from dynamics.geodesy import Home
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.geodesy import Home
 
 GEOTIFF = (".tif", ".tiff")
 METRES = ("", "m", "metre", "meter")  # what a band says of its unit; most files say nothing

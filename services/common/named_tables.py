@@ -5,9 +5,9 @@ from typing import Any
 
 from pydantic import ConfigDict
 
-from cosim.scene import Files, Scene, Section
-from dynamics.errors import KeyedError
-from services.common import modules, user_code
+from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.common import user_code, user_modules
 
 
 class NamedTables(Section):
@@ -26,7 +26,7 @@ class NamedTables(Section):
         entries = tree.get(cls.TABLE, {})
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             if isinstance(entry, dict) and isinstance(module := entry.get("module"), str):
-                modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
+                user_modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
 
     def check(self, scene: Scene) -> None:
         """Every entry is a table."""
@@ -36,7 +36,7 @@ class NamedTables(Section):
 
     def load(self, scene: Scene) -> None:
         """Import the modules of the user's own. KeyedError where one cannot be imported."""
-        texts = modules.texts(scene)
+        texts = user_modules.texts(scene)
         for name, table in self.tables.items():
             if "module" in table:
                 key = f"{self.TABLE}.{name}.module"

@@ -7,8 +7,8 @@ that begin with # are comments. Source: QGroundControl developer guide, "Paramet
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from cosim.scene import SceneError, Source
-from services.common.parameters import Parameter
+from lapwing.cosim.scene import SceneError, Source
+from lapwing.services.common.autopilot_parameters import Parameter
 
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
 _HEADER = ("# Onboard parameters for Vehicle 1", "#", "# Vehicle-Id Component-Id Name Value Type")

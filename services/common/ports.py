@@ -7,8 +7,8 @@ for each rotor or body are as long as the vehicle has them.
 import math
 from typing import NamedTuple
 
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion
-from dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.vector import ZERO, Vec3
 
 TRUTH, BATTERY, BODIES, CONTACT = "truth", "battery", "bodies", "contact"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from cosim import user_module
-from dynamics.errors import KeyedError
+from lapwing.cosim.config import user_module
+from lapwing.dynamics.config_error import KeyedError
 
 MEMORY = "memory"  # the module in the name of an object that only this process has: "memory:MyController"
 _lent: dict[str, Any] = {}  # such objects

@@ -1,8 +1,8 @@
 """The links, as the bodies at their ends show them."""
 
-from dynamics.kernel import leaf
-from dynamics.lie.ts2 import Swing, normalise
-from dynamics.vector import Vec3, cross, norm, scale, subtract
+from lapwing.dynamics.lie.ts2 import Swing, normalise
+from lapwing.dynamics.vector import Vec3, cross, norm, scale, subtract
+from lapwing.kernels import leaf
 
 
 @leaf

@@ -1,17 +1,17 @@
 """From a scene's `[formation]` to the control law."""
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics.vector import ZERO, norm, scale
-from dynamics.vehicles.cooperative_control import FormationControl
-from dynamics.vehicles.cooperative_load import CooperativeLoadParameters
-from services.common import ports
-from services.common.exchange import Exchange
-from services.common.ports import RotorWrenches
-from services.common.sections import CooperativeLoad
-from services.formation.config import Formation
-from services.formation.core import FormationLaw
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.vector import ZERO, norm, scale
+from lapwing.dynamics.vehicles.cooperative_control import FormationControl
+from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters
+from lapwing.services.common import ports
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.ports import RotorWrenches
+from lapwing.services.common.run_schema import CooperativeLoad
+from lapwing.services.formation.block import FormationLaw
+from lapwing.services.formation.schema import Formation
 
 
 def resolve(scene: Scene) -> ServiceSetup | None:

@@ -1,10 +1,10 @@
 """The formation's control as a service: every body's state in, thrusts and moments out."""
 
-from cosim.graph import Service
-from cosim.part import Part
-from cosim.setup import Setup
-from dynamics.cell import Cell
-from services.formation.wire import wires
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.kernels.cell import Cell
+from lapwing.services.formation.encoders import wires
 
 NAME = "formation"
 

@@ -2,8 +2,8 @@
 
 from typing import Any, Self
 
-from messages import TYPES
-from services.common.address import host_and_port, is_loopback
+from lapwing.messages import TYPES
+from lapwing.services.common.address import host_and_port, is_loopback
 
 BACKLOG = 16384  # messages kept for a client; the oldest go where it is too slow
 

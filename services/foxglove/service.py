@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from cosim.bundle import unpack_batch
-from cosim.keys import BATCH_KEY
-from cosim.process import POLL, Process
-from cosim.watch import WATCHER
-from messages.topics import EVENTS
-from services.foxglove.server import Server
+from lapwing.cosim.executors.participant import POLL, Process
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.transport.bus_keys import BATCH_KEY
+from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.messages.topics import EVENTS
+from lapwing.services.foxglove.server import Server
 
 
 def run(process: Process, given: Any) -> None:

@@ -7,9 +7,9 @@ from it. Nothing there can be changed, and the motors cannot be run one by one.
 from collections.abc import Sequence
 from typing import Any
 
-from services.mavlink.frames import swap_body
-from services.mavlink.px4_facts import FIRST_MOTOR, MULTIROTOR, output_function
-from services.mavlink.vehicle import Rotor
+from lapwing.services.mavlink.frames import swap_body
+from lapwing.services.mavlink.px4_facts import FIRST_MOTOR, MULTIROTOR, output_function
+from lapwing.services.mavlink.vehicle_description import Rotor
 
 VERSION = 2  # of the format
 _STOPPED, _FULL = 0.0, 1.0

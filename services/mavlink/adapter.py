@@ -5,21 +5,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from messages import CommandAcks, OperatorInput, header
-from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
-from services.mavlink.announcements import Announcements
-from services.mavlink.channel import Channel, Signature
-from services.mavlink.clock import Clock, Instant
-from services.mavlink.command_queue import CommandQueue
-from services.mavlink.dialect import mavlink
-from services.mavlink.endpoint import Endpoint
-from services.mavlink.mission_store import MissionStore
-from services.mavlink.parameter_store import ParameterStore
-from services.mavlink.protocols import handlers
-from services.mavlink.session import Session
-from services.mavlink.telemetry.state import heartbeat
-from services.mavlink.vehicle import VehicleDescription
-from services.mavlink.view import VehicleView
+from lapwing.messages import CommandAcks, OperatorInput, header
+from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
+from lapwing.services.mavlink.announcements import Announcements
+from lapwing.services.mavlink.channel import Channel, Signature
+from lapwing.services.mavlink.clock import Clock, Instant
+from lapwing.services.mavlink.command_queue import CommandQueue
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.mission_store import MissionStore
+from lapwing.services.mavlink.parameter_store import ParameterStore
+from lapwing.services.mavlink.protocols import handlers
+from lapwing.services.mavlink.session import Session
+from lapwing.services.mavlink.telemetry.system_status import heartbeat
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 SECOND = 1_000_000_000
 LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as gone

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from services.common.spoken import ROUTINE, TAKEN_OVER
-from services.mavlink.dialect import id_of, mavlink
-from services.mavlink.events import Definition, watches
-from services.mavlink.telemetry import streams
-from services.mavlink.text import statustext
-from services.mavlink.view import VehicleView
+from lapwing.services.common.status_texts import ROUTINE, TAKEN_OVER
+from lapwing.services.mavlink.dialect import id_of, mavlink
+from lapwing.services.mavlink.events import Definition, watches
+from lapwing.services.mavlink.statustext import statustext
+from lapwing.services.mavlink.telemetry import streams
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.framing import frame
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.framing import frame
 
 _YEAR_2015 = 1420070400  # [s] Unix time from which signatures count, in steps of 10 us
 MIN_PASSPHRASE = 8  # characters of a passphrase

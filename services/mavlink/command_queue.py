@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from messages import CommandAck, OperatorCommand
-from services.mavlink.clock import Clock, Instant
-from services.mavlink.dialect import mavlink
+from lapwing.messages import CommandAck, OperatorCommand
+from lapwing.services.mavlink.clock import Clock, Instant
+from lapwing.services.mavlink.dialect import mavlink
 
 TIMEOUT = 2.0  # [s] the autopilot gets to acknowledge
 MAX_WAITING = 256  # commands that may wait for their acknowledgement

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from services.common.parameters import Parameter
-from services.mavlink import flavours
-from services.mavlink.actuator_metadata import actuators
-from services.mavlink.event_metadata import events
-from services.mavlink.file_server import crc32
-from services.mavlink.px4_facts import Fact, output_function
-from services.mavlink.vehicle import VehicleDescription
+from lapwing.services.common.autopilot_parameters import Parameter
+from lapwing.services.mavlink import firmware
+from lapwing.services.mavlink.actuator_metadata import actuators
+from lapwing.services.mavlink.event_metadata import events
+from lapwing.services.mavlink.file_server import crc32
+from lapwing.services.mavlink.px4_facts import Fact, output_function
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 GENERAL, PARAMETERS = "etc/extras/component_general.json", "etc/extras/parameters.json"
 EVENTS, ACTUATORS = "etc/extras/all_events.json", "etc/extras/actuators.json"
@@ -28,7 +28,7 @@ def files(description: VehicleDescription) -> Mapping[str, bytes]:
     """The files of a vehicle by their paths."""
     table = {p.name: _parameter(p) for p in description.parameters}
     values = {p.name: p.default for p in description.parameters}
-    flavour = flavours.get(description.flavour)
+    flavour = firmware.get(description.flavour)
     for fact in flavour.facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import Any
 
-from services.mavlink.extra_messages import mavlink
+from lapwing.services.mavlink.extra_messages import mavlink
 
 __all__ = ["id_of", "mavlink", "message_class", "name_of"]
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from services.mavlink.channel import Channel
-from services.mavlink.clock import Instant
+from lapwing.services.mavlink.channel import Channel
+from lapwing.services.mavlink.clock import Instant
 
 MAX_DATAGRAM = 1400  # [bytes] that any network carries in one piece
 

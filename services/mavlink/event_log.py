@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from services.mavlink.dialect import message_class
+from lapwing.services.mavlink.dialect import message_class
 
 KEPT = 100  # events that can be sent again
 ROUND = 1 << 16  # sequence numbers begin again after so many

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from services.mavlink import flavours
-from services.mavlink.dialect import mavlink
-from services.mavlink.events import Definition, definitions
-from services.mavlink.events.arming_checks import MODES
-from services.mavlink.events.definition import Enumeration
+from lapwing.services.mavlink import firmware
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.events import Definition, definitions
+from lapwing.services.mavlink.events.arming_checks import MODES
+from lapwing.services.mavlink.events.definition import Enumeration
 
 VERSION = 2
 NAMESPACE = "lapwing"
@@ -19,7 +19,7 @@ def events() -> dict[str, Any]:
     groups: dict[str, Any] = {}
     for definition in found:
         groups.setdefault(definition.group, {"events": {}})["events"][str(definition.sub_id)] = _event(definition)
-    numbers = {mode.kind: mode.number for mode in reversed(flavours.get("px4").MODES)}
+    numbers = {mode.kind: mode.number for mode in reversed(firmware.get("px4").MODES)}
     component = {
         "namespace": NAMESPACE,
         "enums": {name: _enumeration(e) for name, e in enumerations.items()},

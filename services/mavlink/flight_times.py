@@ -1,6 +1,6 @@
 """When the vehicle was armed, took off and landed."""
 
-from messages import Status
+from lapwing.messages import Status
 
 
 class FlightTimes:

@@ -6,7 +6,7 @@ half turns, so the same functions lead there and back.
 
 import math
 
-from dynamics.vector import Vec3
+from lapwing.dynamics.vector import Vec3
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 _S = math.sqrt(0.5)

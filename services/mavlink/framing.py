@@ -6,7 +6,7 @@ from functools import cache
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.dialect import mavlink
 
 _HEADER = struct.Struct("<BBBBBBBHB")  # MAVLink guide, "Packet Serialization": magic to message id (24 bits)
 _CHECKSUM = struct.Struct("<H")

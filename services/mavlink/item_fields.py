@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from messages import MissionItem, Vector3
-from services.mavlink.coordinates import ABOVE_HOME, ABOVE_SEA, Datum, degrees, to_world
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_yaw
+from lapwing.messages import MissionItem, Vector3
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import swap_yaw
+from lapwing.services.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, Datum, degrees, to_world
 
 _ON_GLOBE = ABOVE_SEA | ABOVE_HOME
 

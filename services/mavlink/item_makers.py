@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from messages import MissionItem, Vector3
-from services.mavlink.coordinates import Datum
-from services.mavlink.dialect import mavlink
-from services.mavlink.item_fields import RefusedItemError, idle, length, makes, place, radius, yaw
+from lapwing.messages import MissionItem, Vector3
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.mavlink.item_fields import RefusedItemError, idle, length, makes, place, radius, yaw
 
 MAX_ITEMS = 1000
 

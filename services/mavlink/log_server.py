@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.dialect import mavlink
 
 NUMBER = 1  # of the only log there is
 PIECE = 90  # [bytes] of one LOG_DATA

@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from services.mavlink.coordinates import Datum, from_world
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import saturated, swap_yaw
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import saturated, swap_yaw
+from lapwing.services.mavlink.geo_coordinates import Datum, from_world
 
 GROUND_SPEED, NO_THROTTLE, DEFAULT_SPEED = 1.0, -1.0, -2.0  # parameters of DO_CHANGE_SPEED
 _PLACELESS = ("gripper", "return", "delay", "condition", "jump", "speed", "yaw")

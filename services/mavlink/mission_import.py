@@ -8,11 +8,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from messages import MissionItem
-from services.mavlink.coordinates import Datum
-from services.mavlink.dialect import mavlink
-from services.mavlink.item_fields import MAKERS, RefusedItemError, idle
-from services.mavlink.item_makers import MAX_ITEMS
+from lapwing.messages import MissionItem
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.mavlink.item_fields import MAKERS, RefusedItemError, idle
+from lapwing.services.mavlink.item_makers import MAX_ITEMS
 
 __all__ = ["MAX_ITEMS", "RefusedItemError", "from_mavlink", "skipped"]
 

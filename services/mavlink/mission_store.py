@@ -4,15 +4,15 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from services.mavlink.clock import Clock
-from services.mavlink.command_queue import CommandQueue
-from services.mavlink.coordinates import Datum
-from services.mavlink.dialect import mavlink
-from services.mavlink.endpoint import Endpoint
-from services.mavlink.mission_export import to_mavlink
-from services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
-from services.mavlink.mission_upload import Repeat, Upload
-from services.mavlink.text import statustext
+from lapwing.services.mavlink.clock import Clock
+from lapwing.services.mavlink.command_queue import CommandQueue
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.mavlink.mission_export import to_mavlink
+from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
+from lapwing.services.mavlink.mission_upload import Repeat, Upload
+from lapwing.services.mavlink.statustext import statustext
 
 MAX_WARNINGS = 10  # texts about items that are skipped
 KINDS = {  # what the autopilot is asked to take

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from services.mavlink.clock import Clock
-from services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.clock import Clock
+from lapwing.services.mavlink.endpoint import Endpoint
 
 RETRY, UPLOAD_TIMEOUT = (
     0.25,

@@ -5,11 +5,11 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from services.mavlink.command_queue import CommandQueue
-from services.mavlink.dialect import mavlink
-from services.mavlink.endpoint import Endpoint
-from services.mavlink.flavours import Flavour
-from services.mavlink.vehicle import VehicleDescription
+from lapwing.services.mavlink.command_queue import CommandQueue
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.firmware import Flavour
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 BY_NAME = -1  # the index of a request that gives a name
 MAX_PER_STEP = 20  # values of a list sent to one endpoint at each step of the telemetry

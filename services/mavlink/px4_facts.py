@@ -7,9 +7,9 @@ what PX4 has in one number, the autopilot has in several.
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.vehicle import Battery, VehicleDescription
-from services.mavlink.vehicle_type import vehicle_type
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.vehicle_description import Battery, VehicleDescription
+from lapwing.services.mavlink.vehicle_type import vehicle_type
 
 Values = Mapping[str, float]
 

@@ -1,17 +1,17 @@
 """From a scene to what the MAVLink link knows of its vehicle."""
 
-from cosim.scene import Scene
-from dynamics.atmosphere import FREEZING, temperature
-from dynamics.effects import battery
-from dynamics.effects.battery_thevenin import BatteryThevenin
-from dynamics.effects.payload import Payload
-from dynamics.kernel import uncompiled
-from services.common.environment import environment
-from services.common.exchange import Exchange
-from services.common.parameters import table
-from services.common.vehicle import Vehicle, active, airframe, start_height
-from services.mavlink.config import Mavlink
-from services.mavlink.vehicle import Battery, Rotor, VehicleDescription
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.atmosphere import FREEZING, temperature
+from lapwing.dynamics.effects import battery
+from lapwing.dynamics.effects.battery_thevenin import BatteryThevenin
+from lapwing.dynamics.effects.payload import Payload
+from lapwing.kernels import uncompiled
+from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.vehicle_schema import Vehicle, active, airframe, start_height
+from lapwing.services.mavlink.schema import Mavlink
+from lapwing.services.mavlink.vehicle_description import Battery, Rotor, VehicleDescription
 
 
 def resolve(scene: Scene) -> VehicleDescription | None:

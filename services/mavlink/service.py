@@ -10,16 +10,16 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from cosim.bundle import unpack_batch
-from cosim.fleet import members
-from cosim.keys import BATCH_KEY
-from cosim.process import Process
-from messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, of_all
-from services.common.operator import OPERATOR_KEY
-from services.mavlink.channel import read_key
-from services.mavlink.hub import Hub
-from services.mavlink.links import numbered
-from services.mavlink.options import Options
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.transport.bus_keys import BATCH_KEY
+from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, of_all
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.mavlink.channel import read_key
+from lapwing.services.mavlink.link_options import Options
+from lapwing.services.mavlink.link_server import Hub
+from lapwing.services.mavlink.links import numbered
 
 ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # of which no message is left out
 

@@ -5,18 +5,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from services.mavlink.clock import Clock, Instant
-from services.mavlink.command_queue import CommandQueue, OnAcknowledgement
-from services.mavlink.component_metadata import files
-from services.mavlink.dialect import mavlink
-from services.mavlink.endpoint import Endpoint
-from services.mavlink.file_server import FileServer
-from services.mavlink.log_server import LogServer
-from services.mavlink.mission_store import MissionStore
-from services.mavlink.parameter_store import ParameterStore
-from services.mavlink.schedule import Schedule
-from services.mavlink.text import statustext
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.clock import Clock, Instant
+from lapwing.services.mavlink.command_queue import CommandQueue, OnAcknowledgement
+from lapwing.services.mavlink.component_metadata import files
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.file_server import FileServer
+from lapwing.services.mavlink.log_server import LogServer
+from lapwing.services.mavlink.mission_store import MissionStore
+from lapwing.services.mavlink.parameter_store import ParameterStore
+from lapwing.services.mavlink.statustext import statustext
+from lapwing.services.mavlink.stream_rates import Schedule
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 SAY_EVERY, MAX_SAID = 5.0, 64  # [s] between two times of the same text; texts that are remembered
 

@@ -1,6 +1,6 @@
 """What ground stations are told that a vehicle is, by its rotors: they draw and name it by that."""
 
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.dialect import mavlink
 
 _TYPES = {
     3: mavlink.MAV_TYPE_TRICOPTER,

@@ -3,30 +3,30 @@
 import importlib
 from collections.abc import Mapping
 
-from cosim.scene import Scene
-from cosim.schedule import Port
-from cosim.setup import ServiceSetup
-from dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
-from dynamics.effects.carried_load import CarriedLoad
-from dynamics.errors import KeyedError
-from dynamics.vector import ZERO
-from services.common import ports
-from services.common.exchange import Rates
-from services.common.ports import ContactForces
-from services.common.vehicle import Vehicle
-from services.plant import interactions
-from services.plant.cores.contact import ContactView
-from services.plant.cores.multirotor import MultirotorPlant
-from services.plant.models._common import bodies_port, noise_key, rate_ticks
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
+from lapwing.dynamics.effects.carried_load import CarriedLoad
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.common import ports
+from lapwing.services.common.communication_schema import Rates
+from lapwing.services.common.ports import ContactForces
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.plant import fleet_coupling
+from lapwing.services.plant.blocks.contact import ContactView
+from lapwing.services.plant.blocks.multirotor import MultirotorPlant
+from lapwing.services.plant.models._common import bodies_port, noise_key, rate_ticks
 
 
 def resolve(scene: Scene) -> ServiceSetup:
     """The plant of the scene: every scene has one."""
     model = scene[Vehicle].model
-    found = importlib.import_module(f"services.plant.models.{model}").resolve(scene)
+    found = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
     if scene[Rates].contact is not None:
         found = _with_contact(scene, found)
-    if any(isinstance(e, CarriedLoad) for e in interactions.effects_of(found)):
+    if any(isinstance(e, CarriedLoad) for e in fleet_coupling.effects_of(found)):
         if any(port.name == ports.BODIES for port in found.ports):
             raise KeyedError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
         plant = found.parameters
@@ -38,7 +38,7 @@ def resolve(scene: Scene) -> ServiceSetup:
 def _with_contact(scene: Scene, found: ServiceSetup) -> ServiceSetup:
     """The same plant, which also tells of the forces on its feet."""
     effect = next(
-        (e for e in interactions.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
+        (e for e in fleet_coupling.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
     )
     if effect is None:
         message = "no effect of the scene tells of forces on feet"
@@ -50,7 +50,7 @@ def _with_contact(scene: Scene, found: ServiceSetup) -> ServiceSetup:
 
 def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
     """The plants of a run's vehicles, by their names, once they know of one another; as of `interactions.told`."""
-    return interactions.told(shares, keys)
+    return fleet_coupling.told(shares, keys)
 
 
 def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:

@@ -5,30 +5,30 @@ from typing import Any
 
 from numba import types
 
-from cosim.errors import DivergedError
-from cosim.graph import NEVER, Graph, Service
-from cosim.part import Code, Part
-from cosim.schedule import Input, Port
-from cosim.setup import Setup
-from dynamics.cell import Cell, read, write
-from dynamics.effects import _hooks as hooks
-from dynamics.effects._interaction import Presence
-from dynamics.generate import implements
-from dynamics.integrators import not_finite
-from dynamics.kernel import kernel
-from dynamics.multibody.five_bodies import FiveBodies
-from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
-from dynamics.vehicles.multirotor_multibody_equations import struck
-from services.common import ports
-from services.common.ports import PerRotor
-from services.plant.cores import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
-from services.plant.cores.interaction import Interaction
-from services.plant.cores.multirotor import MultirotorPlantState
-from services.plant.cores.presence import PresenceView
-from services.plant.interactions import LOAD, PRESENCE
-from services.plant.setup import Others, PlantEvent, PlantSetup
-from services.plant.wire import wires
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.compiled_block import Code, Part
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.run_errors import DivergedError
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.integrators import not_finite
+from lapwing.dynamics.multibody.five_bodies import FiveBodies
+from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import struck
+from lapwing.kernels import kernel
+from lapwing.kernels.cell import Cell, read, write
+from lapwing.kernels.codegen import implements
+from lapwing.services.common import ports
+from lapwing.services.common.ports import PerRotor
+from lapwing.services.plant.blocks import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
+from lapwing.services.plant.blocks.interaction import Interaction
+from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
+from lapwing.services.plant.blocks.neighbour_state import PresenceView
+from lapwing.services.plant.encoders import wires
+from lapwing.services.plant.fleet_coupling import LOAD, PRESENCE
+from lapwing.services.plant.service_config import Others, PlantEvent, PlantSetup
 
 NAME = "plant"
 

@@ -5,18 +5,26 @@ from typing import Any
 
 import numpy as np
 
-from cosim.backlog import Teller
-from cosim.bundle import unpack_batch
-from cosim.deadlines import Lateness, entries, lateness
-from cosim.errors import LockStepError
-from cosim.keys import BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, HANDED_KEY, LOGGED_KEY, RESTARTED_KEY
-from cosim.log import LogWriter
-from cosim.process import Process, Stopped
-from cosim.provenance import RESTARTS, WAITED, attachments, failure, metadata
-from cosim.recording import Recording
-from cosim.restart import Progress
-from cosim.watch import WATCHER
-from cosim.wire import Page, later
+from lapwing.cosim.config.provenance import RESTARTS, WAITED, attachments, failure, metadata
+from lapwing.cosim.diagram.topic_encoder import Page, later
+from lapwing.cosim.executors.deadlines import Lateness, entries, lateness
+from lapwing.cosim.executors.log_backpressure import Teller
+from lapwing.cosim.executors.participant import Process, Stopped
+from lapwing.cosim.log import LogWriter
+from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.transport.bus_keys import (
+    BATCH_KEY,
+    DEADLINES_KEY,
+    DIVERGED_KEY,
+    ENDED_KEY,
+    HANDED_KEY,
+    LOGGED_KEY,
+    RESTARTED_KEY,
+)
+from lapwing.cosim.transport.input_journal import Progress
+from lapwing.cosim.transport.packets import unpack_batch
 
 TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
 

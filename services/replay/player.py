@@ -4,10 +4,10 @@ import time
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from cosim.bus import ZenohBus
-from cosim.log import LogReader, LogWriter
-from services.replay.pace import Pace
-from services.replay.schedule import Cut, schedule
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.services.replay.playback_clock import Pace
+from lapwing.services.replay.playback_schedule import Cut, schedule
 
 AUDIENCE = 1.0  # [s] the first subscriber gets to appear
 

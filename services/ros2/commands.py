@@ -8,8 +8,17 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
-from messages import Actuators, Bool, OperatorCommand, OperatorInput, PoseStamped, Setpoint, String, TwistStamped
+from lapwing.dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
+from lapwing.messages import (
+    Actuators,
+    Bool,
+    OperatorCommand,
+    OperatorInput,
+    PoseStamped,
+    Setpoint,
+    String,
+    TwistStamped,
+)
 
 SOURCE = "ros2"
 WORLD = "world"

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import Any, Self
 
-from cosim.bus import ZenohBus
-from cosim.errors import BusError
-from cosim.subscription import Subscription
-from messages import TYPES
-from services.common.address import host_and_port, is_loopback
-from services.ros2.names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
+from lapwing.cosim.run_errors import BusError
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.subscription import Subscription
+from lapwing.messages import TYPES
+from lapwing.services.common.address import host_and_port, is_loopback
+from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 
 ROUTER = "127.0.0.1:7447"  # where nodes of rmw_zenoh look for their router
 # Nodes are told of one another, as by rmw_zenoh's own router, and then talk to one another directly.

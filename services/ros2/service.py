@@ -5,16 +5,16 @@ It takes no part in the lock step: nobody waits for it, and when it ends the fli
 
 from typing import Any
 
-from cosim.fleet import members
-from cosim.process import POLL, Process
-from cosim.setup import Setup
-from cosim.watch import WATCHER
-from messages import OperatorInput, header
-from messages.topics import EVENTS, of_vehicle
-from services.common.operator import OPERATOR_KEY
-from services.processes import create
-from services.ros2.commands import Commands
-from services.ros2.node import Node
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.executors.participant import POLL, Process
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.messages import OperatorInput, header
+from lapwing.messages.topics import EVENTS, of_vehicle
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.process_table import create
+from lapwing.services.ros2.commands import Commands
+from lapwing.services.ros2.node import Node
 
 
 def run(process: Process, given: Any) -> None:

@@ -6,8 +6,8 @@ It is no part of the lock step: the services are joined pairwise, and the router
 import time
 from typing import Any
 
-from cosim.process import POLL, Process
-from services.processes import RECORDER
+from lapwing.cosim.executors.participant import POLL, Process
+from lapwing.services.process_table import RECORDER
 
 
 def run(process: Process, given: Any) -> None:

@@ -5,17 +5,17 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Lt
 
-from cosim.schedule import Port
-from cosim.wire import Wire
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotate_back
-from dynamics.noise import TURN_ON, Key, normal, normal3
-from messages import topics as topic
-from services.common.airspeed import airspeed_wire
-from services.common.ports import AirspeedReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.truth import Truth
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.dynamics.lie.quaternion import rotate_back
+from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
+from lapwing.kernels import kernel, leaf
+from lapwing.messages import topics as topic
+from lapwing.services.common.airspeed_encoder import airspeed_wire
+from lapwing.services.common.ports import AirspeedReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("pressure",)
 
@@ -67,11 +67,11 @@ def initial(p: Airspeed, key: Key, truth: Truth) -> AirspeedState:
 @kernel
 def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> tuple[AirspeedState, AirspeedReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    noise = errors.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 0)
+    noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     measured = s.scale * _true_pressure(truth) + s.turn_on + noise
-    measured = errors.quantise(errors.limit(measured, p.range_pa), p.resolution_pa)
+    measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
     line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
-    variance = errors.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
+    variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
     return AirspeedState(s.scale, s.turn_on, line), AirspeedReading(arrived[0], variance, valid)
 
 

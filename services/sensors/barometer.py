@@ -5,14 +5,14 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dynamics.atmosphere import pressure
-from dynamics.kernel import kernel, leaf
-from dynamics.noise import TURN_ON, Key, normal, normal3
-from dynamics.vector import ZERO, Vec3
-from services.common.ports import BarometerReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.truth import Truth
+from lapwing.dynamics.atmosphere import pressure
+from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.kernels import kernel, leaf
+from lapwing.services.common.ports import BarometerReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("pressure",)
 
@@ -61,7 +61,7 @@ def initial(p: Barometer, key: Key, truth: Truth) -> BarometerState:
     true = _true_pressure(p, truth)
     scale = 1.0 + p.scale_error * draw[0]
     turn_on = p.turn_on_pa * draw[1]
-    walk = errors.walk_deviation(p.bias_instability_pa) * draw[2]
+    walk = error_models.walk_deviation(p.bias_instability_pa) * draw[2]
     return BarometerState(scale, turn_on, (walk, 0.0, 0.0), new_line((scale * true + turn_on + walk, 0.0, 0.0)))
 
 
@@ -70,14 +70,14 @@ def sample(
     p: Barometer, s: BarometerState, key: Key, tick: int, truth: Truth
 ) -> tuple[BarometerState, BarometerReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    deviation = errors.walk_deviation(p.bias_instability_pa)
-    walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
-    noise = errors.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
+    deviation = error_models.walk_deviation(p.bias_instability_pa)
+    walk = error_models.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
+    noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
     true = _true_pressure(p, truth)
     measured = s.scale * true + s.turn_on + walk[0] + noise
-    measured = errors.quantise(errors.limit(measured, p.range_pa), p.resolution_pa)
+    measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
     line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
-    variance = errors.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
+    variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
     return BarometerState(s.scale, s.turn_on, walk, line), BarometerReading(arrived[0], variance, valid)
 
 

@@ -3,11 +3,11 @@
 import math
 from typing import Any, NamedTuple
 
-from dynamics.kernel import leaf
-from dynamics.noise import TURN_ON, Key, normal
-from services.common.ports import DistanceReading
-from services.sensors import errors
-from services.sensors.line import BLANK, Line, carry, new_line
+from lapwing.dynamics.noise import TURN_ON, Key, normal
+from lapwing.kernels import leaf
+from lapwing.services.common.ports import DistanceReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, Line, carry, new_line
 
 CHANNELS = ("range",)
 FARTHEST = 1000.0  # [m] that the ground is looked for
@@ -34,13 +34,13 @@ def switched_on(p: Any, key: Key, distance: float) -> DistanceState:
 @leaf
 def measured(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
     """Next state and reading of a true distance [m]; other arguments as of `imu.sample`."""
-    noise = errors.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
+    noise = error_models.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     true = (s.scale * distance + noise, 0.0, 0.0)
     line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, true)
-    found = errors.quantise(arrived[0], p.resolution)
+    found = error_models.quantise(arrived[0], p.resolution)
     if found > p.range_max:
         found = math.inf
     elif found < p.range_min:
         found = -math.inf
-    variance = errors.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
+    variance = error_models.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
     return DistanceState(s.scale, line), DistanceReading(found, variance, valid)

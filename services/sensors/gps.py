@@ -5,16 +5,16 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dynamics.errors import KeyedError
-from dynamics.geodesy import enu_to_geodetic
-from dynamics.kernel import kernel, leaf, uncompiled
-from dynamics.lie.quaternion import rotate
-from dynamics.noise import TURN_ON, Key, normal3
-from dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
-from services.common.ports import GpsReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.truth import Place, Truth
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.geodesy import enu_to_geodetic
+from lapwing.dynamics.lie.quaternion import rotate
+from lapwing.dynamics.noise import TURN_ON, Key, normal3
+from lapwing.dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
+from lapwing.kernels import kernel, leaf, uncompiled
+from lapwing.services.common.ports import GpsReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 CHANNELS = ("position", "velocity")
 FEWEST = 4  # satellites of a fix
@@ -124,12 +124,12 @@ def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec
     """(error [m], variance [m^2]) east, north, up."""
     if p.sky is None:
         w = _deviations(p)
-        across = errors.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
-        up = errors.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
+        across = error_models.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
+        up = error_models.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
         horizontal = across * across + w[0] * w[0]
         error = add(multiply(w, wander), multiply((across, across, up), white))
         return error, (horizontal, horizontal, up * up + w[2] * w[2])
-    noise, L = errors.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate), s.geometry
+    noise, L = error_models.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate), s.geometry
     square = noise * noise + p.range_wander * p.range_wander
     east, north = L[0] * L[0], L[3] * L[3] + L[4] * L[4]
     variance = (square * east, square * north, square * (L[6] * L[6] + L[7] * L[7] + L[8] * L[8]))
@@ -173,8 +173,8 @@ def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
 @kernel
 def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsState, GpsReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    v = errors.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
-    wander = errors.walk(s.wander, 1.0, p.wander_time, p.rate, normal3(key, tick, 0))
+    v = error_models.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
+    wander = error_models.walk(s.wander, 1.0, p.wander_time, p.rate, normal3(key, tick, 0))
     error, variance = _position_error(p, s, wander, normal3(key, tick, 1))
     position, velocity = _seen(p.antenna, truth)
     position = add(position, error)

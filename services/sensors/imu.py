@@ -4,15 +4,16 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Lt
 
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion
-from dynamics.noise import Key
-from dynamics.vector import ZERO, Vec3, add
-from services.common.ports import ImuReading
-from services.sensors import errors, imu_motion
-from services.sensors.imu_motion import Vibration
-from services.sensors.line import DEPTH, Fault
-from services.sensors.triad import (
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.noise import Key
+from lapwing.dynamics.vector import ZERO, Vec3, add
+from lapwing.kernels import kernel
+from lapwing.services.common.ports import ImuReading
+from lapwing.services.sensors import error_models, imu_motion
+from lapwing.services.sensors.delay_line import DEPTH, Fault
+from lapwing.services.sensors.imu_motion import Vibration
+from lapwing.services.sensors.sensor_inputs import Place, Truth
+from lapwing.services.sensors.triad import (
     BLANK_TRIAD,
     Accelerometer,
     Gyro,
@@ -22,7 +23,6 @@ from services.sensors.triad import (
     measure,
     new_triad,
 )
-from services.sensors.truth import Place, Truth
 
 CHANNELS = ("gyro", "accelerometer")
 
@@ -79,7 +79,7 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
     Args:
         p: `Imu`.
         s: `ImuState`.
-        key: of this instrument's random stream (`dynamics.noise.stream_key`).
+        key: of this instrument's random stream (`lapwing.dynamics.noise.stream_key`).
         tick: integer, different for every sample.
         truth: `Truth` at this tick.
     """
@@ -95,8 +95,8 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
     g, a = gyro_units(p.gyro), accelerometer_units(p.accelerometer)
     gyro, omega, gyro_valid = measure(g, s.gyro, p, cold, 0, key, tick, omega)
     accelerometer, force, force_valid = measure(a, s.accelerometer, p, cold, 1, key, tick, force)
-    omega_variance = errors.sample_variance(g.noise, g.resolution, p.rate)
-    force_variance = errors.sample_variance(a.noise, a.resolution, p.rate)
+    omega_variance = error_models.sample_variance(g.noise, g.resolution, p.rate)
+    force_variance = error_models.sample_variance(a.noise, a.resolution, p.rate)
     reading = ImuReading(omega, force, omega_variance, force_variance, gyro_valid and force_valid)
     return ImuState(gyro, accelerometer, cold, phase, truth.attitude, velocity_world), reading
 
@@ -106,7 +106,7 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
 # calibration leaves of bias, scale and alignment: chosen.
 MPU6000 = Imu(
     Gyro(
-        noise_dps_per_sqrt_hz=errors.density_of_random_walk(0.30),
+        noise_dps_per_sqrt_hz=error_models.density_of_random_walk(0.30),
         bias_instability_deg_per_h=4.6,
         turn_on_dps=0.1,
         temperature_dps_per_k=0.008,

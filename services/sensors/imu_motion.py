@@ -5,11 +5,11 @@ from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import conjugate, log, multiply, rotate, rotate_back
-from dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
-from services.sensors.triad import MG
-from services.sensors.truth import Truth
+from lapwing.dynamics.lie.quaternion import conjugate, log, multiply, rotate, rotate_back
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
+from lapwing.kernels import kernel, leaf
+from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.triad import MG
 
 Amplitude = Annotated[float, Ge(0), Le(1e5)]
 

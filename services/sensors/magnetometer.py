@@ -5,14 +5,14 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotate_back
-from dynamics.noise import TURN_ON, Key, normal3
-from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
-from services.common.ports import MagnetometerReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.truth import Truth
+from lapwing.dynamics.lie.quaternion import rotate_back
+from lapwing.dynamics.noise import TURN_ON, Key, normal3
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
+from lapwing.kernels import kernel, leaf
+from lapwing.services.common.ports import MagnetometerReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("field",)
 _NANO = 1e-9
@@ -60,11 +60,11 @@ def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
 @kernel
 def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
     """State before the first sample."""
-    matrix = errors.scale_and_misalignment(
+    matrix = error_models.scale_and_misalignment(
         p.scale_error, math.radians(p.misalignment_deg), normal3(key, TURN_ON, 0), normal3(key, TURN_ON, 1)
     )
     hard_iron = scale(p.hard_iron_nt * _NANO, normal3(key, TURN_ON, 2))
-    walk = scale(errors.walk_deviation(p.bias_instability_nt * _NANO), normal3(key, TURN_ON, 3))
+    walk = scale(error_models.walk_deviation(p.bias_instability_nt * _NANO), normal3(key, TURN_ON, 3))
     true = _true_field(p, truth)
     return MagnetometerState(matrix, hard_iron, walk, new_line(add(apply(matrix, true), add(hard_iron, walk))))
 
@@ -74,14 +74,14 @@ def sample(
     p: Magnetometer, s: MagnetometerState, key: Key, tick: int, truth: Truth
 ) -> tuple[MagnetometerState, MagnetometerReading]:
     """Next state and reading; arguments as of `imu.sample`."""
-    deviation = errors.walk_deviation(p.bias_instability_nt * _NANO)
-    walk = errors.walk(s.walk, deviation, p.bias_time, p.rate, normal3(key, tick, 0))
-    noise = scale(errors.white_deviation(p.noise_nt_per_sqrt_hz * _NANO, p.rate), normal3(key, tick, 1))
+    deviation = error_models.walk_deviation(p.bias_instability_nt * _NANO)
+    walk = error_models.walk(s.walk, deviation, p.bias_time, p.rate, normal3(key, tick, 0))
+    noise = scale(error_models.white_deviation(p.noise_nt_per_sqrt_hz * _NANO, p.rate), normal3(key, tick, 1))
     true = _true_field(p, truth)
     measured = add(add(apply(s.matrix, true), add(s.hard_iron, walk)), noise)
-    measured = errors.digitise(measured, p.range_ut * 1e-6, p.resolution_nt * _NANO)
+    measured = error_models.digitise(measured, p.range_ut * 1e-6, p.resolution_nt * _NANO)
     line, field, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
-    variance = errors.sample_variance(p.noise_nt_per_sqrt_hz * _NANO, p.resolution_nt * _NANO, p.rate)
+    variance = error_models.sample_variance(p.noise_nt_per_sqrt_hz * _NANO, p.resolution_nt * _NANO, p.rate)
     return MagnetometerState(s.matrix, s.hard_iron, walk, line), MagnetometerReading(field, variance, valid)
 
 

@@ -6,21 +6,21 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Lt
 
-from cosim.schedule import Port
-from cosim.wire import Fields, Wire
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotate, rotate_back
-from dynamics.noise import TURN_ON, Key, normal3
-from dynamics.vector import Vec3
-from messages import OpticalFlow as OpticalFlowMessage
-from messages import header
-from messages import topics as topic
-from messages.records import stamp_columns
-from services.common.ports import OpticalFlowReading
-from services.sensors import errors
-from services.sensors.line import BLANK, DEPTH, Fault, Line, carry, new_line
-from services.sensors.rangefinder import to_ground
-from services.sensors.truth import Truth
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.dynamics.lie.quaternion import rotate, rotate_back
+from lapwing.dynamics.noise import TURN_ON, Key, normal3
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import kernel, leaf
+from lapwing.messages import OpticalFlow as OpticalFlowMessage
+from lapwing.messages import header
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.services.common.ports import OpticalFlowReading
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.rangefinder import to_ground
+from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("flow", "rate")
 
@@ -78,8 +78,8 @@ def sample(
 ) -> tuple[OpticalFlowState, OpticalFlowReading]:
     """Next state and reading; arguments as of `imu.sample`."""
     true, first, second = _true_flow(truth), normal3(key, tick, 0), normal3(key, tick, 1)
-    noise = errors.white_deviation(p.noise_rad_per_s_per_sqrt_hz, p.rate)
-    gyro_noise = errors.white_deviation(math.radians(p.gyro_noise_dps_per_sqrt_hz), p.rate)
+    noise = error_models.white_deviation(p.noise_rad_per_s_per_sqrt_hz, p.rate)
+    gyro_noise = error_models.white_deviation(math.radians(p.gyro_noise_dps_per_sqrt_hz), p.rate)
     flow = (s.scale * true[0] + noise * first[0], s.scale * true[1] + noise * first[1], true[2])
     omega = truth.omega_body
     rate = (omega[0] + gyro_noise * second[0], omega[1] + gyro_noise * second[1], 0.0)

@@ -7,21 +7,21 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from numba import types
 
-from cosim.schedule import Port
-from cosim.wire import Fields, Wire
-from dynamics.generate import implements
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotate
-from dynamics.noise import Key
-from dynamics.terrain import Level, ray
-from dynamics.vector import ZERO, Vec3, add
-from messages import Range, header
-from messages import topics as topic
-from messages.records import stamp_columns
-from services.common.ports import DistanceReading
-from services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
-from services.sensors.line import DEPTH, Fault
-from services.sensors.truth import Place, Truth
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.dynamics.lie.quaternion import rotate
+from lapwing.dynamics.noise import Key
+from lapwing.dynamics.terrain import Level, ray
+from lapwing.dynamics.vector import ZERO, Vec3, add
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import implements
+from lapwing.messages import Range, header
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.services.common.ports import DistanceReading
+from lapwing.services.sensors.delay_line import DEPTH, Fault
+from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 __all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "wires"]
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-import services.sensors
-from dynamics.errors import KeyedError
-from dynamics.validation import fault
-from services.sensors import schedule
+import lapwing.services.sensors
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
+from lapwing.services.sensors import fault_schedule
 
 NO_SENSORS = ("config", "registry", "service")  # modules of the folder that import this one
 
@@ -21,8 +21,8 @@ NO_SENSORS = ("config", "registry", "service")  # modules of the folder that imp
 @cache
 def sensors() -> dict[str, ModuleType]:
     """Every sensor, by name: a module of this folder that has `PRESETS`."""
-    names = sorted(module.name for module in pkgutil.iter_modules(services.sensors.__path__))
-    modules = {n: importlib.import_module(f"services.sensors.{n}") for n in names if n not in NO_SENSORS}
+    names = sorted(module.name for module in pkgutil.iter_modules(lapwing.services.sensors.__path__))
+    modules = {n: importlib.import_module(f"lapwing.services.sensors.{n}") for n in names if n not in NO_SENSORS}
     return {name: module for name, module in modules.items() if hasattr(module, "PRESETS")}
 
 
@@ -73,7 +73,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
             if faults:
                 raise KeyedError("faults", f"{sensor} knows none; leave them out")
             return p
-        return p._replace(faults=schedule.compile_faults(faults, module.CHANNELS, tick))
+        return p._replace(faults=fault_schedule.compile_faults(faults, module.CHANNELS, tick))
     except ValidationError as error:
         raise fault(error, type(preset)).under(sensor) from None
     except KeyedError as error:

@@ -6,23 +6,23 @@ from typing import Any
 
 import numba
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.noise import stream_key
-from messages import NavSatStatus
-from services.common import ports
-from services.common.environment import environment
-from services.common.exchange import Exchange, ticks
-from services.common.sections import Run
-from services.common.vehicle import Vehicle, gravity
-from services.sensors.config import Sensors
-from services.sensors.core import Instrument
-from services.sensors.registry import module_of, parameters
-from services.sensors.service import SensorsSetup
-from services.sensors.truth import Truth
-from services.sensors.wire import SonarWiring
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.noise import stream_key
+from lapwing.messages import NavSatStatus
+from lapwing.services.common import ports
+from lapwing.services.common.communication_schema import Exchange, ticks
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle, gravity
+from lapwing.services.sensors.block import Instrument
+from lapwing.services.sensors.encoders import SonarWiring
+from lapwing.services.sensors.registry import module_of, parameters
+from lapwing.services.sensors.schema import Sensors
+from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.service import SensorsSetup
 
 READINGS = {
     ports.IMU: ports.ImuReading(),

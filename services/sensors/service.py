@@ -3,13 +3,13 @@
 import sys
 from typing import NamedTuple
 
-from cosim.graph import Service
-from cosim.part import Part
-from cosim.setup import Setup
-from cosim.wire import Wire
-from dynamics.cell import Cell
-from services.sensors.core import Instrument
-from services.sensors.wire import PORTS, SonarWiring, own_wire, wires
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.kernels.cell import Cell
+from lapwing.services.sensors.block import Instrument
+from lapwing.services.sensors.encoders import PORTS, SonarWiring, own_wire, wires
 
 NAME = "sensors"
 

@@ -7,16 +7,16 @@ import numpy as np
 from annotated_types import Ge, Gt, Lt
 from numba import types
 
-from dynamics.generate import implements
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotation_matrix
-from dynamics.noise import Key
-from dynamics.terrain import Level, ray, surface
-from dynamics.vector import add, apply, dot, scale
-from services.common.ports import DistanceReading
-from services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
-from services.sensors.line import DEPTH, Fault
-from services.sensors.truth import Truth
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.noise import Key
+from lapwing.dynamics.terrain import Level, ray, surface
+from lapwing.dynamics.vector import add, apply, dot, scale
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import implements
+from lapwing.services.common.ports import DistanceReading
+from lapwing.services.sensors.delay_line import DEPTH, Fault
+from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from lapwing.services.sensors.sensor_inputs import Truth
 
 __all__ = ["CHANNELS", "PRESETS", "Sonar", "blank", "initial", "sample"]
 

@@ -5,14 +5,14 @@ from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Lt
 
-from dynamics.kernel import kernel, leaf
-from dynamics.noise import TURN_ON, Key, normal3
-from dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
-from services.sensors import errors
-from services.sensors.line import BLANK, Line, carry, new_line
+from lapwing.dynamics.noise import TURN_ON, Key, normal3
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
+from lapwing.kernels import kernel, leaf
+from lapwing.services.sensors import error_models
+from lapwing.services.sensors.delay_line import BLANK, Line, carry, new_line
 
 _DPS = math.radians(1.0)  # [rad/s] in one degree per second
-MG = 1e-3 * errors.STANDARD_GRAVITY  # [m/s^2] in one mg
+MG = 1e-3 * error_models.STANDARD_GRAVITY  # [m/s^2] in one mg
 
 
 class Gyro(NamedTuple):
@@ -105,12 +105,12 @@ def accelerometer_units(a: Accelerometer) -> Units:
 @kernel
 def new_triad(u: Units, key: Key, lane: int, cold: float, value: Vec3) -> Triad:
     """The state at the start, drawn from lanes `lane` to `lane` + 4 of a stream, where the true value is `value`."""
-    matrix = errors.scale_and_misalignment(
+    matrix = error_models.scale_and_misalignment(
         u.scale_error, u.misalignment, normal3(key, TURN_ON, lane), normal3(key, TURN_ON, lane + 1)
     )
     turn_on = scale(u.turn_on, normal3(key, TURN_ON, lane + 2))
     temperature = scale(u.temperature, normal3(key, TURN_ON, lane + 3))
-    walk = scale(errors.walk_deviation(u.instability), normal3(key, TURN_ON, lane + 4))
+    walk = scale(error_models.walk_deviation(u.instability), normal3(key, TURN_ON, lane + 4))
     bias = add(add(turn_on, walk), scale(-cold, temperature))
     return Triad(matrix, turn_on, temperature, walk, new_line(add(apply(matrix, value), bias)))
 
@@ -120,11 +120,11 @@ def measure(
     u: Units, t: Triad, p: Any, cold: float, channel: int, key: Key, tick: int, value: Vec3
 ) -> tuple[Triad, Vec3, bool]:
     """One triad's reading: theory.md, eq. (3.9)."""
-    walk = errors.walk(
-        t.walk, errors.walk_deviation(u.instability), u.bias_time, p.rate, normal3(key, tick, 2 * channel)
+    walk = error_models.walk(
+        t.walk, error_models.walk_deviation(u.instability), u.bias_time, p.rate, normal3(key, tick, 2 * channel)
     )
     bias = add(add(t.turn_on, walk), scale(-cold, t.temperature))
-    noise = scale(errors.white_deviation(u.noise, p.rate), normal3(key, tick, 2 * channel + 1))
-    measured = errors.digitise(add(add(apply(t.matrix, value), bias), noise), u.range, u.resolution)
+    noise = scale(error_models.white_deviation(u.noise, p.rate), normal3(key, tick, 2 * channel + 1))
+    measured = error_models.digitise(add(add(apply(t.matrix, value), bias), noise), u.range, u.resolution)
     line, arrived, valid = carry(p.faults, t.line, p.latency_samples, channel, key, tick, measured)
     return Triad(t.matrix, t.turn_on, t.temperature, walk, line), arrived, valid

@@ -4,9 +4,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
-from dynamics.errors import KeyedError
-from services.trajectory.segments import choose
-from services.trajectory.segments.segment import Positive, Segment
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.trajectory.segments import choose
+from lapwing.services.trajectory.segments.segment import Positive, Segment
 
 
 def _segments(value: object) -> tuple[Segment, ...]:

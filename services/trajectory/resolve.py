@@ -4,21 +4,21 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.vector import subtract
-from services.common import ports
-from services.common.exchange import Exchange
-from services.common.ports import Reference
-from services.common.sections import follows_trajectory
-from services.common.vehicle import start_place
-from services.trajectory.config import Trajectory, compiled
-from services.trajectory.core import TrajectoryPath
-from services.trajectory.following import FollowedPath
-from services.trajectory.piece import Parameters
-from services.trajectory.service import TrajectorySetup
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.vector import subtract
+from lapwing.services.common import ports
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.ports import Reference
+from lapwing.services.common.run_schema import follows_trajectory
+from lapwing.services.common.vehicle_schema import start_place
+from lapwing.services.trajectory.block import TrajectoryPath
+from lapwing.services.trajectory.leader_follower import FollowedPath
+from lapwing.services.trajectory.polynomial_piece import Parameters
+from lapwing.services.trajectory.schema import Trajectory, compiled
+from lapwing.services.trajectory.service import TrajectorySetup
 
 LEAD = 0.2  # [s] the references are ahead of the plant at the most
 

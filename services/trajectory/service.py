@@ -2,15 +2,15 @@
 
 from typing import Any, NamedTuple
 
-from cosim.graph import Service
-from cosim.part import Part
-from cosim.setup import Setup
-from dynamics.cell import Cell
-from messages.topics import TRAJECTORY
-from services.common import ports
-from services.common.references import reference_wire
-from services.trajectory.core import TrajectoryPath
-from services.trajectory.following import FollowedPath
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.kernels.cell import Cell
+from lapwing.messages.topics import TRAJECTORY
+from lapwing.services.common import ports
+from lapwing.services.common.reference_encoder import reference_wire
+from lapwing.services.trajectory.block import TrajectoryPath
+from lapwing.services.trajectory.leader_follower import FollowedPath
 
 NAME = "trajectory"
 

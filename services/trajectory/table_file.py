@@ -4,7 +4,7 @@ import csv
 import math
 from pathlib import Path
 
-from cosim.scene import SceneError, Source
+from lapwing.cosim.scene import SceneError, Source
 
 HEADER = ["time", "value"]
 

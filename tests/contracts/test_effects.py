@@ -9,19 +9,19 @@ from typing import get_args, get_origin, get_type_hints
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.effects import _hooks as hooks
-from dynamics.effects._types import Motion
-from dynamics.integrators import get, rk4_renormalised
-from dynamics.kernel import kernel, leaf
-from dynamics.lie.quaternion import rotation_matrix
-from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.integrators import get, rk4_renormalised
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.kernels import kernel, leaf
 
 ROOT = Path(__file__).parents[2]
-DRONE = load_airframe(ROOT / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(ROOT / "lapwing/scenes/vehicles/delivery_drone.toml")
 EULER, RK4 = get("lie_euler").Method(), get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
 HOVER = (32.6, 32.5, 32.7, 32.6)

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dynamics import integrators
-from dynamics.integrators import RATES, march
-from dynamics.kernel import kernel, leaf
-from dynamics.lie import quaternion, s2, so3, ts2
-from dynamics.lie.quaternion import Quaternion, rotate_back
-from dynamics.lie.s2 import Direction
-from dynamics.lie.se3 import Pose
-from dynamics.lie.so3 import Rotation
-from dynamics.lie.ts2 import Swing, tangent
-from dynamics.tree import embed, flatten, unflatten
-from dynamics.vector import Vec3, add, cross, divide, multiply, scale
-from dynamics.vehicles.rigid_body import RigidBody
+from lapwing.dynamics import integrators
+from lapwing.dynamics.integrators import RATES, march
+from lapwing.dynamics.lie import quaternion, s2, so3, ts2
+from lapwing.dynamics.lie.quaternion import Quaternion, rotate_back
+from lapwing.dynamics.lie.s2 import Direction
+from lapwing.dynamics.lie.se3 import Pose
+from lapwing.dynamics.lie.so3 import Rotation
+from lapwing.dynamics.lie.ts2 import Swing, tangent
+from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
+from lapwing.dynamics.vehicles.rigid_body import RigidBody
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.state_tree import embed, flatten, unflatten
 
 pytestmark = pytest.mark.long
 

@@ -6,8 +6,8 @@ from io import BytesIO
 
 import pytest
 
-from services.participant import Participation, hand_over
-from services.table import load, resolve
+from lapwing.services.process_main import Participation, hand_over
+from lapwing.services.scene_resolver import load, resolve
 
 pytestmark = pytest.mark.long
 
@@ -18,9 +18,9 @@ BY_OTHERS = {"cffi", "cython_runtime", "pycparser", "scipy", "yaml"}
 CHILD = """
 import sys
 before = set(sys.modules)
-from services.participant import take_over
+from lapwing.services.process_main import take_over
 given = take_over()
-import cosim.bus, cosim.lockstep
+import lapwing.cosim.transport.bus, lapwing.cosim.executors.lockstep
 from services import processes
 processes.create(given.setup, given.name)
 print(*sorted(set(sys.modules) - before))
@@ -35,7 +35,7 @@ def noted(name):
     return fork(name)
 child._fork = noted
 sys.argv = ["lapwing", "run", "hover", "--set", "run.duration=0.1", "--log", sys.argv[1], "--report", sys.argv[2]]
-from lapwing.cli.start import main
+from lapwing.cli.entry_point import main
 main()
 """
 

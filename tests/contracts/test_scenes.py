@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-import cosim.turns
-from cosim.graph import Graph
-from cosim.log import LogReader
-from cosim.part import run
-from services.common.operator import nobody
-from services.common.sections import Published, Run
-from services.processes import create_all
-from services.table import load, resolve
+import lapwing.cosim.diagram.execution_groups
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.compiled_block import run
+from lapwing.cosim.log import LogReader
+from lapwing.services.common.operator_inbox import nobody
+from lapwing.services.common.run_schema import Published, Run
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 
 pytestmark = pytest.mark.long
 
@@ -49,7 +49,7 @@ def test_no_part_makes_arrays(scene, monkeypatch):
         made += rtsys.get_allocation_stats().mi_alloc - before
         return stopped
 
-    monkeypatch.setattr(cosim.turns, "run", watched)
+    monkeypatch.setattr(lapwing.cosim.diagram.execution_groups, "run", watched)
     setup = resolve(load(scene))
     _nrt_python.memsys_enable_stats()
     Graph(setup, create_all(setup, nobody), 1).advance(250)
@@ -58,7 +58,7 @@ def test_no_part_makes_arrays(scene, monkeypatch):
 
 
 def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
-    scene = ROOT / "scenes/delivery_mission.toml"
+    scene = ROOT / "lapwing/scenes/delivery_mission.toml"
     published = load(scene)[Published].rmse
     flown = fly(scene, tmp_path)
     assert flown["landed"]
@@ -67,7 +67,7 @@ def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
 
 
 def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
-    scene = ROOT / "scenes/delivery_paper.toml"
+    scene = ROOT / "lapwing/scenes/delivery_paper.toml"
     published = load(scene)[Published].rmse
     flown = fly(scene, tmp_path)
     assert flown["landed"]
@@ -76,7 +76,7 @@ def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
 
 
 def test_the_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
-    scene = ROOT / "scenes/delivery_full.toml"
+    scene = ROOT / "lapwing/scenes/delivery_full.toml"
     published = load(scene)[Published].rmse
     flown = fly(scene, tmp_path)
     assert flown["landed"]

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.long
 RUN = """
 import json, sys
 from lapwing.cli.main import app
-from dynamics.kernel import _files, on_compile
+from lapwing.kernels import _files, on_compile
 compiled, looked_up, read = [], [], _files.read
 def watched(folder, name, version):
     if folder.startswith("kernels/"):
@@ -27,8 +27,8 @@ print(json.dumps([compiled, looked_up]))
 JOINS = """
 import sys
 from pathlib import Path
-from cosim.process import Process
-from dynamics.kernel import on_compile
+from lapwing.cosim.executors.participant import Process
+from lapwing.kernels import on_compile
 from lapwing.cli.main import app
 joined, join, told = [], Process.join, Path(sys.argv[1])
 def watched(process, *given):
@@ -76,5 +76,5 @@ def test_no_process_compiles_once_the_run_has_begun(tmp_path, monkeypatch, scene
     words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
     subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
     told = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]
-    assert "cosim.part.run" in [kernel for kernel, _ in told]
+    assert "lapwing.cosim.diagram.compiled_block.run" in [kernel for kernel, _ in told]
     assert [(kernel, process) for kernel, process in told if process] == []

@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from cosim.graph import Graph
-from cosim.scene import Scene
-from cosim.setup import Setup
-from cosim.single import PAGE, run_single
-from cosim.wire import Page
-from messages.digest import Digest
-from messages.history import history
-from messages.topics import Topic
-from services.processes import create_all
-from services.table import resolve
-from studies.topic_view import TopicView
-from studies.verdict import judge
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.executors.single_process import PAGE, run_single
+from lapwing.cosim.scene import Scene
+from lapwing.messages.digest import Digest
+from lapwing.messages.topic_columns import history
+from lapwing.messages.topics import Topic
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import resolve
+from lapwing.studies.outcome import judge
+from lapwing.studies.topic_view import TopicView
 
 
 class MemoryLog:
@@ -29,7 +29,7 @@ class MemoryLog:
         self._decoded: dict[str, list[Any]] = {}
 
     def write(self, pages: Iterable[Page], last: int) -> None:
-        """Take the pages of some ticks; called as `cosim.recording.Recording.write`."""
+        """Take the pages of some ticks; called as `lapwing.cosim.log.log_sequencer.Recording.write`."""
         for page in pages:
             name = page.topic.name.removeprefix("{vehicle}/")
             self._topics[name] = page.topic
@@ -37,7 +37,7 @@ class MemoryLog:
         self._decoded.clear()
 
     def finish(self) -> None:
-        """Nothing is left; called as `cosim.recording.Recording.finish`."""
+        """Nothing is left; called as `lapwing.cosim.log.log_sequencer.Recording.finish`."""
 
     @property
     def topics(self) -> dict[str, Topic]:

@@ -1,7 +1,7 @@
 """Graphs of a few parts, without a scene."""
 
-from cosim.graph import Graph, Service
-from cosim.setup import ServiceSetup, Setup
+from lapwing.cosim.config.run_config import ServiceSetup, Setup
+from lapwing.cosim.diagram.block_diagram import Graph, Service
 
 NAME = "test"
 

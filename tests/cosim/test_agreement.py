@@ -4,10 +4,10 @@ record the same bytes."""
 import pytest
 from flights import OPERATED, command, scripted
 
-from cosim.bundle import Bundles, pack_batch, unpack_batch
-from cosim.graph import Graph
-from services.processes import TIME_OWNER, create_all
-from services.table import load, resolve
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.transport.packets import Bundles, pack_batch, unpack_batch
+from lapwing.services.process_table import TIME_OWNER, create_all
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import MemoryLog, fly
 
 pytestmark = pytest.mark.long

@@ -1,6 +1,6 @@
 """Answers on the bus: to words that are understood, with the mark of who gives them."""
 
-from cosim.bus import ZenohBus
+from lapwing.cosim.transport.bus import ZenohBus
 from tests.endpoints import loopback_endpoints
 
 MARK, OTHER = b"m" * 16, b"o" * 16

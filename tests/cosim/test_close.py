@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from cosim.bus import ZenohBus
-from cosim.private import private_endpoints
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.transport.bus import ZenohBus
 
 KEY, CONFIRMED, THERE = "test-close/data", "test-close/confirmed", "test-close/there"
 MESSAGES, SIZE = 400, 100_000

@@ -5,23 +5,23 @@ import sys
 
 import pytest
 
-from cosim.access import VIEWER, by_certificate
-from cosim.bus import ZenohBus
-from cosim.certificates import make, tls
-from cosim.errors import BusError
-from cosim.keys import ALIVE_KEY, ENDED_KEY, STEP_KEY
-from cosim.log import LogReader
-from cosim.participants import Participants
-from lapwing.runs.single import fly_single
-from services.common.operator import OPERATOR_KEY
-from services.processes import MAVLINK
-from services.security import says
-from services.table import load, resolve
+from lapwing.cosim.access.certificates import make, tls
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.zenoh_access import VIEWER, by_certificate
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.run_errors import BusError
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENDED_KEY, STEP_KEY
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.process_table import MAVLINK
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.services.security import says
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long
 
-SCENE = "scenes/gyrostat_blocked.toml"
+SCENE = "lapwing/scenes/gyrostat_blocked.toml"
 
 
 def participant(name, peers, tmp_path, *more, insecure=True):
@@ -52,7 +52,7 @@ def test_a_participant_with_another_set_up_is_refused_and_the_first_difference_n
     for process in (plant, recorder):
         _, said = process.communicate(timeout=120)
         assert process.returncode == 2, said
-        assert "services.plant.parameters.core.system.inertia.1" in said
+        assert "lapwing.services.plant.parameters.core.system.inertia.1" in said
         assert "501.0" in said
         assert "500.0" in said
         assert len(said.splitlines()) == 1

@@ -9,9 +9,9 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from cosim.log import LogReader, LogWriter
-from messages import Clock, Imu, Status, TFMessage, TransformStamped, WallTime, header, stamp
-from messages.digest import Digest
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.messages import Clock, Imu, Status, TFMessage, TransformStamped, WallTime, header, stamp
+from lapwing.messages.digest import Digest
 
 
 def messages(count=300):
@@ -164,7 +164,7 @@ def test_a_log_whose_writer_was_killed_is_readable(path):
         f"""
         import os, signal
         from messages import Clock, stamp
-        from cosim.log import LogWriter
+        from lapwing.cosim.log import LogWriter
         log = LogWriter({str(path)!r}, {{"seed": "7"}}, {{"scene.toml": b"x"}})
         for k in range(1000):
             log.write("/clock", Clock, Clock(stamp(k)).encode(), k)
@@ -200,7 +200,7 @@ def test_cut_anywhere_it_reads_up_to_the_last_whole_chunk(path, tmp_path):
 
 def test_a_paused_writer_flushes_with_the_next_message(path, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("cosim.log.writer.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("lapwing.cosim.log.log_writer.time.monotonic", lambda: now[0])
     log = LogWriter(path, {}, {})
     for k in range(3):
         log.write("/clock", Clock, Clock().encode(), k)

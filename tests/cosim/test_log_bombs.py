@@ -9,8 +9,8 @@ import zstandard
 from mcap.records import Channel, Chunk, Message, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from cosim.log import LogReader, contents
-from cosim.log.container import encoded
+from lapwing.cosim.log import LogReader, mcap_contents
+from lapwing.cosim.log.mcap_writer import encoded
 
 MESSAGE = encoded(Message(channel_id=1, data=b"hello", log_time=5, publish_time=5, sequence=0))
 LARGEST = 1 << 20  # [bytes] instead of 256 times as much
@@ -49,7 +49,7 @@ def test_packed_chunks_are_read(name, pack, tmp_path):
 @pytest.mark.parametrize("said", [100, len(BOMB)], ids=["small", "large"])
 @pytest.mark.parametrize(("name", "pack"), [("lz4", lz4_of), ("zstd", zstd_of), ("zstd", zstd_of_unknown_size)])
 def test_bombs_are_refused_before_they_fill_the_memory(name, pack, said, monkeypatch, tmp_path):
-    monkeypatch.setattr(contents, "LARGEST", LARGEST)
+    monkeypatch.setattr(mcap_contents, "LARGEST", LARGEST)
     path = write(tmp_path / "log.mcap", name, pack(BOMB), said)
     tracemalloc.start()
     try:

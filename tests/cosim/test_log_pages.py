@@ -12,9 +12,9 @@ from mcap.writer import IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from cosim.log import LogReader, LogWriter
-from messages import Estimate, Imu, OperatorInput, Vector3, WallTime, header
-from messages.records import Record, stamp_columns
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.messages import Estimate, Imu, OperatorInput, Vector3, WallTime, header
+from lapwing.messages.cdr_arrays import Record, stamp_columns
 
 TICK = 4_000_000  # [ns]
 
@@ -142,7 +142,7 @@ def test_the_same_pages_give_the_same_file_whatever_the_wall_clock_shows(tmp_pat
     files = []
     for speed in (0.01, 3.0):
         clock = itertools.count(0.0, speed)
-        monkeypatch.setattr("cosim.log.writer.time.monotonic", lambda clock=clock: next(clock))
+        monkeypatch.setattr("lapwing.cosim.log.log_writer.time.monotonic", lambda clock=clock: next(clock))
         write_pages(tmp_path / "log", [page(50 * k) for k in range(5)])
         files.append((tmp_path / "log").read_bytes())
     assert files[0] == files[1]

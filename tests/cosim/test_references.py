@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-from cosim.part import Part, advance
-from cosim.schedule import Port
-from dynamics.cell import Cell, read
+from lapwing.cosim.diagram.compiled_block import Part, advance
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.kernels.cell import Cell, read
 from tests.cosim.parts.arrays import Last, Mean, Sum, weighted
 from tests.cosim.parts.exchanged_array import Exchange
 from tests.cosim.parts.new_arrays import Squares

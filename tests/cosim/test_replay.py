@@ -12,15 +12,15 @@ import time
 import numpy as np
 import pytest
 
-from cosim.bus import ZenohBus
-from cosim.log import LogReader, LogWriter
 from lapwing.cli.keyboard import Keyboard
-from messages import Clock, stamp
-from messages.digest import Digest
-from messages.topics import CLOCK
-from services.replay import player
-from services.replay.pace import Pace
-from services.replay.schedule import Cut, schedule
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.messages import Clock, stamp
+from lapwing.messages.digest import Digest
+from lapwing.messages.topics import CLOCK
+from lapwing.services.replay import player
+from lapwing.services.replay.playback_clock import Pace
+from lapwing.services.replay.playback_schedule import Cut, schedule
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long

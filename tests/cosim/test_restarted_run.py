@@ -7,13 +7,13 @@ import subprocess
 
 import pytest
 
-from cosim.log import LogReader
+from lapwing.cosim.log import LogReader
 from lapwing.flight import Flight
+from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.processes import fly_processes
-from services.participant import Participation
-from services.table import load, resolve
-from studies.fly import fly
+from lapwing.services.process_main import Participation
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.simulate import fly
 from tests.cosim.test_run import SCENE, STARTED, arguments, single, started  # noqa: F401 (a fixture)
 
 pytestmark = pytest.mark.long
@@ -54,7 +54,7 @@ def test_a_service_that_is_killed_in_flight_takes_its_place_again(started, tmp_p
 
 
 ALTITUDE = """
-from services.common.controllers import ThrustAndMoments
+from lapwing.services.common.controller_api import ThrustAndMoments
 
 class Altitude:
     rate = 125.0

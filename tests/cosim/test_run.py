@@ -11,18 +11,18 @@ from pathlib import Path
 
 import pytest
 
-from cosim.bus import ZenohBus
-from cosim.log import LogReader
-from cosim.log.recover import recover
-from lapwing.runs.single import fly_single
-from messages import BodyStates, VehicleState
-from services.table import load, resolve
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.log.recover import recover
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.messages import BodyStates, VehicleState
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.participants import participants
 
 pytestmark = pytest.mark.long
 
-SCENE = Path("scenes/hover.toml")
+SCENE = Path("lapwing/scenes/hover.toml")
 SHORT = ["run.duration=2"]
 SERVICES = {"autopilot", "plant", "trajectory", "recorder"}  # of this scene
 END = 10.0  # [s] a generous bound on how long an end may take; the target is 2 s

@@ -10,20 +10,20 @@ from pathlib import Path
 
 import pytest
 
-from cosim.bus import ZenohBus, mesh
-from cosim.keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, SETUP_KEY, STEP_KEY
-from cosim.log import LogReader
-from cosim.participants import Participants, new_secret
-from cosim.private import private_endpoints
-from cosim.serialise import to_json
-from messages.attachment import pack
-from services.common.operator import OPERATOR_KEY
-from services.table import load, resolve
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.access.publisher_ids import Participants, new_secret
+from lapwing.cosim.config.serialise import to_json
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, SETUP_KEY, STEP_KEY
+from lapwing.messages.attachment import pack
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.scene_resolver import load, resolve
 from tests.participants import participants
 
 pytestmark = pytest.mark.long
 
-SCENE = "scenes/hover.toml"
+SCENE = "lapwing/scenes/hover.toml"
 PREFIX = "test-strangers"
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim.watch import WATCHER
-from lapwing.runs.joined import parse_peers
-from services import processes
-from services.table import load, resolve
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.runs.distributed_run import parse_peers
+from lapwing.services import process_table
+from lapwing.services.scene_resolver import load, resolve
 
 ROOT = Path(__file__).parents[2]
 SET = {"DYNAMICS": "10.0.0.1", "FLIGHT": "10.0.0.2"}
@@ -42,7 +42,7 @@ def test_two_hosts_have_every_service_once_and_one_table():
     assert set(tables[0]) == {*plant, *others}
     assert not {*plant} & {*others}
     for scene in (ROOT / "scenes").glob("*.toml"):
-        assert {WATCHER, *processes.needed(resolve(load(scene)))} <= set(tables[0])
+        assert {WATCHER, *process_table.needed(resolve(load(scene)))} <= set(tables[0])
 
 
 def test_each_service_of_two_hosts_listens_at_its_host_with_its_own_certificate():
@@ -65,7 +65,7 @@ def test_kubernetes_takes_the_manifests():
 
 
 def test_kubernetes_has_a_pod_and_a_name_for_each_process_that_a_scene_needs():
-    needed = {WATCHER, *processes.needed(resolve(load("cooperative_load")))}
+    needed = {WATCHER, *process_table.needed(resolve(load("cooperative_load")))}
     found = {(each["kind"], each["metadata"]["name"]): each for each in manifests("cooperative_load")}
     for name in needed:
         spec = found["Pod", name]["spec"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.certificates import make
+from lapwing.cosim.access.certificates import make
 
 SCRIPT = Path(__file__).parents[2] / "deploy" / "keys.sh"
 NAMES = ("mission", "plant", "viewer")

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import lapwing
-from lapwing.docs.api import api
-from lapwing.docs.reference import reference
-from lapwing.docs.schema import SCHEMAS
+from lapwing.docs.api_page import api
+from lapwing.docs.json_schema import SCHEMAS
+from lapwing.docs.reference_page import reference
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from messages.topics import TOPICS
-from messages.types import DEFINITIONS
+from lapwing.messages.topics import TOPICS
+from lapwing.messages.types import DEFINITIONS
 
 FOLDER = Path("docs/layouts")
 BY_KEY = {topic.key("drone1"): topic for topic in TOPICS}

@@ -8,12 +8,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from dynamics.vehicles import performance
-from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.airframe_tables import Propeller
-from dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
-from lapwing.docs.schema import airframe_schema
-from services.table import load
+from lapwing.docs.json_schema import airframe_schema
+from lapwing.dynamics.vehicles import performance
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.dynamics.vehicles.airframe_tables import Propeller
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.services.scene_resolver import load
 
 pytestmark = pytest.mark.long
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dynamics.atmosphere import Atmosphere, density, density_slope, pressure, pressure_altitude, temperature
+from lapwing.dynamics.atmosphere import Atmosphere, density, density_slope, pressure, pressure_altitude, temperature
 
 STANDARD, WARM = Atmosphere(), Atmosphere(99_000.0, 20.0)
 

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from dynamics import discovery
+from lapwing.dynamics import discovery
 
 
 @pytest.fixture

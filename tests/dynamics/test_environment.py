@@ -4,8 +4,8 @@ import datetime
 
 import pytest
 
-from dynamics.environment import STANDARD, magnetic_field
-from dynamics.geodesy import Home
+from lapwing.dynamics.environment import STANDARD, magnetic_field
+from lapwing.dynamics.geodesy import Home
 
 # WMM2025_TEST_VALUES.txt: date, height [km], latitude, longitude [deg], north, east, down [nT]
 TABLE = [

@@ -4,8 +4,8 @@ import numpy as np
 import pymap3d
 import pytest
 
-from dynamics import geodesy
-from dynamics.geodesy import Home
+from lapwing.dynamics import geodesy
+from lapwing.dynamics.geodesy import Home
 
 HOMES = [Home(40.7686, 14.7907, 280.0), Home(-33.9, 151.2, 30.0), Home(0.0, 180.0, -20.0), Home(78.2, -15.6, 2500.0)]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from dynamics import noise
-from dynamics.kernel import kernel
+from lapwing.dynamics import noise
+from lapwing.kernels import kernel
 
 # Known-answer vectors of Random123 (tests/kat_vectors, "philox4x32 10"): counter, key, result.
 KNOWN = [

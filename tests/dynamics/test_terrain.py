@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dynamics.errors import KeyedError
-from dynamics.terrain import LEVEL, over_plane, ray, relief, summit, surface, touch
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.terrain import LEVEL, over_plane, ray, relief, summit, surface, touch
 
 GRID = {"grid": 0.2 * np.random.default_rng(1).normal(size=(9, 11)), "corner": (-4.0, -5.0), "spacing": 1.0}
 SMOOTH = {

@@ -6,8 +6,8 @@ import pytest
 from annotated_types import Ge, Gt, Le
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
-from dynamics.errors import KeyedError
-from dynamics.validation import fault
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
 
 
 class Inner(BaseModel):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from services.table import load
-from studies.fly import fly
+from lapwing.services.scene_resolver import load
+from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.flight import Flight
-from lapwing.runs.refly import refly
+from lapwing.runs.resimulate import refly
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.faults import after
+from tests.faults import leak_checks
 
 KILL, WORKER, INTERRUPT = "campaign kill", "campaign worker", "campaign Ctrl-C"
 COMMAND = ["campaign", "hover", "--runs", "40", "--set", "run.duration=2", "--workers", "2"]
@@ -65,7 +65,7 @@ def fly(
         workers = _workers(folder)
         victim = "worker" if kind == WORKER else "all" if kind == INTERRUPT and place >= 0.5 else "command"
         over = begun.poll() is not None
-        taken = after.ports(after.of_trial(folder))
+        taken = leak_checks.ports(leak_checks.of_trial(folder))
         struck = time.monotonic()
         with suppress(ProcessLookupError):
             if victim == "worker" and workers:
@@ -74,10 +74,10 @@ def fly(
                 os.killpg(begun.pid, signal.SIGINT)
             elif victim == "command" and not over:
                 os.kill(begun.pid, signal.SIGINT if kind == INTERRUPT else signal.SIGKILL)
-        wrong = after.ended(begun, "command", timeout)
-        wrong += after.left(folder, taken, kernels, timeout)
+        wrong = leak_checks.ended(begun, "command", timeout)
+        wrong += leak_checks.left(folder, taken, kernels, timeout)
         seconds = time.monotonic() - struck
-        for process in after.of_trial(folder):
+        for process in leak_checks.of_trial(folder):
             with suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
         said.seek(0)
@@ -116,7 +116,7 @@ def _digest(said: str) -> str:
 def _workers(folder: Path) -> list[int]:
     """The numbers of a campaign's worker processes."""
     found = []
-    for process in sorted(after.of_trial(folder)):
+    for process in sorted(leak_checks.of_trial(folder)):
         with suppress(OSError):
             if b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes():
                 found.append(process)

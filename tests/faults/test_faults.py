@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults import after, campaign, cut
+from tests.faults import campaign, leak_checks, network_partition
 from tests.faults.trial import Trial, draw, fly
 from tests.hosts.network import why_not
 
@@ -35,7 +35,7 @@ def test_a_fault_has_the_end_that_it_should(trial):
         pytest.skip("finds processes in /proc")
     if trial.kind == "full disk" and os.geteuid() != 0:
         pytest.skip("mounts a small disk, as root")
-    if trial.kind in cut.KINDS and (reason := why_not()):
+    if trial.kind in network_partition.KINDS and (reason := why_not()):
         pytest.skip(reason)
     outcome = fly(trial)
     assert not outcome.wrong, outcome
@@ -49,17 +49,17 @@ def test_a_seed_makes_the_same_trial():
 
 def test_what_is_left_of_a_trial_is_found(tmp_path):
     """A process of it, the port at which it listens, and a lock that it has taken."""
-    (tmp_path / "cache" / after.LOCKS).mkdir(parents=True)
-    lock = tmp_path / "cache" / after.LOCKS / "kernel"
+    (tmp_path / "cache" / leak_checks.LOCKS).mkdir(parents=True)
+    lock = tmp_path / "cache" / leak_checks.LOCKS / "kernel"
     with subprocess.Popen([sys.executable, "-c", HOLDS, lock], stdout=subprocess.PIPE, text=True) as holder:
         port = holder.stdout.readline().strip()
-        taken = after.ports(after.of_trial(tmp_path))
+        taken = leak_checks.ports(leak_checks.of_trial(tmp_path))
         assert list(taken.values()) == [f"tcp port {port}"]
-        there = after.left(tmp_path, taken, tmp_path / "cache", 0.0)
+        there = leak_checks.left(tmp_path, taken, tmp_path / "cache", 0.0)
         holder.kill()
     assert there[0].startswith(f"process {holder.pid} ")
     assert there[1:] == [f"tcp port {port} stays taken"]  # the lock's holder is there, and named by its number
-    assert after.left(tmp_path, taken, tmp_path / "cache", 10.0) == []
+    assert leak_checks.left(tmp_path, taken, tmp_path / "cache", 10.0) == []
 
 
 HOLDS = """

@@ -15,12 +15,12 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import studies.fly
-from cosim.log import LogReader
-from services.processes import needed
-from services.table import load, resolve
-from tests.faults import after, campaign, cut
-from tests.faults.kinds import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
+import lapwing.studies.simulate
+from lapwing.cosim.log import LogReader
+from lapwing.services.process_table import needed
+from lapwing.services.scene_resolver import load, resolve
+from tests.faults import campaign, leak_checks, network_partition
+from tests.faults.fault_types import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
 from tests.participants import participants
 
 SCENES = {  # overrides that make a flight of a few seconds
@@ -58,7 +58,7 @@ class Outcome(NamedTuple):
 def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
     """The trial of a seed, of one of these kinds; None: of those that a seed has drawn from ever since."""
     chance = random.Random(seed)
-    every = [*KINDS, *cut.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
+    every = [*KINDS, *network_partition.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
     kind = chance.choice(kinds or every)
     launcher = kind not in (FULL, *RESTARTED, *campaign.KINDS) and chance.random() < 0.2
     place = 1.0 if kind == INTERRUPT or launcher else chance.random()
@@ -73,10 +73,12 @@ def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
     disk.mkdir()
     full = trial.kind == FULL
     try:
-        if trial.kind in cut.KINDS:
-            victim = cut.HOSTS[min(int(trial.place * len(cut.HOSTS)), len(cut.HOSTS) - 1)]
-            code, said, seconds, wrong = cut.fly(victim, trial.kind, trial.delay / 2, folder)
-            return Outcome(victim, code, said, seconds, wrong + after.left(folder, {}, None, timeout))
+        if trial.kind in network_partition.KINDS:
+            victim = network_partition.HOSTS[
+                min(int(trial.place * len(network_partition.HOSTS)), len(network_partition.HOSTS) - 1)
+            ]
+            code, said, seconds, wrong = network_partition.fly(victim, trial.kind, trial.delay / 2, folder)
+            return Outcome(victim, code, said, seconds, wrong + leak_checks.left(folder, {}, None, timeout))
         if trial.kind in campaign.KINDS:
             cold = trial.seed % 2 == 1
             return Outcome(*campaign.fly(trial.kind, trial.place, trial.delay, cold, folder, timeout))
@@ -115,7 +117,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
             names = [name for name in names if name in undisturbed(trial.scene).services]
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
         late = launcher.poll() is not None
-        taken = after.ports(after.of_trial(folder))
+        taken = leak_checks.ports(leak_checks.of_trial(folder))
         if trial.kind == FULL:
             victim = "recorder"
             _fill(log.with_name("filler"))
@@ -125,14 +127,14 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
         if (victim, trial.kind) == (LAUNCHER, "freeze"):
             _gone(participants(launcher.pid) | children, FROZEN)
             os.kill(launcher.pid, signal.SIGCONT)
-        wrong = after.ended(launcher, "launcher", timeout)
+        wrong = leak_checks.ended(launcher, "launcher", timeout)
         left = _gone(children, timeout)
         seconds = time.monotonic() - struck
         wrong += [f"{name} is left" for name in left]
         for name in left:
             with suppress(ProcessLookupError):
                 os.kill(children[name], signal.SIGKILL)
-        wrong += after.left(folder, taken, Path(cold["LAPWING_CACHE"]) if cold else None, timeout)
+        wrong += leak_checks.left(folder, taken, Path(cold["LAPWING_CACHE"]) if cold else None, timeout)
         said.seek(0)
         text = said.read()
     code = launcher.returncode
@@ -189,7 +191,7 @@ class Undisturbed(NamedTuple):
 @cache
 def undisturbed(scene: str) -> Undisturbed:
     """The run of a scene of a trial."""
-    flight = studies.fly.fly(load(scene, SCENES[scene]))
+    flight = lapwing.studies.simulate.fly(load(scene, SCENES[scene]))
     return Undisturbed(tuple(flight.setup.services), flight.digest)
 
 

@@ -7,15 +7,15 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from lapwing.runs.live import OVER, handler
-from messages import Estimate, header
-from messages.topics import ESTIMATE
-from services import table
-from services.foxglove.server import Server
-from services.mavlink.adapter import Adapter
-from services.mavlink.dialect import mavlink
-from services.mavlink.protocols import handlers
-from services.mavlink.resolve import describe
+from lapwing.messages import Estimate, header
+from lapwing.messages.topics import ESTIMATE
+from lapwing.runs.live_page import OVER, handler
+from lapwing.services import scene_resolver
+from lapwing.services.foxglove.server import Server
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.protocols import handlers
+from lapwing.services.mavlink.resolve import describe
 from tests.fuzz.mutate import MOST
 from tests.fuzz.target import Target
 from tests.services.foxglove.client import Client
@@ -29,7 +29,7 @@ _SENDER = bytes([255, 190])  # system and component of a ground station
 
 def _conversations() -> Callable[[bytes], None]:
     """Gives bytes to a vehicle, of which estimates come, as those of one endpoint after the other."""
-    adapter = Adapter(describe(table.load("hover")), lambda command: None)
+    adapter = Adapter(describe(scene_resolver.load("hover")), lambda command: None)
     now = SimpleNamespace(endpoint=None, count=0)
 
     def read(data: bytes) -> None:

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.bundle import pack_batch, unpack_batch
-from cosim.log import LogReader, LogWriter
-from cosim.serialise import from_json, to_json
-from cosim.wire import Page
-from messages import PoseStamped, attachment
-from messages.topics import POSE
-from messages.types import TYPES
-from services import table
-from services.common import parameter_file, plan
+from lapwing.cosim.config.serialise import from_json, to_json
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.cosim.transport.packets import pack_batch, unpack_batch
+from lapwing.messages import PoseStamped, attachment
+from lapwing.messages.topics import POSE
+from lapwing.messages.types import TYPES
+from lapwing.services import scene_resolver
+from lapwing.services.common import flight_plan_file, parameter_file
 from tests.fuzz.sockets import frames, link, page, requests, websocket
 from tests.fuzz.target import Target
 
@@ -86,13 +86,13 @@ def attachments() -> Target:
 
 
 def set_ups() -> Target:
-    setup = to_json(table.resolve(table.load("gyrostat_blocked")))
+    setup = to_json(scene_resolver.resolve(scene_resolver.load("gyrostat_blocked")))
     return Target(lambda data: from_json(data.decode()), (setup.encode(), to_json((1.0, {"a": [None]})).encode()))
 
 
 def scenes() -> Target:
     def read(data: bytes) -> None:
-        table.parse(SCENES / "fuzz.toml", data.decode())
+        scene_resolver.parse(SCENES / "fuzz.toml", data.decode())
 
     return Target(read, SMALL_SCENES)
 
@@ -100,7 +100,7 @@ def scenes() -> Target:
 def plans() -> Target:
     seeds = tuple(path.read_bytes() for path in sorted((SCENES / "plans").glob("*.plan")))
     waypoints = b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t5.0\t1\n1\t0\t3\t22\t0\t0\t0\t0\t47.0\t8.0\t9.0\t1\n"
-    return Target(lambda data: plan.read(_file(data, "a.plan")), (*seeds, waypoints))
+    return Target(lambda data: flight_plan_file.read(_file(data, "a.plan")), (*seeds, waypoints))
 
 
 def parameters() -> Target:

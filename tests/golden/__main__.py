@@ -3,11 +3,11 @@
 import argparse
 import sys
 
-from cosim.graph import Graph
-from cosim.single import PAGE
-from services.processes import create_all
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.services.process_table import create_all
 from tests.cosim.memory_log import MemoryLog
-from tests.golden import digests, sample
+from tests.golden import digests, thinned_log
 from tests.golden.cases import CASES
 from tests.golden.digests import BEGINNING, Golden
 
@@ -54,12 +54,12 @@ def _check(name: str, update: bool, reason: str) -> bool:
         return True
     print(f"{name}: {digest}, was {known[name].digest if name in known else 'not known'}")
     if path.exists():
-        for line in sample.first_difference(sample.read(path), log):
+        for line in thinned_log.first_difference(thinned_log.read(path), log):
             print(f"  {line}")
     sys.stdout.flush()
     if update:
         path.parent.mkdir(exist_ok=True)
-        sample.write(path, sample.take(log))
+        thinned_log.write(path, thinned_log.take(log))
         digests.write({**known, name: Golden(digest, beginning, reason)})
     return False
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from cosim.setup import Setup
-from services.common import plan
-from services.common.environment import environment
-from services.common.vehicle import start_height
-from services.table import load, resolve
+from lapwing.cosim.config.run_config import Setup
+from lapwing.services.common import flight_plan_file as plan
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.vehicle_schema import start_height
+from lapwing.services.scene_resolver import load, resolve
 
 SCENES = Path(__file__).parents[2] / "scenes"
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.cosim.memory_log import fly
-from tests.golden import digests, sample
+from tests.golden import digests, thinned_log
 from tests.golden.cases import CASES
 
 WHOLE = {"gyrostat_blocked", "os4_motors", "cooperative_load", "hover"}
@@ -15,7 +15,7 @@ def test_a_scene_flies_to_its_digest(name):
     whole = name in WHOLE
     log = fly(setup, last=None if whole else round(digests.BEGINNING * setup.rate))
     if log.digest != (golden.digest if whole else golden.beginning):
-        found = sample.first_difference(sample.read(digests.sample_file(name)), log, whole)
+        found = thinned_log.first_difference(thinned_log.read(digests.sample_file(name)), log, whole)
         pytest.fail("\n".join(["not the digest that is kept; `python -m tests.golden` tells more", *found]))
 
 
@@ -43,13 +43,13 @@ class Changed:
 
 
 def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
-    sample.write(tmp_path / "sample.mcap", sample.take(flown))
-    kept = sample.read(tmp_path / "sample.mcap")
-    assert sample.first_difference(kept, flown) == []
+    thinned_log.write(tmp_path / "sample.mcap", thinned_log.take(flown))
+    kept = thinned_log.read(tmp_path / "sample.mcap")
+    assert thinned_log.first_difference(kept, flown) == []
     truth, number = flown.messages("truth"), 156  # one of those that are kept
     speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
     later = {("truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
-    began, field = sample.first_difference(kept, Changed(flown, later))
+    began, field = thinned_log.first_difference(kept, Changed(flown, later))
     before, at = (t * flown.setup.interval for t in (number - 1, number + 1))
     assert began.startswith(f"/{flown.setup.vehicle}/truth: differs first, after t = ")
     after, until = (float(part.split(" s")[0]) for part in began.split("t = ")[1:])
@@ -59,21 +59,21 @@ def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
 
 
 def test_a_flight_cut_short_differs_nowhere(flown):
-    kept = sample.take(flown)
+    kept = thinned_log.take(flown)
     short = fly(flown.setup, last=217)
-    assert sample.first_difference(kept, short, whole=False) == []
-    assert any("differs first" in line for line in sample.first_difference(kept, short))
+    assert thinned_log.first_difference(kept, short, whole=False) == []
+    assert any("differs first" in line for line in thinned_log.first_difference(kept, short))
 
 
 def test_a_single_message_between_those_kept_is_found_too(flown):
     message = flown.messages("truth")[151]._replace(air_density=7.0).encode()
-    (began,) = sample.first_difference(sample.take(flown), Changed(flown, {("truth", 151): message}))
+    (began,) = thinned_log.first_difference(thinned_log.take(flown), Changed(flown, {("truth", 151): message}))
     assert "truth: differs first" in began
 
 
 def test_topics_that_come_and_go_are_named(flown):
-    kept = sample.take(flown)
+    kept = thinned_log.take(flown)
     gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/truth"], **kept}
-    assert sample.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
+    assert thinned_log.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
     del kept["/tf"]
-    assert sample.first_difference(kept, flown) == ["/tf: this topic is new"]
+    assert thinned_log.first_difference(kept, flown) == ["/tf: this topic is new"]

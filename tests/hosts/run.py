@@ -4,7 +4,7 @@ import subprocess
 import sys
 import time
 
-from cosim.watch import WATCHER
+from lapwing.cosim.processes.run_monitor import WATCHER
 
 SLOWEST = 120.0  # [s] for a run to begin, and to end
 _GROWN = 8  # sizes of a log that is being written, some of which are of its head

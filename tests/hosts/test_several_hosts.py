@@ -4,11 +4,11 @@ import time
 
 import pytest
 
-from cosim.certificates import make
-from cosim.log import LogReader
-from cosim.watch import WATCHER
-from lapwing.runs.single import fly_single
-from services.table import load, resolve
+from lapwing.cosim.access.certificates import make
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.scene_resolver import load, resolve
 from tests.hosts.network import Network, why_not
 from tests.hosts.run import Run
 

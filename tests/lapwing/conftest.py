@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cli import start as cli
+from lapwing.cli import entry_point as cli
 
 ROOT = Path.cwd()
 

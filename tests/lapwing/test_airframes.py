@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import lapwing
-from dynamics.vehicles.airframe import load_airframe
-from services.autopilot.unstable import unstable_loops
-from services.common.sections import SHIPPED
-from services.table import load
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.services.autopilot.stability_check import unstable_loops
+from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.scene_resolver import load
 
 # worst RMSE of x, y [m]
 SCENES = {"quad_x": 0.03, "racer_250": 0.3, "os4_hover": 0.05, "hexacopter": 0.05, "hexacopter_tilted": 0.05}

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import lapwing
-from services.common.controllers import ThrustAndMoments
-from services.common.estimators import StateEstimate
+from lapwing.services.common.controller_api import ThrustAndMoments
+from lapwing.services.common.estimator_api import StateEstimate
 
 MODULE = """
-from services.common.controllers import ThrustAndMoments
+from lapwing.services.common.controller_api import ThrustAndMoments
 
 class Altitude:
     rate = 125.0

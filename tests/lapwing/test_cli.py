@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import lapwing
-from cosim.key_prefix import check_key_prefix
-from lapwing.runs import single
+from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.runs import single_process_run
 
 ROOT = Path.cwd()
-HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
+HOVER, DELIVERY = "lapwing/scenes/hover.toml", "lapwing/scenes/delivery_mission.toml"
 PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 
 OPEN = ("--peers", "foxglove=unixsock-stream/x")
@@ -40,7 +40,10 @@ BAD = {
     "no value": ([HOVER, "--set", "run.seed"], "--set run.seed: expected KEY=VALUE"),
     "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
     "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),
-    "missing file": (["scenes/hovr.toml"], "scenes/hovr.toml: no such file or directory; did you mean scenes/hover"),
+    "missing file": (
+        ["lapwing/scenes/hovr.toml"],
+        "lapwing/scenes/hovr.toml: no such file or directory; did you mean lapwing/scenes/hover",
+    ),
     "folder": (["scenes"], "scenes: is a folder; expected a scene file"),
     "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: no such file or directory"),
     "log is a folder": ([HOVER, "--log", "scenes"], "scenes: is a folder"),
@@ -96,9 +99,9 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["check", "scenes/none.toml"], "no such file"),
-        (["warm", "scenes/none.toml"], "no such file"),
-        (["warm", "scenes/plans"], "scenes/plans: no scenes there; expected a folder with .toml files"),
+        (["check", "lapwing/scenes/none.toml"], "no such file"),
+        (["warm", "lapwing/scenes/none.toml"], "no such file"),
+        (["warm", "lapwing/scenes/plans"], "lapwing/scenes/plans: no scenes there; expected a folder with .toml files"),
         (["scenes", "none"], "none: no scenes there"),
         (["report", "none.mcap"], "none.mcap"),
         (["report", "none.mcap", "--out", "a.txt"], "--out a.txt: expected a name that ends in .html, .pdf or .png"),
@@ -143,7 +146,7 @@ def test_a_refused_run_takes_the_folder_of_recordings_away_again(lapwing):
 
 
 def test_a_signal_while_kernels_compile_ends_the_run_at_once(lapwing, monkeypatch):
-    monkeypatch.setattr(single, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(single_process_run, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
     code, out, err = lapwing("run", HOVER, "--mode", "single")
     assert (code, out, err) == (143, "", "lapwing: ended by SIGTERM\n")
     assert os.listdir() == ["scenes"]
@@ -188,10 +191,10 @@ def test_check_tells_what_flies(lapwing):
 
 
 def test_the_command_itself_shows_no_traceback():
-    command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
+    command = [sys.executable, "-m", "lapwing", "run", "lapwing/scenes/none.toml"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 2
-    assert result.stderr.startswith("lapwing: scenes/none.toml: no such file")
+    assert result.stderr.startswith("lapwing: lapwing/scenes/none.toml: no such file")
     assert result.stderr.count("\n") == 1
 
 

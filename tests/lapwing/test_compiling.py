@@ -9,13 +9,13 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from dynamics.kernel import kernel
 from lapwing.cli.main import app
 from lapwing.cli.progress import Display
-from lapwing.runs import ahead, compiling
-from lapwing.runs.ahead import compile_ahead
-from lapwing.runs.compiling import EACH, FILE, Compilation, told
-from services.table import load, resolve
+from lapwing.kernels import kernel
+from lapwing.runs import compile_notice, precompile
+from lapwing.runs.compile_notice import EACH, FILE, Compilation, told
+from lapwing.runs.precompile import compile_ahead
+from lapwing.services.scene_resolver import load, resolve
 
 SERVICES = ("plant", "autopilot", "trajectory")  # of the hover scene
 
@@ -27,7 +27,7 @@ def setup():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiling, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compile_notice, "cache_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -102,7 +102,7 @@ def test_a_terminal_has_a_bar_and_anything_else_a_line():
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monkeypatch, terminal):
-    monkeypatch.setattr(ahead, "Graph", Compiling)
+    monkeypatch.setattr(precompile, "Graph", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": setup, "two": setup}, console)
     said = console.file.getvalue()
@@ -113,10 +113,10 @@ def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monk
 
 def test_one_broken_scene_of_a_folder_stops_no_other(tmp_path, monkeypatch):
     compiled = []
-    monkeypatch.setattr("lapwing.runs.ahead.compile_ahead", lambda setups, console: compiled.extend(setups))
+    monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda setups, console: compiled.extend(setups))
     for name in ("a", "c"):
         (tmp_path / f"{name}.toml").write_text("[run")
-    (tmp_path / "b.toml").write_bytes(Path("scenes/hover.toml").read_bytes())
+    (tmp_path / "b.toml").write_bytes(Path("lapwing/scenes/hover.toml").read_bytes())
     result = CliRunner().invoke(app, ["warm", str(tmp_path)])
     assert (result.exit_code, compiled) == (2, [str(tmp_path / "b.toml")])
     assert [line.partition(": not valid TOML")[0] for line in result.output.splitlines()] == [

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 import lapwing as package
-from lapwing.runs import single
-from studies.figures import figures
-from studies.flight import SHOWN, Flight
-from studies.report.page import flight_page
+from lapwing.runs import single_process_run
+from lapwing.studies.flight_data import SHOWN, Flight
+from lapwing.studies.metrics import figures
+from lapwing.studies.report.page import flight_page
 
 HOVER = ["run", "hover", "--mode", "single", "--log", "a.mcap", "--json", "a.json"]
 FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
@@ -65,12 +65,12 @@ def test_a_divergence_has_its_verdict_in_both_modes(lapwing, mode):
 
 
 def test_ctrl_c_has_its_verdict_too(lapwing, monkeypatch):
-    advance = single.run_single
+    advance = single_process_run.run_single
 
     def interrupted(graph, recording, speed, observe, last):
         advance(graph, recording, speed, lambda graph: signal.raise_signal(signal.SIGINT) or observe(graph), 500)
 
-    monkeypatch.setattr(single, "run_single", interrupted)
+    monkeypatch.setattr(single_process_run, "run_single", interrupted)
     code, out, err = lapwing(*HOVER)
     assert (code, err) == (130, "lapwing: ended by SIGINT\n")
     assert "Broken off at 2.00 s: ended by SIGINT" in out
@@ -80,7 +80,7 @@ def test_ctrl_c_has_its_verdict_too(lapwing, monkeypatch):
 
 def test_a_run_that_is_refused_says_nothing_of_the_log_that_was_there(lapwing, monkeypatch):
     lapwing(*HOVER)
-    monkeypatch.setattr(single, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(single_process_run, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
     assert lapwing(*HOVER)[1:] == ("", "lapwing: ended by SIGTERM\n")
 
 

@@ -6,7 +6,7 @@ import re
 import pytest
 from rich.console import Console
 
-from lapwing.cli.countdown import Countdown, left
+from lapwing.cli.study_progress import Countdown, left
 
 
 def test_time_left_is_that_of_the_mean_flight():

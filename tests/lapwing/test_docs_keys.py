@@ -6,16 +6,16 @@ import pytest
 from annotated_types import Gt, Le
 from pydantic import BaseModel, Field
 
-from dynamics.declared import comments, split
-from dynamics.vehicles.airframe import Airframe
 from lapwing.docs.annotations import schema_of
 from lapwing.docs.catalogue import effect_tables, sensor_tables
-from lapwing.docs.keys import REQUIRED, first_sentence, keys
+from lapwing.docs.key_docs import REQUIRED, first_sentence, keys
 from lapwing.docs.markdown import code, key_table, kind, limits
-from services.sensors.schedule import FaultTable
-from services.table import vocabulary
-from services.trajectory.phases import Phase
-from services.trajectory.segments import KINDS
+from lapwing.dynamics.field_comments import comments, split
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.services.scene_resolver import vocabulary
+from lapwing.services.sensors.fault_schedule import FaultTable
+from lapwing.services.trajectory.phases import Phase
+from lapwing.services.trajectory.segments import KINDS
 
 
 class Base(BaseModel):

@@ -7,18 +7,18 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cosim.scene import SceneError
-from lapwing.docs.schema import SCHEMAS
-from services.table import load
+from lapwing.cosim.scene import SceneError
+from lapwing.docs.json_schema import SCHEMAS
+from lapwing.services.scene_resolver import load
 
 ROOT = Path(__file__).parents[2]
 FILES = {
     "scene": sorted((ROOT / "scenes").glob("*.toml")),
-    "airframe": sorted((ROOT / "scenes/vehicles").glob("*.toml")),
+    "airframe": sorted((ROOT / "lapwing/scenes/vehicles").glob("*.toml")),
     "gains": sorted((ROOT / "services/autopilot/gains").glob("*.toml")),
 }
 VALIDATORS = {kind: jsonschema.Draft7Validator(make()) for kind, make in SCHEMAS.items()}
-MISSION = tomllib.loads((ROOT / "scenes/delivery_mission.toml").read_text())
+MISSION = tomllib.loads((ROOT / "lapwing/scenes/delivery_mission.toml").read_text())
 
 
 def faults(kind, tree):

@@ -9,7 +9,7 @@ import pytest
 
 import lapwing
 from lapwing import Flight
-from services.common.sections import SHIPPED
+from lapwing.services.common.run_schema import SHIPPED
 
 pytestmark = pytest.mark.long
 SHORT = ["--set", "run.duration=1.5"]

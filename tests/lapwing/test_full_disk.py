@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.log import LogReader
+from lapwing.cosim.log import LogReader
 
 pytestmark = pytest.mark.long
 

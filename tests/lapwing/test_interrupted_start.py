@@ -17,7 +17,7 @@ def strike(event, arguments):
         os.kill(os.getpid(), signal.NUMBER)
 sys.addaudithook(strike)
 sys.argv = ["lapwing", "--version"]
-from lapwing.cli.start import main
+from lapwing.cli.entry_point import main
 main()
 """
 
@@ -28,7 +28,9 @@ def struck(module, number, said=subprocess.PIPE):
     return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=said, text=True, check=False)
 
 
-@pytest.mark.parametrize("module", ["cosim.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.studies"])
+@pytest.mark.parametrize(
+    "module", ["lapwing.cosim.processes.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.study_commands"]
+)
 def test_ctrl_c_at_an_import(module):
     done = struck(module, signal.SIGINT)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")

@@ -10,10 +10,10 @@ import urllib.request
 
 import pytest
 
-from cosim.log import LogReader
-from messages import Log
-from services.processes import FOXGLOVE, needed
-from services.table import load, resolve
+from lapwing.cosim.log import LogReader
+from lapwing.messages import Log
+from lapwing.services.process_table import FOXGLOVE, needed
+from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import patient
 

@@ -12,14 +12,14 @@ import urllib.request
 import numpy as np
 import pytest
 
-from cosim.graph import Graph
-from cosim.single import PAGE
-from lapwing.runs.following import Following
-from lapwing.runs.live import LivePage
-from messages import Log
-from services.processes import create_all
-from services.table import load, resolve
-from studies.report.motion import steps_to_json
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.messages import Log
+from lapwing.runs.live_feed import Following
+from lapwing.runs.live_page import LivePage
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.report.motion_3d import steps_to_json
 from tests.studies import chromium
 
 pytestmark = pytest.mark.long

@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from scipy.io import loadmat
 
-from cosim.log import LogReader, LogWriter
-from messages import Clock, Point, Pose, Status, VehicleState, header, stamp
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.messages import Clock, Point, Pose, Status, VehicleState, header, stamp
 
 TICK = 4_000_000  # [ns]
 ABOUT = {"scene": "made_up", "seed": "7", "version": "0.1", "solver_integrator": "rk4", "solver_step": "0.001"}
@@ -103,7 +103,7 @@ def test_what_a_killed_writer_has_flushed_is_recovered(lapwing, tmp_path):
         """
         import os, signal, time
         from messages import Clock, stamp
-        from cosim.log import LogWriter
+        from lapwing.cosim.log import LogWriter
         log = LogWriter("killed.mcap", {"seed": "7"}, {"scene.toml": b"x"})
         for k in range(3000):
             log.write("/clock", Clock, Clock(stamp(k)).encode(), k)

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from cosim.log import LogReader
-from dynamics.errors import KeyedError
-from lapwing.cli.new import write_effect
+from lapwing.cli.new_command import write_effect
+from lapwing.cosim.log import LogReader
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.processes import fly_processes
-from lapwing.runs.refly import refly
-from services.participant import Participation
-from services.table import from_resolved, load, resolve
-from studies.fly import fly
+from lapwing.runs.resimulate import refly
+from lapwing.services.process_main import Participation
+from lapwing.services.scene_resolver import from_resolved, load, resolve
+from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
@@ -26,7 +26,7 @@ def scene(tmp_path):
     """Loads the hover scene with a new effect beside it."""
     write_effect(NAME, tmp_path)
     path = tmp_path / "hover.toml"
-    path.write_text(Path("scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
+    path.write_text(Path("lapwing/scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
     return lambda *overrides: load(path, ["run.duration=1.5", *overrides])
 
 

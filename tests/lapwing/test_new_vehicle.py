@@ -10,12 +10,12 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.performance import rotor_of, thrust_over_weight
 from lapwing.cli.main import app
 from lapwing.cli.new_vehicle import write_vehicle
-from lapwing.vehicle_figures import FIGURES
-from services.table import load
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.performance import rotor_of, thrust_over_weight
+from lapwing.services.scene_resolver import load
+from lapwing.vehicle_measurements import FIGURES
 
 
 @pytest.mark.parametrize(

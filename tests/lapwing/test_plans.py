@@ -4,24 +4,27 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cli import plans
-from services.table import load, resolve
+from lapwing.cli import plan_options
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import fly
 
-PLAN = "scenes/plans/delivery.plan"
+PLAN = "lapwing/scenes/plans/delivery.plan"
 
 
 def test_one_vehicle_needs_no_name():
-    assert plans.overrides([PLAN], Path("hover"), []) == ["autopilot.operator=true", "autopilot.trajectory=false"]
-    assert list(plans.commands([PLAN], load("hover"))) == ["drone1"]
-    assert plans.overrides([], Path("hover"), []) == []
+    assert plan_options.overrides([PLAN], Path("hover"), []) == [
+        "autopilot.operator=true",
+        "autopilot.trajectory=false",
+    ]
+    assert list(plan_options.commands([PLAN], load("hover"))) == ["drone1"]
+    assert plan_options.overrides([], Path("hover"), []) == []
     with pytest.raises(ValueError, match="expected one plan"):
-        plans.files([PLAN, PLAN], load("hover"))
+        plan_options.files([PLAN, PLAN], load("hover"))
 
 
 def test_of_several_those_that_are_named_are_operated():
     given = [f"right={PLAN}"]
-    assert plans.overrides(given, Path("fleet"), []) == [
+    assert plan_options.overrides(given, Path("fleet"), []) == [
         "vehicle.1.autopilot.operator=true",
         "vehicle.1.autopilot.trajectory=false",
     ]
@@ -30,13 +33,13 @@ def test_of_several_those_that_are_named_are_operated():
 @pytest.mark.parametrize("given", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
 def test_refuses_a_plan_of_nobody(given):
     with pytest.raises(ValueError, match=r"the scene has several vehicles; expected NAME=FILE, .*left, right, scout"):
-        plans.files(given, load("fleet"))
+        plan_options.files(given, load("fleet"))
 
 
 def test_the_others_fly_as_they_would_without_it():
     given, only = [f"right={PLAN}"], ["run.duration=8.0"]
-    scene = load("fleet", [*only, *plans.overrides(given, Path("fleet"), only)])
-    flown = fly(resolve(scene, plans.commands(given, scene)))
+    scene = load("fleet", [*only, *plan_options.overrides(given, Path("fleet"), only)])
+    flown = fly(resolve(scene, plan_options.commands(given, scene)))
     assert flown.messages("right/status")[-1].mode == "mission"
     assert flown.view("right/truth").position[-1, 2] > 1.0
     without = fly(resolve(load("fleet", only)))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lapwing
+from lapwing.services.common.ports import Reference
 from lapwing.simulator import Simulator
-from services.common.ports import Reference
 
 STILL = {"autopilot.estimator": "truth"}
 

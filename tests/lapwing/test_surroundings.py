@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from dynamics.kernel import cache_folder
+from lapwing.kernels import cache_folder
 
 pytestmark = pytest.mark.long
 

@@ -35,7 +35,12 @@ def test_a_wheel_flies_a_shipped_scene_from_any_folder(tmp_path):
             command, cwd=work, env=environment, capture_output=True, text=True, timeout=300, check=False
         )
 
-    assert str(site) in python("-c", "import services.table; print(services.table.__file__)").stdout
+    assert (
+        str(site)
+        in python(
+            "-c", "import lapwing.services.scene_resolver; print(lapwing.services.scene_resolver.__file__)"
+        ).stdout
+    )
     flown = python(
         "-m", "lapwing", "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--key-prefix", "test-wheel"
     )

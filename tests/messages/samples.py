@@ -4,8 +4,8 @@ import random
 import struct
 from typing import Any
 
-from messages import TYPES
-from messages.types import DEFINITIONS
+from lapwing.messages import TYPES
+from lapwing.messages.types import DEFINITIONS
 
 RANGES = {
     "byte": (0, 255), "char": (0, 255), "int8": (-128, 127), "uint8": (0, 255), "int16": (-(2**15), 2**15 - 1),

@@ -1,6 +1,6 @@
 import pytest
 
-from messages.attachment import Attachment, pack, time_and_gid, unpack
+from lapwing.messages.attachment import Attachment, pack, time_and_gid, unpack
 
 GID = bytes(range(16))
 

@@ -7,11 +7,11 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from samples import sample
 
-import messages
-from messages import TYPES, Imu, NavSatFix, Odometry, Quaternion, Status, TFMessage, Vector3, VehicleState
+import lapwing.messages
+from lapwing.messages import TYPES, Imu, NavSatFix, Odometry, Quaternion, Status, TFMessage, Vector3, VehicleState
 
 ROUNDS = 25
-FOLDER = Path(messages.__file__).parent / "msg"
+FOLDER = Path(lapwing.messages.__file__).parent / "msg"
 
 
 def published_store():
@@ -153,7 +153,7 @@ def test_schema_text_defines_the_same_fields_as_the_published_type(name):
 def test_types_are_the_files():
     files = {f"{path.parent.name}/msg/{path.stem}" for path in FOLDER.glob("*/*.msg")}
     assert set(TYPES) == files
-    assert all(getattr(messages, cls.__name__) is cls for cls in TYPES.values())
+    assert all(getattr(lapwing.messages, cls.__name__) is cls for cls in TYPES.values())
 
 
 def test_defaults_are_zero_but_for_the_identity_quaternion():
@@ -167,7 +167,7 @@ def test_unknown_names_are_errors():
     with pytest.raises(ImportError):
         exec("from messages import NoSuchMessage")
     with pytest.raises(ValueError, match="unknown message type a/msg/B; known: builtin_interfaces/msg/Time"):
-        messages.message_class("a/msg/B")
+        lapwing.messages.message_class("a/msg/B")
 
 
 def test_decode_is_static():

@@ -4,7 +4,7 @@ import struct
 import numpy as np
 import pytest
 
-from messages.digest import Digest
+from lapwing.messages.digest import Digest
 
 A = [("/a", t, bytes([t % 256])) for t in range(5000)]
 B = [("/b", t, b"x" * (t % 7)) for t in range(300)]

@@ -1,7 +1,7 @@
 import pytest
 
-from messages.codec import make_class
-from messages.parse import Field, dependencies, parse, read_folder, schema_text
+from lapwing.messages.codec import make_class
+from lapwing.messages.parse import Field, dependencies, parse, read_folder, schema_text
 
 TEXT = """
 # a comment

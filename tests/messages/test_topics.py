@@ -1,5 +1,5 @@
-from messages import topics
-from messages.topics import CLOCK, EVENTS, GPS, TOPICS, WALL_TIME
+from lapwing.messages import topics
+from lapwing.messages.topics import CLOCK, EVENTS, GPS, TOPICS, WALL_TIME
 
 EXPECTED = {
     "/clock", "/tf", "/wall_time",

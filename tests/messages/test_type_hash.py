@@ -3,9 +3,9 @@
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from messages import TYPES
-from messages.parse import parse
-from messages.type_hash import known_type_hash, type_hash
+from lapwing.messages import TYPES
+from lapwing.messages.parse import parse
+from lapwing.messages.type_hash import known_type_hash, type_hash
 
 STANDARD = get_typestore(Stores.ROS2_JAZZY)
 PUBLISHED = {  # in the keys of rmw_zenoh's own documentation, and of ROS 2 nodes

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cosim.bundle import pack_batch
-from cosim.errors import LockStepError
-from cosim.wire import Page
-from messages.topics import ACTUATORS, POSE, TRUTH
-from services.recorder.service import Pending
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.transport.packets import pack_batch
+from lapwing.messages.topics import ACTUATORS, POSE, TRUTH
+from lapwing.services.recorder.service import Pending
 
 
 def batch(topic, ticks, stop, start=0):

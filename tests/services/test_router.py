@@ -8,16 +8,16 @@ import time
 import pytest
 import zenoh
 
-from cosim.access import VIEWER
-from cosim.bus import ZenohBus, mesh
-from cosim.certificates import make, tls
-from cosim.errors import BusError
-from cosim.keys import BATCH_KEY, DIVERGED_KEY, STEP_KEY
-from messages import PoseStamped
-from services.common.operator import OPERATOR_KEY
-from services.processes import ROUTER
-from services.security import settings
-from services.table import load, resolve
+from lapwing.cosim.access.certificates import make, tls
+from lapwing.cosim.access.zenoh_access import VIEWER
+from lapwing.cosim.run_errors import BusError
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus_keys import BATCH_KEY, DIVERGED_KEY, STEP_KEY
+from lapwing.messages import PoseStamped
+from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.process_table import ROUTER
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.services.security import settings
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long

@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from services.table import load, resolve
-from studies.fly import fly
-from studies.topic_view import TopicView
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.simulate import fly
+from lapwing.studies.topic_view import TopicView
 
 TICKS = 500
 

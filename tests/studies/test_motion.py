@@ -6,19 +6,19 @@ import json
 import re
 
 import chromium
-import made_up
 import numpy as np
 import pytest
+import synthetic_flights
 
-from services.common.mesh import pack
-from services.common.mesh_file import Mesh
-from services.table import load, resolve
-from studies.flight import Flight
-from studies.origin import Origin
-from studies.report import motion, shapes, write
-from studies.report.motion import FRAMES
-from studies.report.style import COLOURS
-from studies.topic_view import TopicView
+from lapwing.services.common.mesh_file import Mesh
+from lapwing.services.common.mesh_schema import pack
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.report import motion_3d, shapes, write
+from lapwing.studies.report.motion_3d import FRAMES
+from lapwing.studies.report.style import COLOURS
+from lapwing.studies.topic_view import TopicView
 from tests.golden.digests import sample_file
 
 TICKS, RATE = 400, 100
@@ -37,7 +37,7 @@ def flight(model="reduced", ticks=TICKS, scene=None, **topics):
     t = np.arange(ticks) / RATE
     truth = {
         "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
-        "pose.orientation": made_up.LEVEL,
+        "pose.orientation": synthetic_flights.LEVEL,
         "rotor_speed": (10.0,) * 4,
         **dict.fromkeys(("motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque"), (1.0,) * 4),
         "velocity": (0.0, 0.0, 1.0),
@@ -47,7 +47,7 @@ def flight(model="reduced", ticks=TICKS, scene=None, **topics):
         "ground_contact": np.zeros(ticks, bool),
     }
     told = {"vehicle": {"model": model}, **({"airframe": AIRFRAME} if scene is None else scene)}
-    return made_up.flight(ticks, RATE, scene=told, truth=truth, **topics)
+    return synthetic_flights.flight(ticks, RATE, scene=told, truth=truth, **topics)
 
 
 def numbers(text, kind="<f4"):
@@ -55,7 +55,7 @@ def numbers(text, kind="<f4"):
 
 
 def test_the_page_is_given_the_motion_and_the_shape_of_the_airframe():
-    (table,) = json.loads(motion.to_json([flight()]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([flight()]))["flights"]
     assert numbers(table["t"], "<f8") == pytest.approx(T)
     assert numbers(table["path"]).reshape(-1, 3)[:, 2] == pytest.approx(T)
     assert numbers(table["wind"])[:3] == pytest.approx([3.0, 0.0, 0.0])
@@ -68,7 +68,7 @@ def test_the_page_is_given_the_motion_and_the_shape_of_the_airframe():
 
 
 def test_a_long_flight_is_thinned_to_its_ends():
-    (table,) = json.loads(motion.to_json([flight(ticks=5000)]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([flight(ticks=5000)]))["flights"]
     times = numbers(table["t"], "<f8")
     assert len(times) == FRAMES
     assert (times[0], times[-1]) == (0.0, 49.99)
@@ -87,14 +87,14 @@ def fleet():
 
 
 def test_a_fleet_is_shown_together_the_vehicle_of_the_report_first_and_each_in_its_colour():
-    tables = json.loads(motion.to_json([fleet()]))["flights"]
+    tables = json.loads(motion_3d.to_json([fleet()]))["flights"]
     assert [table["name"] for table in tables] == ["drone1", "second"]
     assert [table["colour"] for table in tables] == [COLOURS[1], COLOURS[0]]  # as in the plot of all paths
     assert [numbers(table["path"])[1] for table in tables] == [0.0, 4.0]
 
 
 def test_two_flights_laid_over_each_other_have_the_names_of_their_logs():
-    tables = json.loads(motion.to_json([fleet(), flight()]))["flights"]
+    tables = json.loads(motion_3d.to_json([fleet(), flight()]))["flights"]
     assert len(tables) == 2
     assert len({table["name"] for table in tables}) == 2
 
@@ -134,10 +134,10 @@ def test_bodies_move_each_by_itself_and_have_their_forces():
     place[:, :, 2] = T[:, None]
     bodies = {
         "name": np.full((TICKS, 5), "body", object),
-        "pose": np.concatenate([place, np.tile(made_up.LEVEL, (TICKS, 5, 1))], axis=2),
+        "pose": np.concatenate([place, np.tile(synthetic_flights.LEVEL, (TICKS, 5, 1))], axis=2),
         "force": place,
     }
-    (table,) = json.loads(motion.to_json([flight("multibody", bodies=bodies)]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([flight("multibody", bodies=bodies)]))["flights"]
     assert len(table["bodies"]) == 5
     assert [len(body["rotors"]) for body in table["bodies"]] == [0, 1, 1, 1, 1]
     assert numbers(table["bodies"][2]["f"]).reshape(-1, 3)[:, 2] == pytest.approx(T)
@@ -154,14 +154,14 @@ def slung():
     force = np.where((np.arange(TICKS) < TICKS // 2)[:, None, None], 0.0, [[[0.0, 0.0, 4.0]]])
     load = {
         "name": np.full((TICKS, 1), "load", object),
-        "pose": np.concatenate([place, np.tile(made_up.LEVEL, (TICKS, 1, 1))], axis=2),
+        "pose": np.concatenate([place, np.tile(synthetic_flights.LEVEL, (TICKS, 1, 1))], axis=2),
         "force": force,
     }
     return flight("slung_load", scene={"airframe": OFF, "slung_load": SLING}, bodies=load)
 
 
 def test_a_load_hangs_by_a_cable_from_the_hook_and_all_places_are_from_the_centre_of_mass():
-    (table,) = json.loads(motion.to_json([slung()]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([slung()]))["flights"]
     vehicle, load = table["bodies"]
     assert numbers(vehicle["rotors"][0][0]) == pytest.approx(np.array(HUBS[0]) - OFF["mass"]["centre"], abs=1e-6)
     assert np.ptp(numbers(load["strokes"][0][0]).reshape(-1, 3), axis=0) == pytest.approx([0.1] * 3)  # 1 l of 0.4 kg
@@ -177,13 +177,13 @@ def test_a_body_that_tells_less_often_moves_evenly_in_between():
         np.arange(0, TICKS, 10) * 10**7, {k: whole.topic("bodies")[k][::10] for k in ("name", "pose", "force")}
     )
     views = {name: whole.topic(name) for name in whole.topics} | {"bodies": seldom}
-    (table,) = json.loads(motion.to_json([Flight(views, whole.origin)]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([Flight(views, whole.origin)]))["flights"]
     heights = numbers(table["bodies"][1]["p"]).reshape(-1, 3)[:, 2]
     assert heights[: TICKS - 10] == pytest.approx(T[: TICKS - 10] - 1.8, abs=1e-5)
 
 
 def test_a_vehicle_without_a_shape_has_its_axes():
-    (table,) = json.loads(motion.to_json([flight("something new", scene={})]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([flight("something new", scene={})]))["flights"]
     assert len(table["bodies"][0]["strokes"]) == 3
 
 
@@ -282,11 +282,11 @@ def standing():
 
 
 def test_the_page_is_given_the_forces_on_every_foot_where_they_are_told():
-    (table,) = json.loads(motion.to_json([standing()]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([standing()]))["flights"]
     assert table["contact"]["points"] == 2
     assert numbers(table["contact"]["p"]).reshape(-1, 2, 3)[:, :, 0] == pytest.approx(np.tile([0.2, -0.2], (TICKS, 1)))
     assert numbers(table["contact"]["f"]).reshape(-1, 2, 3)[:, :, 2] == pytest.approx(50.0)
-    assert json.loads(motion.to_json([flight()]))["flights"][0]["contact"] is None
+    assert json.loads(motion_3d.to_json([flight()]))["flights"][0]["contact"] is None
 
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
@@ -356,7 +356,7 @@ def test_a_browser_draws_the_mesh_where_the_vehicle_is_and_as_it_is_turned(tmp_p
 
 def test_a_flight_that_goes_on_tells_its_mesh_once():
     for first in (True, False):
-        (table,) = json.loads(motion.steps_to_json([flight(scene=WITH_MESH)], [[]], first))["flights"]
+        (table,) = json.loads(motion_3d.steps_to_json([flight(scene=WITH_MESH)], [[]], first))["flights"]
         assert [body["surface"] is not None for body in table["bodies"]] == [first]
 
 
@@ -375,7 +375,7 @@ def test_a_flight_that_goes_on_tells_its_mesh_once():
 def test_every_kind_of_scene_is_drawn_in_its_own_shape(scene, bodies, rotors, links):
     recorded = Flight.read(sample_file(scene))  # the samples carry no set-up
     views = {name: recorded.topic(name) for name in recorded.topics}
-    found = motion.motion(Flight(views, Origin.of_setup(resolve(load(scene)))))
+    found = motion_3d.motion(Flight(views, Origin.of_setup(resolve(load(scene)))))
     assert (len(found.bodies), sum(len(body.rotors) for body in found.bodies), len(found.links)) == (
         bodies,
         rotors,

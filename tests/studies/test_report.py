@@ -9,27 +9,39 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 
-import made_up
 import numpy as np
 import pytest
+import synthetic_flights
 
-from cosim.log import LogWriter
-from cosim.provenance import attachments as attachments_of
-from messages import Actuators, Estimate, Imu, Point, Pose, Quaternion, Setpoint, Status, Vector3, VehicleState, header
-from studies.flight import AXES, Flight
-from studies.report import browser, picture, plots, write
-from studies.report.facts import MANY, differences
-from studies.report.overlay import overlay
-from studies.report.plots import estimator, motors, position, propulsion
-from studies.report.style import POINTS
-from studies.report.thin import thin
-from studies.report.whole import phases
+from lapwing.cosim.config.provenance import attachments as attachments_of
+from lapwing.cosim.log import LogWriter
+from lapwing.messages import (
+    Actuators,
+    Estimate,
+    Imu,
+    Point,
+    Pose,
+    Quaternion,
+    Setpoint,
+    Status,
+    Vector3,
+    VehicleState,
+    header,
+)
+from lapwing.studies.flight_data import AXES, Flight
+from lapwing.studies.report import overview_image, plotly_figure, plots, write
+from lapwing.studies.report.downsampling import thin
+from lapwing.studies.report.flight_header import MANY, differences
+from lapwing.studies.report.flight_phases import phases
+from lapwing.studies.report.overlay import overlay
+from lapwing.studies.report.plots import estimator, motors, position, propulsion
+from lapwing.studies.report.style import POINTS
 
 RATE, SECONDS = 50, 6.0
 OFFSET = (0.1, -0.2, 0.05, 0.01, -0.02, 0.03)  # reference minus truth, so the errors are these numbers
 THRUST, TORQUE = 2e-4, 8e-6  # over speed squared
 ESTIMATE_ERROR = 0.02  # estimate minus truth of x [m]
-SETUP = made_up.setup(
+SETUP = synthetic_flights.setup(
     int(RATE * SECONDS) + 1,
     RATE,
     run={"title": "a circle <by> formula"},
@@ -218,7 +230,7 @@ def test_the_page_needs_nothing_from_elsewhere(page):
 
 def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
     code = (
-        "import sys; from pathlib import Path; from studies.flight import Flight; from studies.report import write;"
+        "import sys; from pathlib import Path; from lapwing.studies.flight_data import Flight; from lapwing.studies.report import write;"
         f"write(Flight.read({str(log)!r}), Path({str(log.with_suffix('.html'))!r}));"
         "print([name for name in ('matplotlib', 'plotly') if name in sys.modules])"
     )
@@ -236,11 +248,11 @@ def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monke
     script = tmp_path / "plotly" / "package_data" / "plotly.min.js"
     monkeypatch.setattr(sys, "path", [str(tmp_path)])
     with pytest.raises(ValueError, match="pip install plotly"):
-        browser.script()
+        plotly_figure.script()
     script.parent.mkdir(parents=True)
     script.write_text("Plotly = {}")
     importlib.invalidate_caches()
-    assert browser.script() == "Plotly = {}"
+    assert plotly_figure.script() == "Plotly = {}"
 
 
 def test_another_ending_is_refused(log, tmp_path):
@@ -415,7 +427,7 @@ def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
 
 
 def test_the_picture_of_a_mission_is_a_png(log, tmp_path):
-    picture.draw(Flight.read(log), tmp_path / "mission.png")
+    overview_image.draw(Flight.read(log), tmp_path / "mission.png")
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 

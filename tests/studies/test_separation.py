@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.separation import least_over_time, nearest
+from lapwing.studies.separation import least_over_time, nearest
 
 
 class Truth:

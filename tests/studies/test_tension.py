@@ -1,10 +1,10 @@
 """Tension of the links of a load: Lagrange multipliers of free particles, a hover, and what is told of a push."""
 
-import made_up
 import numpy as np
 import pytest
+import synthetic_flights
 
-from studies.tension import pushes, tension
+from lapwing.studies.tension import pushes, tension
 
 LOAD = {"quad_mass": (0.7, 0.9), "link_length": (0.6, 0.8), "load_mass": 0.4, "gravity": 9.81}
 MASS = np.array([0.4, 0.7, 0.9])
@@ -39,9 +39,9 @@ def test_tension_is_that_of_lagrange_multipliers():
 def flight(thrust):
     """Links straight down, both quadrotors level: each carries half of the load where the thrust is theirs and its."""
     place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.6], [0.0, 0.0, 0.8]])
-    bodies = {"pose": np.broadcast_to(np.hstack([place, np.tile(made_up.LEVEL, (3, 1))]), (100, 3, 7))}
+    bodies = {"pose": np.broadcast_to(np.hstack([place, np.tile(synthetic_flights.LEVEL, (3, 1))]), (100, 3, 7))}
     bodies["velocity"] = np.zeros((100, 3, 3))
-    return made_up.flight(100, scene={"cooperative_load": LOAD}, truth={"pose.position": (0.0, 0.0, 0.0)},
+    return synthetic_flights.flight(100, scene={"cooperative_load": LOAD}, truth={"pose.position": (0.0, 0.0, 0.0)},
                           bodies=bodies, lift={"thrust": thrust})  # fmt: skip
 
 

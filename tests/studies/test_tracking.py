@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from studies import tracking
+from lapwing.studies import tracking
 
 
 def test_roll_pitch_yaw_are_scipys():

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from studies.workers import workers
+from lapwing.studies.workers import workers
 
 pytestmark = pytest.mark.long
 
 PATIENCE = 120.0  # [s] a generous bound; the target is a second
 SCRIPT = """
 import os, time
-from cosim.interrupt import end_at_once
-from studies.workers import workers
+from lapwing.cosim.processes.interrupt import end_at_once
+from lapwing.studies.workers import workers
 
 if __name__ == "__main__":
     end_at_once()
@@ -71,7 +71,7 @@ def test_workers_that_cannot_be_had_are_refused_in_one_line(monkeypatch):
     def fails(*_):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr("studies.workers.ProcessPoolExecutor", fails)
+    monkeypatch.setattr("lapwing.studies.workers.ProcessPoolExecutor", fails)
     said = "worker processes need semaphores: read-only file system; expected a /dev/shm to write to"
     with pytest.raises(ValueError, match=said), workers(2):
         pass

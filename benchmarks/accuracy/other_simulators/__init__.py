@@ -9,9 +9,9 @@ from types import ModuleType
 
 import numpy as np
 
-from dynamics import discovery
-from studies.accuracy.coordinates import matrices
-from studies.accuracy.problem import Outcome
+from lapwing.dynamics import discovery
+from lapwing.studies.accuracy.coordinates import matrices
+from lapwing.studies.accuracy.problem import Outcome
 
 
 def installed() -> list[ModuleType]:

@@ -18,8 +18,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
 from benchmarks.accuracy.other_simulators.mujoco_sim import ACROSS, AXIAL, rotor_speeds
-from studies.accuracy.problem import Way
-from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
+from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 NAME, MODULE = "Drake", "drake"
 SCHEMES = {"runge_kutta3": 3, "runge_kutta5": 5}

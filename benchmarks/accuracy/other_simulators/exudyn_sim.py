@@ -8,8 +8,8 @@ import numpy as np
 from exudyn import utilities as build
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from studies.accuracy.problem import Way
-from studies.accuracy.systems import free_rigid_body, heavy_top
+from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.systems import free_rigid_body, heavy_top
 
 NAME, MODULE = "Exudyn", "exudyn"
 HALVINGS = 15

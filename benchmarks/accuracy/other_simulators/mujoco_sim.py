@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from studies.accuracy.problem import Way
-from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
+from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 mujoco.set_mju_user_warning(lambda message: None)  # of steps too large to be stable, which are measured as such
 

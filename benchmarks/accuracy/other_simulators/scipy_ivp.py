@@ -8,8 +8,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from studies.accuracy.problem import Way
-from studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
+from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 NAME, MODULE = "SciPy", "scipy"
 METHODS = {"DOP853": 8, "Radau": 5}

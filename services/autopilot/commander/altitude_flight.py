@@ -2,10 +2,10 @@
 
 import math
 
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.smoothing import PositionSmoothing
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
+from lapwing.services.autopilot.interface import Setpoint
 
 
 class AltitudeFlight:

@@ -2,12 +2,12 @@
 
 import math
 
-from dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, retract, to_roll_pitch_yaw
-from dynamics.vector import Vec3
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
-from services.autopilot.stage import CUT_HEIGHT
+from lapwing.dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, retract, to_roll_pitch_yaw
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.land_detector import CUT_HEIGHT
 
 _RISING = 0.01  # [m/s]
 LEAST_THRUST = 0.08  # over the maximum at the lower end of the stick, PX4's MPC_MANTHR_MIN

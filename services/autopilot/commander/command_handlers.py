@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from messages import CommandAck
-from services.autopilot.commander import checks, transitions
-from services.autopilot.commander.flight_mode import value
-from services.autopilot.commander.mode_table import MODES
-from services.autopilot.commander.state import PendingArm
-from services.autopilot.commander.transitions import Context
-from services.common import spoken
+from lapwing.messages import CommandAck
+from lapwing.services.autopilot.commander import prearm_checks, transitions
+from lapwing.services.autopilot.commander.commander_state import PendingArm
+from lapwing.services.autopilot.commander.flight_mode import value
+from lapwing.services.autopilot.commander.mode_table import MODES
+from lapwing.services.autopilot.commander.transitions import Context
+from lapwing.services.common import status_texts
 
 Handler = Callable[[Context, Any], None]
 HANDLERS: dict[str, Handler] = {}
@@ -62,7 +62,7 @@ def arm(context: Context, command: Any) -> None:
     """Values: 1 to arm whatever the checks say; how long [s] to wait for them."""
     if context.state.guidance.armed:
         return
-    if reasons := checks.reasons(context.view, context.state):
+    if reasons := prearm_checks.reasons(context.view, context.state):
         time_left = value(command.values, 1)
         if time_left > 0.0:
             context.state.pending_arm = PendingArm(command, time_left)
@@ -83,7 +83,7 @@ def disarm(context: Context, command: Any) -> None:
         raise ValueError("disarming refused: the vehicle flies")
     if state.on_trajectory:
         transitions.enter(context.constants, state, "hold")
-    transitions.disarm(context, spoken.AS_COMMANDED)
+    transitions.disarm(context, status_texts.AS_COMMANDED)
 
 
 @handles(*MODES)
@@ -101,7 +101,7 @@ def mission_start(context: Context, command: Any) -> None:
     """Arm and fly the mission from an item, as PX4 does at MAV_CMD_MISSION_START."""
     before = context.state.mode, context.state.mode_name
     transitions.enter(context.constants, context.state, "mission", *command.values[:1])
-    if not context.state.guidance.armed and (reasons := checks.reasons(context.view, context.state)):
+    if not context.state.guidance.armed and (reasons := prearm_checks.reasons(context.view, context.state)):
         context.state.mode, context.state.mode_name = before
         raise ValueError(f"arming refused: {'; '.join(reasons)}")
     if not context.state.guidance.armed:

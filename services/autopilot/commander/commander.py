@@ -5,24 +5,19 @@ Deterministic: it knows the views of its ticks and nothing else. Every time-out 
 
 import math
 
-from dynamics.vector import ZERO
-from messages import CommandAck
-from services.autopilot.commander import (  # noqa: F401 (two declare their handlers)
-    checks,
-    failsafes,
-    failure_handlers,
-    plan_handlers,
-)
-from services.autopilot.commander.attention import quiet_time
-from services.autopilot.commander.command_handlers import handle
-from services.autopilot.commander.request import Outbox, Request, Status
-from services.autopilot.commander.state import State, initial
-from services.autopilot.commander.status import status
-from services.autopilot.commander.transitions import Context, arm, disarm, enter
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.estimate import EXACT
-from services.autopilot.interface import Setpoint
-from services.common import spoken
+from lapwing.dynamics.vector import ZERO
+from lapwing.messages import CommandAck
+from lapwing.services.autopilot.commander import failsafes, failure_handlers, plan_handlers, prearm_checks  # noqa: F401 (two declare their handlers)
+from lapwing.services.autopilot.commander.command_handlers import handle
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_output import Outbox, Request, Status
+from lapwing.services.autopilot.commander.commander_state import State, initial
+from lapwing.services.autopilot.commander.commander_status import status
+from lapwing.services.autopilot.commander.transitions import Context, arm, disarm, enter
+from lapwing.services.autopilot.commander.wakeup_conditions import quiet_time
+from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common import status_texts
 
 BLOCKED_TIME = 1.0  # [s] of sinking in vain after which the vehicle is on the ground
 LOW_THRUST = 0.5  # of the hovering thrust, below which the vehicle does not carry itself
@@ -65,7 +60,7 @@ class Commander:
         constants, state = self.constants, self.state
         context = Context(constants, view, state, Outbox())
         if constants.has_operator:
-            checks.count_outages(view, state)
+            prearm_checks.count_outages(view, state)
         for command in view.commands:
             handle(context, command)
         state.guidance.inputs.age(view.dt)
@@ -125,7 +120,7 @@ def _detect_landing(context: Context) -> None:
     state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
     if view.motors_cut or state.blocked_time > BLOCKED_TIME:
         guidance.flying, state.on_ground_time, state.blocked_time = False, 0.0, 0.0
-        context.outbox.say(spoken.LANDED)
+        context.outbox.say(status_texts.LANDED)
 
 
 def _disarm_when_idle(context: Context) -> None:
@@ -136,7 +131,7 @@ def _disarm_when_idle(context: Context) -> None:
     state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
-        disarm(context, spoken.AFTER_LANDING if guidance.has_flown else spoken.NO_TAKEOFF)
+        disarm(context, status_texts.AFTER_LANDING if guidance.has_flown else status_texts.NO_TAKEOFF)
 
 
 def _retry_arming(context: Context) -> None:
@@ -145,7 +140,7 @@ def _retry_arming(context: Context) -> None:
     if state.pending_arm is None:
         return
     command, time_left = state.pending_arm
-    reasons = checks.reasons(view, state)
+    reasons = prearm_checks.reasons(view, state)
     if not reasons:
         state.pending_arm = None
         arm(context)

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from services.autopilot.commander.state import FailsafeTimer, State
-from services.autopilot.commander.transitions import Context, enter
-from services.autopilot.commander.view import View
-from services.common import spoken
-from services.common.parameters import DESCEND, HOLD, LAND, RETURN
+from lapwing.services.autopilot.commander.commander_input import View
+from lapwing.services.autopilot.commander.commander_state import FailsafeTimer, State
+from lapwing.services.autopilot.commander.transitions import Context, enter
+from lapwing.services.common import status_texts
+from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RETURN
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
 _SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never undoes a more severe one
@@ -34,24 +34,24 @@ def _link_lost(view: View, state: State) -> bool:
 
 FAILSAFES = (
     Failsafe(
-        spoken.POSITION_LOST,
+        status_texts.POSITION_LOST,
         lambda v, s: v.position_lost,
         lambda p: p["COM_POS_FS_DELAY"],
         "FS_ESTIMATE_ACT",
     ),
-    Failsafe(spoken.MOTOR_FAILED, lambda v, s: v.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
-    _battery(spoken.BATTERY_EMPTY, "BAT_EMERGEN_THR", "FS_BAT_EMER_ACT"),
-    _battery(spoken.BATTERY_CRITICAL, "BAT_CRIT_THR", "FS_BAT_CRIT_ACT"),
-    _battery(spoken.BATTERY_LOW, "BAT_LOW_THR", "FS_BAT_LOW_ACT"),
-    Failsafe(spoken.LINK_LOST, _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
+    Failsafe(status_texts.MOTOR_FAILED, lambda v, s: v.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
+    _battery(status_texts.BATTERY_EMPTY, "BAT_EMERGEN_THR", "FS_BAT_EMER_ACT"),
+    _battery(status_texts.BATTERY_CRITICAL, "BAT_CRIT_THR", "FS_BAT_CRIT_ACT"),
+    _battery(status_texts.BATTERY_LOW, "BAT_LOW_THR", "FS_BAT_LOW_ACT"),
+    Failsafe(status_texts.LINK_LOST, _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
     Failsafe(
-        spoken.SETPOINTS_LOST,
+        status_texts.SETPOINTS_LOST,
         lambda v, s: s.mode_name == "offboard" and not s.guidance.offboard_fresh,
         lambda p: 0.0,
         "FS_OFFBOARD_ACT",
     ),
     Failsafe(
-        spoken.FENCE_LEFT,
+        status_texts.FENCE_LEFT,
         lambda v, s: not s.guidance.fence.allows(*v.estimate.position_world[:2]),
         lambda p: 0.1,
         "FS_FENCE_ACT",
@@ -95,7 +95,7 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
         return False
     state.failsafe = reason
     enter(context.constants, state, mode)
-    context.outbox.say(spoken.TAKEN_OVER.format(reason, mode))
+    context.outbox.say(status_texts.TAKEN_OVER.format(reason, mode))
     return True
 
 

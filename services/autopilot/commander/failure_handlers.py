@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from services.autopilot.commander.command_handlers import Denied, handles
-from services.autopilot.commander.flight_mode import value
-from services.autopilot.commander.transitions import Context
-from services.common.failures import KINDS, UNITS, Faults, possible, refusal
+from lapwing.services.autopilot.commander.command_handlers import Denied, handles
+from lapwing.services.autopilot.commander.flight_mode import value
+from lapwing.services.autopilot.commander.transitions import Context
+from lapwing.services.common.failure_types import KINDS, UNITS, Faults, possible, refusal
 
 ENABLE = "SYS_FAILURE_EN"
 LEVEL, THRESHOLDS = "SYS_FAIL_BAT_LVL", ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")  # for its values from 1 on

@@ -2,10 +2,10 @@
 
 import math
 
-from dynamics.vector import Vec3
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.interface import Setpoint
 
 
 class FlightMode:

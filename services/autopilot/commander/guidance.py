@@ -3,13 +3,13 @@
 import math
 from dataclasses import dataclass, field
 
-from dynamics.lie.quaternion import to_roll_pitch_yaw
-from dynamics.vector import Vec3
-from services.autopilot.commander.fence import Fence
-from services.autopilot.commander.route import Route
-from services.autopilot.commander.smoothing import Limits, PositionSmoothing
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.fence import Fence
+from lapwing.services.autopilot.commander.route import Route
+from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
+from lapwing.services.autopilot.interface import Setpoint
 
 STICK_TIMEOUT = 1.0  # [s] older sticks are in the middle
 STICK_DEADZONE = 0.05  # sticks nearer to the middle ask for nothing

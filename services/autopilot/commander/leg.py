@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 
-from dynamics.vector import ZERO, Vec3, dot, norm, subtract
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.smoothing import Limits, braking_speed, stopping_distance, wrap_angle
+from lapwing.dynamics.vector import ZERO, Vec3, dot, norm, subtract
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.smoothing import Limits, braking_speed, stopping_distance, wrap_angle
 
 TOWARDS_TARGET, TOWARDS_HOME, AWAY_FROM_HOME, ALONG_VELOCITY, TURN_FIRST, STAY = range(6)  # MPC_YAW_MODE
 _CLOSE = 0.5  # [m] of the place that is faced, within which its direction is not told

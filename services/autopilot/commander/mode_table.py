@@ -1,8 +1,8 @@
 """The flight modes by name."""
 
-from dynamics import discovery
-from services.autopilot.commander import modes
-from services.autopilot.commander.flight_mode import FlightMode
+from lapwing.dynamics import discovery
+from lapwing.services.autopilot.commander import modes
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
 
 MODES: dict[str, type[FlightMode]] = {module.NAME: module.Mode for module in discovery.modules(modes).values()}
 """Class by the name of the mode."""

@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from services.autopilot.commander import transitions
-from services.autopilot.commander.command_handlers import Denied, denied_if_wrong, handles
-from services.autopilot.commander.fence import Fence, rally_points
-from services.autopilot.commander.flight_mode import fill_in, value, vector
-from services.autopilot.commander.route import GRAB, Route
-from services.autopilot.commander.transitions import Context
+from lapwing.services.autopilot.commander import transitions
+from lapwing.services.autopilot.commander.command_handlers import Denied, denied_if_wrong, handles
+from lapwing.services.autopilot.commander.fence import Fence, rally_points
+from lapwing.services.autopilot.commander.flight_mode import fill_in, value, vector
+from lapwing.services.autopilot.commander.route import GRAB, Route
+from lapwing.services.autopilot.commander.transitions import Context
 
 
 @handles("mission_upload")

@@ -6,8 +6,8 @@ It knows nothing of the real vehicle, so the setpoint is as smooth as its limits
 import math
 from typing import NamedTuple
 
-from dynamics.vector import ZERO, Vec3, add, dot, norm, scale, subtract
-from services.autopilot.interface import Setpoint
+from lapwing.dynamics.vector import ZERO, Vec3, add, dot, norm, scale, subtract
+from lapwing.services.autopilot.interface import Setpoint
 
 _POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre
 _VELOCITY_GAIN = 3.0  # [1/s] acceleration over error of the velocity

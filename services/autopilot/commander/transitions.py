@@ -3,11 +3,11 @@
 import math
 from typing import NamedTuple
 
-from services.autopilot.commander.mode_table import MODES
-from services.autopilot.commander.request import Outbox
-from services.autopilot.commander.state import State
-from services.autopilot.commander.view import Constants, View
-from services.common import spoken
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_output import Outbox
+from lapwing.services.autopilot.commander.commander_state import State
+from lapwing.services.autopilot.commander.mode_table import MODES
+from lapwing.services.common import status_texts
 
 
 class Context(NamedTuple):
@@ -40,7 +40,7 @@ def arm(context: Context) -> None:
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
     x, y, z = context.view.estimate.position_world
     guidance.home = (x, y, z - context.constants.resting_height)
-    context.outbox.say(spoken.ARMED)
+    context.outbox.say(status_texts.ARMED)
 
 
 def disarm(context: Context, reason: str) -> None:
@@ -51,4 +51,4 @@ def disarm(context: Context, reason: str) -> None:
     state.failsafe_timers.clear()
     if state.mode_name != "hold":
         enter(context.constants, state, "hold")
-    context.outbox.say(spoken.DISARMED.format(reason))
+    context.outbox.say(status_texts.DISARMED.format(reason))

@@ -2,8 +2,8 @@
 
 from abc import ABC, abstractmethod
 
-from cosim.graph import Graph
-from services.autopilot.setup import CustomCode
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.services.autopilot.service_config import CustomCode
 
 
 class PeriodicPart(ABC):

@@ -3,14 +3,14 @@
 An error-state Kalman filter. Pure: every function takes the parameters and a state and returns the next state.
 """
 
-from services.autopilot.estimator.flow import update_flow
-from services.autopilot.estimator.gps import update_gps, update_gps_velocity
-from services.autopilot.estimator.heading import update_magnetometer
-from services.autopilot.estimator.height import follow_ground, update_barometer, update_sonar
-from services.autopilot.estimator.parameters import PRESETS, Estimator
-from services.autopilot.estimator.predict import predict
-from services.autopilot.estimator.standstill import update_standstill
-from services.autopilot.estimator.state import NAMES, SOURCES, State, estimate, initial, new_memory
+from lapwing.services.autopilot.estimator.filter_parameters import PRESETS, Estimator
+from lapwing.services.autopilot.estimator.filter_state import NAMES, SOURCES, State, estimate, initial, new_memory
+from lapwing.services.autopilot.estimator.flow_fusion import update_flow
+from lapwing.services.autopilot.estimator.gps_fusion import update_gps, update_gps_velocity
+from lapwing.services.autopilot.estimator.heading_fusion import update_magnetometer
+from lapwing.services.autopilot.estimator.height_fusion import follow_ground, update_barometer, update_sonar
+from lapwing.services.autopilot.estimator.predict import predict
+from lapwing.services.autopilot.estimator.zero_velocity_update import update_standstill
 
 __all__ = [
     "NAMES",

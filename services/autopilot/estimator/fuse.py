@@ -4,10 +4,10 @@ The caller fills `memory.row` with one row of the measurement matrix. Correction
 the rows of one reading are all taken about the same estimate.
 """
 
-from dynamics.kernel import apart, kernel, leaf
-from dynamics.lanes import load, spread, store
-from dynamics.vector import Mat3, Vec3
-from services.autopilot.estimator.state import ACCELEROMETER, SIZE, THETA, Memory
+from lapwing.dynamics.vector import Mat3, Vec3
+from lapwing.kernels import apart, kernel, leaf
+from lapwing.kernels.simd import load, spread, store
+from lapwing.services.autopilot.estimator.filter_state import ACCELEROMETER, SIZE, THETA, Memory
 
 FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from dynamics.kernel import kernel, leaf
-from dynamics.lanes import load, store
-from dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
-from dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
-from services.autopilot.estimator.parameters import Estimator
-from services.autopilot.estimator.state import (
+from lapwing.dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
+from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.simd import load, store
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
     BAROMETER,
     GYRO,
@@ -28,7 +28,7 @@ from services.autopilot.estimator.state import (
     State,
     three,
 )
-from services.autopilot.estimator.watch import repeated
+from lapwing.services.autopilot.estimator.measurement_checks import repeated
 
 _STRAIGHT = 0.1  # of a jolt: up to it two readings are taken to lie on a straight line
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings

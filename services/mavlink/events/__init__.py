@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from functools import cache
 
-from dynamics import discovery
-from services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, Watch
+from lapwing.dynamics import discovery
+from lapwing.services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, Watch
 
 __all__ = ["Definition", "Watch", "definitions", "watches"]
 

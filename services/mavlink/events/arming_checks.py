@@ -5,10 +5,10 @@ A report is a summary of the arming checks, an event for each that fails, and a 
 
 from collections.abc import Iterator
 
-from services.common import spoken
-from services.mavlink import flavours
-from services.mavlink.dialect import mavlink
-from services.mavlink.events.definition import (
+from lapwing.services.common import status_texts
+from lapwing.services.mavlink import firmware
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.events.definition import (
     PROTOCOL,
     Argument,
     Definition,
@@ -18,12 +18,12 @@ from services.mavlink.events.definition import (
     event,
     watch,
 )
-from services.mavlink.telemetry.state import healthy, sensor_health
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.telemetry.system_status import healthy, sensor_health
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
 WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
-MODES = tuple(dict.fromkeys(mode.kind for mode in flavours.get("px4").MODES))
+MODES = tuple(dict.fromkeys(mode.kind for mode in firmware.get("px4").MODES))
 _GPS = ("gps", "GPS")
 _OF_SOURCE = {  # what PX4 calls them
     "imu": ("gyro", "Gyroscope and accelerometer"),
@@ -80,15 +80,15 @@ def _check(name: str, message: str, *more: Argument) -> Definition:
 
 READINGS = _check("check_readings", "No good readings of the {3}", Argument("source", _SOURCE))
 FAILED = {  # by how its reason begins: the event, the component
-    spoken.NOT_STARTED: (_check("check_started", "The estimator has not started"), "attitude_estimate"),
-    spoken.POSITION_UNCERTAIN: (_check("check_position", "The position is uncertain"), "local_position_estimate"),
-    spoken.ATTITUDE_UNCERTAIN: (_check("check_attitude", "The attitude is uncertain"), "attitude_estimate"),
-    spoken.NOT_LEVEL: (_check("check_level", "The vehicle does not stand level"), "none"),
-    spoken.BATTERY_LOW: (_check("check_battery", "The battery is low"), "battery"),
-    spoken.OUTSIDE_FENCE: (_check("check_fence", "The vehicle stands outside of the fence"), "none"),
+    status_texts.NOT_STARTED: (_check("check_started", "The estimator has not started"), "attitude_estimate"),
+    status_texts.POSITION_UNCERTAIN: (_check("check_position", "The position is uncertain"), "local_position_estimate"),
+    status_texts.ATTITUDE_UNCERTAIN: (_check("check_attitude", "The attitude is uncertain"), "attitude_estimate"),
+    status_texts.NOT_LEVEL: (_check("check_level", "The vehicle does not stand level"), "none"),
+    status_texts.BATTERY_LOW: (_check("check_battery", "The battery is low"), "battery"),
+    status_texts.OUTSIDE_FENCE: (_check("check_fence", "The vehicle stands outside of the fence"), "none"),
 }
 OTHER = _check("check_other", "The vehicle cannot be armed"), "none"
-_READINGS = {spoken.NO_READINGS.format(source): source for source in SOURCES}
+_READINGS = {status_texts.NO_READINGS.format(source): source for source in SOURCES}
 
 
 @watch

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from messages.topics import TRUTH
-from services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Happened, event, watch
-from services.mavlink.telemetry.power import motor_fractions
-from services.mavlink.view import VehicleView
+from lapwing.messages.topics import TRUTH
+from lapwing.services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Happened, event, watch
+from lapwing.services.mavlink.telemetry.power import motor_fractions
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 MOTORS = 8  # that an event can name
 LASTS = 1_000_000_000  # [ns] that a motor is at a limit before that is told, or off it before that is over

@@ -9,9 +9,9 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from services.common.events import KINDS
-from services.mavlink.dialect import mavlink
-from services.mavlink.view import VehicleView
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 FORMATS = {"uint8_t": "B", "uint32_t": "I"}
 EMERGENCY, CRITICAL, WARNING = (
@@ -57,7 +57,7 @@ class Definition(NamedTuple):
     """An event that may happen."""
 
     name: str
-    kind: str  # of services.common.events
+    kind: str  # of lapwing.services.common.event_kinds
     message: str
     arguments: tuple[Argument, ...]
     level: int
@@ -112,7 +112,7 @@ def event(
 
     Args:
         name: unique.
-        kind: of services.common.events; says how serious it is where `level` does not.
+        kind: of lapwing.services.common.event_kinds; says how serious it is where `level` does not.
         message: one line, with the arguments' places.
         arguments: in their order.
         level: of MAV_SEVERITY, or PROTOCOL.

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from services.common import spoken
-from services.mavlink.events.definition import (
+from lapwing.services.common import status_texts
+from lapwing.services.mavlink.events.definition import (
     CRITICAL,
     EMERGENCY,
     WARNING,
@@ -14,10 +14,10 @@ from services.mavlink.events.definition import (
     event,
     watch,
 )
-from services.mavlink.events.flight import mode_number, mode_type
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.events.flight import mode_number, mode_type
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
-_CAUSES = tuple(Entry(k, reason.replace(" ", "_"), reason) for k, reason in enumerate(spoken.FAILSAFES))
+_CAUSES = tuple(Entry(k, reason.replace(" ", "_"), reason) for k, reason in enumerate(status_texts.FAILSAFES))
 _cause = Argument("cause", Enumeration("failsafe_cause_t", "uint8_t", _CAUSES))
 
 FAILSAFE = event(
@@ -54,7 +54,7 @@ class FailureWatch:
                 yield MOTOR_FAILED, (s.failed_motor,)
         if (reason := s.text if s.failsafe else "") != self._failsafe:
             self._failsafe = reason
-            if reason in spoken.FAILSAFES:
-                yield FAILSAFE, (spoken.FAILSAFES.index(reason), mode_number(s.mode))
+            if reason in status_texts.FAILSAFES:
+                yield FAILSAFE, (status_texts.FAILSAFES.index(reason), mode_number(s.mode))
             elif not reason:
                 yield FAILSAFE_OVER, ()

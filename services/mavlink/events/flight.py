@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from services.mavlink import flavours
-from services.mavlink.events.definition import Argument, Entry, Enumeration, Happened, event, watch
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink import firmware
+from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Happened, event, watch
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
 _PLACES = (
@@ -12,7 +12,7 @@ _PLACES = (
     Entry(NO_TAKEOFF, "no_takeoff", "nobody took off"),
     Entry(IN_AIR, "in_air", "in the air"),
 )
-MODES = tuple(dict.fromkeys([*(mode.kind for mode in flavours.get("px4").MODES), "orbit", "goto", "descend", "phases"]))
+MODES = tuple(dict.fromkeys([*(mode.kind for mode in firmware.get("px4").MODES), "orbit", "goto", "descend", "phases"]))
 UNKNOWN = len(MODES)
 _MODES = (
     *[Entry(number, kind, kind.replace("_", " ")) for number, kind in enumerate(MODES)],

@@ -3,9 +3,9 @@
 from functools import cache
 from selectors import BaseSelector
 
-from dynamics import discovery
-from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link
+from lapwing.dynamics import discovery
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.link import Link
 
 __all__ = ["Link", "check", "kinds", "numbered", "open_link"]
 

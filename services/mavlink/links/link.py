@@ -6,7 +6,7 @@ import time
 from selectors import BaseSelector
 from typing import ClassVar
 
-from services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.adapter import Adapter
 
 ROUND = 64  # pieces of bytes read from one socket before others get their turn
 PIECE = 2048  # [bytes] a piece is no longer

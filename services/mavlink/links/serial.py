@@ -7,9 +7,9 @@ import tty
 from selectors import BaseSelector
 from typing import ClassVar
 
-from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link
-from services.mavlink.links.stream import ByteStream
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.byte_stream import ByteStream
+from lapwing.services.mavlink.links.link import Link
 
 
 class Serial(Link):

@@ -4,10 +4,10 @@ import socket
 from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
-from services.common.address import is_loopback
-from services.mavlink.adapter import Adapter
-from services.mavlink.links.link import Link, next_port, socket_address
-from services.mavlink.links.stream import ByteStream
+from lapwing.services.common.address import is_loopback
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.byte_stream import ByteStream
+from lapwing.services.mavlink.links.link import Link, next_port, socket_address
 
 MAX_ENDPOINTS = 8
 

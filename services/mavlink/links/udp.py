@@ -5,10 +5,10 @@ import time
 from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
-from services.common.address import is_loopback
-from services.mavlink.adapter import Adapter
-from services.mavlink.endpoint import Endpoint
-from services.mavlink.links.link import PIECE, ROUND, Link, next_port, socket_address
+from lapwing.services.common.address import is_loopback
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.links.link import PIECE, ROUND, Link, next_port, socket_address
 
 MAX_ENDPOINTS = 8
 SILENT = 10.0  # [s] of wall time after which an endpoint makes room for another

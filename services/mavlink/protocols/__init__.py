@@ -2,8 +2,8 @@
 
 from functools import cache
 
-from dynamics import discovery
-from services.mavlink.protocols.handler import HANDLERS, Handler
+from lapwing.dynamics import discovery
+from lapwing.services.mavlink.protocols.handler import HANDLERS, Handler
 
 __all__ = ["Handler", "handlers"]
 

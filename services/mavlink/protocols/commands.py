@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from services.mavlink.coordinates import degrees
-from services.mavlink.dialect import mavlink
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.geo_coordinates import degrees
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 UNSUPPORTED, IN_PROGRESS = mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_IN_PROGRESS

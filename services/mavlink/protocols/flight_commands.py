@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from services.mavlink.coordinates import to_world
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_yaw
-from services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Request, rule
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import swap_yaw
+from lapwing.services.mavlink.geo_coordinates import to_world
+from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Request, rule
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 
 @handles("SET_MODE")

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from services.mavlink.dialect import id_of
-from services.mavlink.session import Session
+from lapwing.services.mavlink.dialect import id_of
+from lapwing.services.mavlink.session import Session
 
 Handler = Callable[[Session, Any], None]
 

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 
 @handles("LOG_REQUEST_LIST")

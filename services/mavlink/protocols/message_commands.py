@@ -2,10 +2,10 @@
 
 import math
 
-from services.mavlink.dialect import mavlink, message_class
-from services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
-from services.mavlink.session import Session
-from services.mavlink.telemetry import requested, streams
+from lapwing.services.mavlink.dialect import mavlink, message_class
+from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
+from lapwing.services.mavlink.session import Session
+from lapwing.services.mavlink.telemetry import requested, streams
 
 
 @rule(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, changes=False)

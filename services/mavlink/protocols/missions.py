@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from services.mavlink.coordinates import degrees, to_world
-from services.mavlink.dialect import mavlink
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.geo_coordinates import degrees, to_world
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 GUIDED, GUIDED_ALTITUDE = 2, 3  # "current" of an item that is flown to at once, or whose altitude is
 EXACT = 1e7  # whole numbers of MISSION_ITEM_INT to a degree

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 
 @handles("PARAM_REQUEST_LIST")

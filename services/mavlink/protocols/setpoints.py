@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from dynamics.vector import Vec3
-from services.mavlink.coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_local, from_world, to_world
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
-from services.mavlink.protocols.handler import handles
-from services.mavlink.session import Session
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
+from lapwing.services.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_local, from_world, to_world
+from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.session import Session
 
 _AHEAD = {mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD}  # positions from the vehicle, along its axes
 _FROM_HERE = _AHEAD | {mavlink.MAV_FRAME_LOCAL_OFFSET_NED}  # positions from the vehicle

@@ -3,9 +3,9 @@
 from functools import cache
 from typing import Any
 
-from dynamics import discovery
-from services.mavlink.telemetry.stream import ON_REQUEST, STREAMS, Stream
-from services.mavlink.view import VehicleView
+from lapwing.dynamics import discovery
+from lapwing.services.mavlink.telemetry.message_stream import ON_REQUEST, STREAMS, Stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 __all__ = ["Stream", "requested", "streams"]
 

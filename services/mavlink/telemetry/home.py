@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from messages.topics import ESTIMATE
-from services.mavlink.coordinates import enu_to_geodetic, to_local
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import saturated
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.messages.topics import ESTIMATE
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import saturated
+from lapwing.services.mavlink.geo_coordinates import enu_to_geodetic, to_local
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 # What the estimator gives: attitude, velocities, position relative and absolute, height; nothing over terrain.
 _GIVEN = (

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from services.mavlink import component_metadata
-from services.mavlink.dialect import mavlink, message_class
-from services.mavlink.file_server import crc32
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink import component_metadata
+from lapwing.services.mavlink.dialect import mavlink, message_class
+from lapwing.services.mavlink.file_server import crc32
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT

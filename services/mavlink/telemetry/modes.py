@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.telemetry.stream import on_request, stream
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.telemetry.message_stream import on_request, stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 
 @stream("CURRENT_MODE", 0.5)

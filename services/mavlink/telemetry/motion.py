@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import compass, saturated
-from services.mavlink.telemetry.power import motor_fractions
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.telemetry.surroundings import indicated_airspeed
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import compass, saturated
+from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.telemetry.power import motor_fractions
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 
 @stream("ATTITUDE", 50.0)

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from messages.topics import TRUTH
-from services.mavlink.dialect import message_class
-from services.mavlink.frames import saturated
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.messages.topics import TRUTH
+from lapwing.services.mavlink.dialect import message_class
+from lapwing.services.mavlink.frames import saturated
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 BATCH = 4  # motors of one message
 RPM = 60.0 / math.tau  # of 1 rad/s

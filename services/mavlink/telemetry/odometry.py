@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from messages.topics import ESTIMATE
-from services.mavlink.dialect import mavlink
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.messages.topics import ESTIMATE
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 _DIAGONAL = (0, 6, 11, 15, 18, 20)  # of the upper triangle of a 6 x 6 matrix, row by row
 _GOOD, _BAD = 100, -1  # quality [%], -1: failed

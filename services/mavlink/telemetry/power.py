@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from messages.topics import ACTUATORS, BATTERY
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import saturated
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.messages.topics import ACTUATORS, BATTERY
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import saturated
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 PULSE_MIN, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
 OUTPUTS, ACTUATORS_MAX = 8, 32  # that SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS have room for

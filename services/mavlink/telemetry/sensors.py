@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from messages import NavSatStatus
-from messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import compass, saturated, swap_body
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.messages import NavSatStatus
+from lapwing.messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import compass, saturated, swap_body
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 9.80665e-3
 FIX_TYPES = {  # by what the receiver says of itself

@@ -3,14 +3,14 @@
 import math
 from typing import Any
 
-from dynamics.vector import Vec3
-from messages.topics import ACTUATORS, SETPOINT
-from services.mavlink.coordinates import from_world, to_local
-from services.mavlink.dialect import mavlink
-from services.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
-from services.mavlink.telemetry.power import motor_fractions
-from services.mavlink.telemetry.stream import stream
-from services.mavlink.view import VehicleView
+from lapwing.dynamics.vector import Vec3
+from lapwing.messages.topics import ACTUATORS, SETPOINT
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
+from lapwing.services.mavlink.geo_coordinates import from_world, to_local
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.telemetry.power import motor_fractions
+from lapwing.services.mavlink.vehicle_cache import VehicleView
 
 _RATES_IGNORED = (
     mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE

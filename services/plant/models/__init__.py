@@ -2,7 +2,7 @@
 
 A model file has `check(scene)`, which refuses a scene that lacks what the model needs, and `create(scene)`, which gives
 the lock-step service with `finished`. A table of its own is a `Section` in the same file. Where the plant is a system
-of `dynamics.integrators.RATES`, `system(scene)` gives its parameters and the state at the start.
+of `lapwing.dynamics.integrators.RATES`, `system(scene)` gives its parameters and the state at the start.
 """
 
 import importlib
@@ -10,9 +10,9 @@ import pkgutil
 from functools import cache
 from types import ModuleType
 
-from cosim.scene import Scene
-from dynamics.errors import KeyedError
-from services.common.vehicle import Vehicle
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.common.vehicle_schema import Vehicle
 
 
 @cache

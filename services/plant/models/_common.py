@@ -4,26 +4,26 @@ import math
 from types import ModuleType
 from typing import Any
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics import integrators
-from dynamics.errors import KeyedError
-from dynamics.integrators import check_start
-from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.noise import Key, stream_key
-from dynamics.vector import ZERO
-from dynamics.vehicles.standing import at_rest
-from services.common import ports
-from services.common.exchange import Exchange, Rates, ticks
-from services.common.ports import BatteryGauge, BodyMotions, TrueState
-from services.common.sections import Run
-from services.common.vehicle import Vehicle, airframe, gravity, start_pose
-from services.plant.config import Solver, method
-from services.plant.cores.autonomous import AutonomousPlant
-from services.plant.cores.multirotor import MultirotorPlant, MultirotorPlantState
-from services.plant.setup import PlantSetup
-from services.plant.wire import PlantWiring
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics import integrators
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.integrators import check_start
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.noise import Key, stream_key
+from lapwing.dynamics.vector import ZERO
+from lapwing.dynamics.vehicles.ground_equilibrium import at_rest
+from lapwing.services.common import ports
+from lapwing.services.common.communication_schema import Exchange, Rates, ticks
+from lapwing.services.common.ports import BatteryGauge, BodyMotions, TrueState
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_pose
+from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState
+from lapwing.services.plant.blocks.uncontrolled import AutonomousPlant
+from lapwing.services.plant.encoders import PlantWiring
+from lapwing.services.plant.schema import Solver, method
+from lapwing.services.plant.service_config import PlantSetup
 
 
 def last_tick(scene: Scene) -> int:

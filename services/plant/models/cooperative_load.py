@@ -1,24 +1,20 @@
 """Quadrotors that carry a point mass by rigid links: thrusts and moments in, the state of every body out."""
 
-from cosim.scene import Scene
-from cosim.schedule import Input, Port
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.lie.ts2 import Swing
-from dynamics.vector import ZERO
-from dynamics.vehicles.cooperative_load import (
-    CooperativeLoadParameters,
-    CooperativeLoadState,
-    LiftCommand,
-)
-from services.common.exchange import Exchange, Rates
-from services.common.ports import LIFT, TRUTH, RotorWrenches, TrueState
-from services.common.sections import CooperativeLoad
-from services.plant.config import method
-from services.plant.cores.cooperative_load import CooperativePlant
-from services.plant.models._common import bodies_port, can_have, check_system, last_tick, needs, wiring
-from services.plant.setup import PlantSetup
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.lie.ts2 import Swing
+from lapwing.dynamics.vector import ZERO
+from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from lapwing.services.common.communication_schema import Exchange, Rates
+from lapwing.services.common.ports import LIFT, TRUTH, RotorWrenches, TrueState
+from lapwing.services.common.run_schema import CooperativeLoad
+from lapwing.services.plant.blocks.cooperative_load import CooperativePlant
+from lapwing.services.plant.models._common import bodies_port, can_have, check_system, last_tick, needs, wiring
+from lapwing.services.plant.schema import method
+from lapwing.services.plant.service_config import PlantSetup
 
 NOTHING = (0.0, 0.0, 0.0)
 LOAD = "load"

@@ -7,15 +7,15 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from cosim.scene import Scene, Section
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.lie.quaternion import Quaternion, exp
-from dynamics.vehicles.gyrostat import GyrostatParameters
-from dynamics.vehicles.rigid_body import RigidBody
-from services.common.ports import TrueState
-from services.common.sections import Triple
-from services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.lie.quaternion import Quaternion, exp
+from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
+from lapwing.dynamics.vehicles.rigid_body import RigidBody
+from lapwing.services.common.ports import TrueState
+from lapwing.services.common.run_schema import Triple
+from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 Turn = tuple[float, float, float, float]

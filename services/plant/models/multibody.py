@@ -6,18 +6,18 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from cosim.scene import Scene, Section
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.vehicles import multirotor_euler, multirotor_multibody
-from services.common.exchange import Exchange
-from services.common.sections import Run
-from services.common.vehicle import Vehicle, active, airframe
-from services.plant.config import Solver
-from services.plant.cores.bodies import FiveBodiesView
-from services.plant.models import reduced
-from services.plant.models._common import bodies_port, multirotor_plant
-from services.plant.setup import PlantEvent
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle, active, airframe
+from lapwing.services.plant.blocks.body_states import FiveBodiesView
+from lapwing.services.plant.models import reduced
+from lapwing.services.plant.models._common import bodies_port, multirotor_plant
+from lapwing.services.plant.schema import Solver
+from lapwing.services.plant.service_config import PlantEvent
 
 NAMES = ("chassis", *[f"propeller{k + 1}" for k in range(4)])
 LARGEST_TURN = 0.5  # [rad] of a propeller in a step of the redundant coordinates

@@ -5,13 +5,13 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from cosim.scene import Scene, Section
-from cosim.setup import ServiceSetup
-from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
-from services.common.ports import TrueState
-from services.common.sections import Triple
-from services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene, Section
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
+from lapwing.services.common.ports import TrueState
+from lapwing.services.common.run_schema import Triple
+from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]

@@ -3,11 +3,11 @@
 from types import ModuleType
 from typing import Any
 
-from cosim.scene import Scene
-from cosim.setup import ServiceSetup
-from dynamics.vehicles import multirotor
-from services.common.vehicle import active, airframe
-from services.plant.models._common import check_integrator, multirotor_plant, needs
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.services.common.vehicle_schema import active, airframe
+from lapwing.services.plant.models._common import check_integrator, multirotor_plant, needs
 
 
 def check(scene: Scene) -> None:

@@ -5,14 +5,14 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from cosim.scene import Scene, Section
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.vector import Vec3
-from dynamics.vehicles import multirotor_slung
-from dynamics.vehicles.multirotor_slung import Sling
-from services.common.environment import environment
-from services.common.vehicle import (
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.vector import Vec3
+from lapwing.dynamics.vehicles import multirotor_slung
+from lapwing.dynamics.vehicles.multirotor_slung import Sling
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.vehicle_schema import (
     Vehicle,
     VehicleAirframe,
     active,
@@ -21,10 +21,10 @@ from services.common.vehicle import (
     thrust_coefficient,
     wake_slopes,
 )
-from services.plant.config import Solver
-from services.plant.cores.slung_load import SlungLoadView
-from services.plant.models import reduced
-from services.plant.models._common import bodies_port, multirotor_plant, needs
+from lapwing.services.plant.blocks.slung_load import SlungLoadView
+from lapwing.services.plant.models import reduced
+from lapwing.services.plant.models._common import bodies_port, multirotor_plant, needs
+from lapwing.services.plant.schema import Solver
 
 NAME = "slung_load"
 FASTEST = 1.0  # frequency of the cable times the step: explicit methods of order 4 are exact to 1e-2 a turn

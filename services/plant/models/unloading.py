@@ -5,17 +5,17 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from cosim.scene import Scene, Section
-from cosim.setup import ServiceSetup
-from dynamics.errors import KeyedError
-from dynamics.vehicles import unloading
-from dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
-from services.common.exchange import Exchange
-from services.common.ports import TrueState
-from services.common.sections import Triple
-from services.plant.cores import unloading_bodies
-from services.plant.cores.unloading_bodies import UnloadingView
-from services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.scene import Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.vehicles import unloading
+from lapwing.dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.ports import TrueState
+from lapwing.services.common.run_schema import Triple
+from lapwing.services.plant.blocks import unloading_bodies
+from lapwing.services.plant.blocks.unloading_bodies import UnloadingView
+from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
 
 NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]

@@ -8,9 +8,9 @@ import pkgutil
 
 from pydantic import ValidationError
 
-from dynamics.errors import KeyedError
-from dynamics.validation import fault
-from services.trajectory.segments.segment import Segment
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
+from lapwing.services.trajectory.segments.segment import Segment
 
 
 def _discover() -> dict[str, type[Segment]]:

@@ -2,8 +2,8 @@
 
 from typing import Literal
 
-from services.trajectory.piece import Piece
-from services.trajectory.segments.segment import Finite, Positive, Segment
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments.segment import Finite, Positive, Segment
 
 
 class MinimumJerk(Segment):

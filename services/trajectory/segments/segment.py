@@ -5,7 +5,7 @@ from typing import Annotated
 from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.trajectory.piece import Piece
+from lapwing.services.trajectory.polynomial_piece import Piece
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Finite, Gt(0.0)]

@@ -3,8 +3,8 @@
 import math
 from typing import Literal
 
-from services.trajectory.piece import Piece
-from services.trajectory.segments.segment import Finite, Positive, Segment
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments.segment import Finite, Positive, Segment
 
 
 class Sine(Segment):

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from dynamics.errors import KeyedError
-from services.trajectory.piece import Piece
-from services.trajectory.segments.segment import Finite, Segment
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments.segment import Finite, Segment
 
 TOLERANCE = 1e-9  # [u] how far a table's first value may lie from where the channel is
 

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.part import GO_ON
-from dynamics.kernel import apart, kernel, leaf
+from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.kernels import apart, kernel, leaf
 
 
 class Mean(NamedTuple):

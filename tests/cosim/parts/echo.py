@@ -2,8 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from cosim.part import GO_ON
-from dynamics.kernel import leaf
+from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.kernels import leaf
 
 
 class Echo(NamedTuple):

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.part import GO_ON
-from dynamics.kernel import leaf
+from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.kernels import leaf
 from tests.cosim.parts.arrays import Last, Sum
 
 

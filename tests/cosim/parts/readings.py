@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from cosim.part import END, FAILED, GO_ON, LOOK
-from dynamics.kernel import leaf
-from dynamics.vector import Vec3
+from lapwing.cosim.diagram.compiled_block import END, FAILED, GO_ON, LOOK
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import leaf
 
 
 class Place(NamedTuple):

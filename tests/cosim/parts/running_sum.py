@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from cosim.part import GO_ON
-from dynamics.kernel import leaf
+from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.kernels import leaf
 
 
 class Number(NamedTuple):

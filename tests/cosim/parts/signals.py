@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from cosim.part import END, GO_ON, LOOK
-from dynamics.kernel import leaf
+from lapwing.cosim.diagram.compiled_block import END, GO_ON, LOOK
+from lapwing.kernels import leaf
 
 
 class Signals(NamedTuple):

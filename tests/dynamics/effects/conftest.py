@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dynamics.effects._types import Air, Motion, Rotors, Situation
-from dynamics.lie.quaternion import Quaternion
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.effects._types import Air, Motion, Rotors, Situation
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
 
-AIRFRAME = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+AIRFRAME = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 
 
 @pytest.fixture(scope="session")

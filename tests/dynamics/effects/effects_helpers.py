@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dynamics.effects._types import Factors, Loads
+from lapwing.dynamics.effects._types import Factors, Loads
 
 NO_FACTORS = Factors((1.0,) * 4, (1.0,) * 4)
 NO_LOADS = Loads((0.0,) * 4, (0.0,) * 4)

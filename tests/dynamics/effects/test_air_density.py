@@ -1,10 +1,10 @@
 import pytest
 
-from dynamics import effects
-from dynamics.atmosphere import Atmosphere, density
-from dynamics.effects.air_density import air_density, tangent
-from dynamics.environment import STANDARD, Environment
-from dynamics.geodesy import Home
+from lapwing.dynamics import effects
+from lapwing.dynamics.atmosphere import Atmosphere, density
+from lapwing.dynamics.effects.air_density import air_density, tangent
+from lapwing.dynamics.environment import STANDARD, Environment
+from lapwing.dynamics.geodesy import Home
 
 HIGH = Environment(home=Home(46.0, 11.0, 800.0), atmosphere=Atmosphere(100_000.0, -10.0))
 

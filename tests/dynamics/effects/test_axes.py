@@ -7,14 +7,14 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from dynamics import effects
-from dynamics.effects._types import Motion
-from dynamics.kernel import uncompiled
-from dynamics.lie.quaternion import Quaternion
-from dynamics.validation import fault
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe
-from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, evaluate
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.validation import fault
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, evaluate
+from lapwing.kernels import uncompiled
 
 SPEED = (310.0, 290.0, 330.0, 270.0)  # [rad/s]
 VOLTAGE = (33.0, 29.0, 31.0, 30.0)  # [V], so that the rotors speed up and slow down

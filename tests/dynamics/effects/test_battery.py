@@ -1,7 +1,7 @@
 import pytest
 
-from dynamics import effects
-from dynamics.effects.battery import battery, discharge, open_circuit_voltage
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.battery import battery, discharge, open_circuit_voltage
 
 
 def make(drone, **table):

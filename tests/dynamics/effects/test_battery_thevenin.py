@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from dynamics import effects
-from dynamics.atmosphere import Atmosphere
-from dynamics.effects.battery_thevenin import battery_thevenin, discharge, read
-from dynamics.environment import Environment
-from dynamics.errors import KeyedError
+from lapwing.dynamics import effects
+from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects.battery_thevenin import battery_thevenin, discharge, read
+from lapwing.dynamics.environment import Environment
 
 OHMIC = 12 * 0.002  # [ohm] of the drone's pack
 COLD = {"activation": 0.0, "heat_capacity": 1e6}  # resistances do not change

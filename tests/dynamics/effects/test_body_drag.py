@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from effects_helpers import rotation_of
 
-from dynamics import effects
-from dynamics.effects.body_drag import body_drag
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.body_drag import body_drag
 
 
 def drag_world(drone, s, rotors, **table):

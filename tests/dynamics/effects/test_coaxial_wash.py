@@ -7,12 +7,12 @@ import pytest
 from scipy.optimize import brentq
 
 import lapwing
-from dynamics import effects
-from dynamics.kernel import uncompiled
-from dynamics.lie.quaternion import exp
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.inflow import thrust_in_wake
-from dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from lapwing.dynamics import effects
+from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.inflow import thrust_in_wake
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from lapwing.kernels import uncompiled
 
 share = uncompiled(thrust_in_wake)
 GAP = 0.10  # [m]

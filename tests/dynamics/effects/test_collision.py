@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics.effects import _interaction as interaction
-from dynamics.effects import from_scene
-from dynamics.effects.collision import touch
-from dynamics.integrators import get
-from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.effects import _vehicle_interaction as interaction
+from lapwing.dynamics.effects import from_scene
+from lapwing.dynamics.effects.collision import touch
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
 
 ROOT = Path(__file__).parents[3]
-DRONE = load_airframe(ROOT / "scenes/vehicles/delivery_drone.toml")
-QUAD = load_airframe(ROOT / "scenes/vehicles/quad_x.toml")
+DRONE = load_airframe(ROOT / "lapwing/scenes/vehicles/delivery_drone.toml")
+QUAD = load_airframe(ROOT / "lapwing/scenes/vehicles/quad_x.toml")
 METHOD, KEY = get("rk4_renormalised").Method(), stream_key(1, "drone1", "plant")
 H = 0.004  # [s] of an exchange interval
 

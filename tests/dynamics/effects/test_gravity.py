@@ -1,4 +1,4 @@
-from dynamics.effects.gravity import Gravity, gravity
+from lapwing.dynamics.effects.gravity import Gravity, gravity
 
 
 def test_weight(situation, rotors):

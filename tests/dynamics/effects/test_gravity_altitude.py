@@ -1,6 +1,6 @@
 import pytest
 
-from dynamics.effects.gravity_altitude import EARTH_RADIUS, GravityAltitude, gravity_altitude, weigh
+from lapwing.dynamics.effects.gravity_altitude import EARTH_RADIUS, GravityAltitude, gravity_altitude, weigh
 
 
 @pytest.mark.parametrize("height", [0.0, 1000.0, 10_000.0])

@@ -8,12 +8,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from dynamics import effects
-from dynamics.environment import Environment
-from dynamics.integrators import get
-from dynamics.lie.quaternion import Quaternion
-from dynamics.terrain import relief
-from dynamics.vehicles import multirotor
+from lapwing.dynamics import effects
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.terrain import relief
+from lapwing.dynamics.vehicles import multirotor
 
 pytestmark = pytest.mark.long
 

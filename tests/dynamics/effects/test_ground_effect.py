@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from effects_helpers import NO_FACTORS
 
-from dynamics import effects
-from dynamics.effects.ground_effect import gain, ground_effect, high
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.ground_effect import gain, ground_effect, high
 
 RADIUS = 0.2794
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.effects.gyroscopic_torque import gyroscopic_torque
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.gyroscopic_torque import gyroscopic_torque
 
 
 def test_torque_is_minus_the_change_of_the_rotors_momentum(drone, situation, rotors):

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from effects_helpers import rotation_of
 
-from dynamics import effects
-from dynamics.effects.h_force import h_force
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.h_force import h_force
 
 
 def test_is_the_sum_over_the_rotors(drone, situation, rotors):

@@ -7,10 +7,10 @@ import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.optimize import brentq
 
-from dynamics import effects
-from dynamics.effects.induced_velocity import follow, induced_velocity
-from dynamics.effects.rotor_thrust import rotor_thrust
-from dynamics.errors import KeyedError
+from lapwing.dynamics import effects
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects.induced_velocity import follow, induced_velocity
+from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 
 SPEED, DENSITY = 300.0, 1.2
 

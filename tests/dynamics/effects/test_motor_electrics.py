@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from effects_helpers import NO_LOADS
 
-from dynamics import effects
-from dynamics.effects.motor_electrics import motor_electrics
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.motor_electrics import motor_electrics
 
 K, R = 0.0954929658551372, 0.085  # 60 / (2 pi 150) / (2/3)
 

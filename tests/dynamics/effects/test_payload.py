@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.effects.payload import RELEASED, payload, release
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.payload import RELEASED, payload, release
 
 
 def make(drone, **table):

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.environment import Environment
-from dynamics.integrators import get
-from dynamics.lie.quaternion import rotation_matrix
-from dynamics.terrain import relief, surface
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.standing import at_rest, standing_pose
+from lapwing.dynamics import effects
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.terrain import relief, surface
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.ground_equilibrium import at_rest, standing_pose
 
 RK4 = get("rk4_renormalised").Method()
 G, HEIGHT, OFF = 9.80665, 0.35, (0.0,) * 4

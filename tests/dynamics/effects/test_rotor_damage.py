@@ -1,8 +1,8 @@
 import pytest
 from effects_helpers import NO_FACTORS
 
-from dynamics import effects
-from dynamics.effects.rotor_damage import rotor_damage, strike
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.rotor_damage import rotor_damage, strike
 
 
 def test_one_rotor_from_its_time(drone, situation, rotors):

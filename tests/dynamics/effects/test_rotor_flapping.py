@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.effects.h_force import h_force
-from dynamics.effects.rotor_flapping import rotor_flapping
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.h_force import h_force
+from lapwing.dynamics.effects.rotor_flapping import rotor_flapping
 
 R = 0.2794  # [m]
 

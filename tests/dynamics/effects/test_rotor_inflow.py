@@ -5,11 +5,11 @@ import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.integrate import quad
 
-from dynamics import effects
-from dynamics.effects.rotor_inflow import rotor_inflow
-from dynamics.effects.rotor_thrust import rotor_thrust
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.rotor_inflow import rotor_inflow
+from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
 
 def both(drone, s):
@@ -26,7 +26,7 @@ def test_thrust_falls_linearly_to_nothing_at_the_pitch_speed(drone, situation):
 
 
 def test_induced_torque_falls_with_the_square(drone, situation):
-    from dynamics.vehicles.propeller import drag_coefficients
+    from lapwing.dynamics.vehicles.propeller import drag_coefficients
 
     profile, induced = drag_coefficients(drone.propeller)
     pitch_speed = 300.0 / (2 * math.pi) * drone.propeller.pitch

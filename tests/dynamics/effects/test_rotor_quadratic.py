@@ -1,8 +1,8 @@
 import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 
-from dynamics import effects
-from dynamics.effects.rotor_quadratic import rotor_quadratic
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.rotor_quadratic import rotor_quadratic
 
 
 def test_loads(drone, situation):

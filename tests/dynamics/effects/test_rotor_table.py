@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 
-from dynamics import effects
-from dynamics.effects.rotor_table import embed, rotor_table
-from dynamics.errors import KeyedError
+from lapwing.dynamics import effects
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects.rotor_table import embed, rotor_table
 
 SPEED, D = 300.0, 0.5588
 N = SPEED / (2 * math.pi)

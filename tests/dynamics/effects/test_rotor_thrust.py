@@ -3,9 +3,9 @@ import math
 import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 
-from dynamics import effects
-from dynamics.effects.rotor_thrust import rotor_thrust
-from dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
 
 
 def test_loads_by_the_source_formula(drone, situation):

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics.effects import from_scene
-from dynamics.effects._interaction import Presence
-from dynamics.effects.rotor_wash import blown
-from dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.effects import from_scene
+from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects.rotor_wash import blown
+from lapwing.dynamics.vehicles.airframe import load_airframe
 
 ROOT = Path(__file__).parents[3]
-QUAD = load_airframe(ROOT / "scenes/vehicles/quad_x.toml")
+QUAD = load_airframe(ROOT / "lapwing/scenes/vehicles/quad_x.toml")
 WASH = from_scene({"rotor_wash": {}}, QUAD)[0]
 NO_WIND = (0.0, 0.0, 0.0)
 WEIGHT, DENSITY = 1.5 * 9.80665, 1.2

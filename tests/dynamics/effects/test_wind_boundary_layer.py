@@ -2,10 +2,10 @@ import math
 
 import pytest
 
-from dynamics import effects
-from dynamics.effects.wind_boundary_layer import wind_boundary_layer
-from dynamics.environment import Environment
-from dynamics.terrain import LEVEL, relief
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.wind_boundary_layer import wind_boundary_layer
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import LEVEL, relief
 
 TABLE = {"speed": 8.0, "height": 10.0, "roughness": 0.1, "heading": math.pi / 2}
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dynamics import effects
-from dynamics.effects.wind_constant import WindConstant, wind_constant
-from dynamics.vehicles import multirotor
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
+from lapwing.dynamics.vehicles import multirotor
 
 
 def test_adds_to_the_wind(situation):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from dynamics import effects
-from dynamics.effects._turbulence import intensity, passing
-from dynamics.effects.wind_dryden import draw
-from dynamics.environment import Environment
-from dynamics.kernel import kernel
-from dynamics.noise import stream_key
-from dynamics.terrain import relief
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._turbulence import intensity, passing
+from lapwing.dynamics.effects.wind_dryden import draw
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.terrain import relief
+from lapwing.kernels import kernel
 
 KEY = stream_key(5, "drone1", "effects")
 FOOT = 0.3048

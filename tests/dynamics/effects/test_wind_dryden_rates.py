@@ -7,15 +7,15 @@ import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.signal import welch
 
-from dynamics import effects
-from dynamics.effects import wind_dryden
-from dynamics.effects._turbulence import intensity
-from dynamics.effects._types import Air
-from dynamics.effects.rotor_inflow import rotor_inflow
-from dynamics.effects.wind_dryden_rates import draw, turning, wind_dryden_rates
-from dynamics.errors import KeyedError
-from dynamics.kernel import kernel
-from dynamics.noise import stream_key
+from lapwing.dynamics import effects
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects import wind_dryden
+from lapwing.dynamics.effects._turbulence import intensity
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.effects.rotor_inflow import rotor_inflow
+from lapwing.dynamics.effects.wind_dryden_rates import draw, turning, wind_dryden_rates
+from lapwing.dynamics.noise import stream_key
+from lapwing.kernels import kernel
 
 KEY = stream_key(5, "drone1", "effects")
 AIRSPEED, ALTITUDE, SPAN, WIND = 8.0, 20.0, 1.5, 7.0

@@ -1,6 +1,6 @@
 import pytest
 
-from dynamics.effects.wind_gust import WindGust, wind_gust
+from lapwing.dynamics.effects.wind_gust import WindGust, wind_gust
 
 GUST = WindGust((4.0, 0.0, -2.0), 1.0, 2.0)
 

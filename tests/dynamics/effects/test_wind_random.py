@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from dynamics import effects
-from dynamics.effects.wind_random import draw, told, wind_random
-from dynamics.kernel import kernel
-from dynamics.noise import stream_key
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects.wind_random import draw, told, wind_random
+from lapwing.dynamics.noise import stream_key
+from lapwing.kernels import kernel
 
 WIND = {"mean": [3.0, 1.0, 0.0], "sigma": 0.7}
 KEY = stream_key(3, "drone1", "effects")

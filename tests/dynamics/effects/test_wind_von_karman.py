@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from dynamics import effects
-from dynamics.effects._turbulence import intensity
-from dynamics.effects.wind_von_karman import PARTS, draw
-from dynamics.kernel import kernel
-from dynamics.noise import stream_key
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._turbulence import intensity
+from lapwing.dynamics.effects.wind_von_karman import PARTS, draw
+from lapwing.dynamics.noise import stream_key
+from lapwing.kernels import kernel
 
 KEY = stream_key(5, "drone1", "effects")
 

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from dynamics.integrators import RATES, erk4m, march, rkmk54
-from dynamics.kernel import leaf
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion, log
-from dynamics.vector import Vec3, add, scale
+from lapwing.dynamics.integrators import RATES, erk4m, march, rkmk54
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, log
+from lapwing.dynamics.vector import Vec3, add, scale
+from lapwing.kernels import leaf
 
 
 class RampParameters(NamedTuple):

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import pytest
 
-from dynamics.integrators import RATES, get, march
-from dynamics.kernel import leaf
+from lapwing.dynamics.integrators import RATES, get, march
+from lapwing.kernels import leaf
 
 
 class LagParameters(NamedTuple):

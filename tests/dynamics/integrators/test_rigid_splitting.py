@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipkinc
 
-from dynamics.integrators import get, simulate, solve
-from dynamics.lie.quaternion import exp
-from dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
+from lapwing.dynamics.integrators import get, simulate, solve
+from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 
 INERTIA = (1.0, 1.7, 2.3)
 OMEGA = (0.8, 0.5, 0.9)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from dynamics.integrators import RATES, get, simulate, solve
-from dynamics.kernel import leaf
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion
-from dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
+from lapwing.dynamics.integrators import RATES, get, simulate, solve
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
+from lapwing.kernels import leaf
 
 
 class BlowUpParameters(NamedTuple):

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dynamics.lie import quaternion as q
-from dynamics.vector import apply
+from lapwing.dynamics.lie import quaternion as q
+from lapwing.dynamics.vector import apply
 
 angle = st.floats(-3.1, 3.1)
 vector = st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))

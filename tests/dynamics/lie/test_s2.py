@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from dynamics.lie import s2, so3
-from dynamics.lie.s2 import Direction
-from dynamics.vector import apply, cross, dot, scale
+from lapwing.dynamics.lie import s2, so3
+from lapwing.dynamics.lie.s2 import Direction
+from lapwing.dynamics.vector import apply, cross, dot, scale
 
 NORTH = Direction(0.0, 0.0, 1.0)
 

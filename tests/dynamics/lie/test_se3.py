@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from dynamics.lie import se3
+from lapwing.dynamics.lie import se3
 
 mpmath.mp.dps = 60
 

@@ -6,8 +6,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from dynamics.lie import quaternion, so3
-from dynamics.lie.so3 import Rotation
+from lapwing.dynamics.lie import quaternion, so3
+from lapwing.dynamics.lie.so3 import Rotation
 
 mpmath.mp.dps = 50
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from dynamics.lie import quaternion
-from dynamics.multibody import euler
-from dynamics.multibody.placement import place
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.multibody import cardan_angles
+from lapwing.dynamics.multibody.body_kinematics import place
 
 
 def euler_from_quaternion(configuration, velocity):
@@ -15,11 +15,11 @@ def euler_from_quaternion(configuration, velocity):
     """
     angles_out, rates_out = np.array(configuration[:, :6]), np.array(velocity, float)
     for i in range(len(configuration)):
-        angles = euler.angles_of(quaternion.rotation_matrix(tuple(configuration[i, 3:])))
-        if abs(np.cos(angles[1])) < euler.SINGULAR:
+        angles = cardan_angles.angles_of(quaternion.rotation_matrix(tuple(configuration[i, 3:])))
+        if abs(np.cos(angles[1])) < cardan_angles.SINGULAR:
             raise ValueError(f"body {i}: pitch is at 90 degrees, where XYZ Euler angles are singular: use quaternions")
         angles_out[i, 3:] = angles
-        rates_out[i, 3:] = euler.rates_of(angles, tuple(velocity[i, 3:]))
+        rates_out[i, 3:] = cardan_angles.rates_of(angles, tuple(velocity[i, 3:]))
     return angles_out, rates_out
 
 

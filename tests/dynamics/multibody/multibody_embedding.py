@@ -8,8 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
-from dynamics.multibody.augmented import RANK_TOLERANCE, generalised_force, mass_roots, prepared, refuse_singular
-from dynamics.multibody.stabilisation import rows
+from lapwing.dynamics.multibody.augmented import (
+    RANK_TOLERANCE,
+    generalised_force,
+    mass_roots,
+    prepared,
+    refuse_singular,
+)
+from lapwing.dynamics.multibody.stabilisation import rows
 
 
 class Reduced(NamedTuple):

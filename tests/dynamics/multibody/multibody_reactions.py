@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.multibody.augmented import Solution, prepared, refuse_singular
-from dynamics.multibody.constraints import equations
-from dynamics.multibody.placement import place
+from lapwing.dynamics.multibody.augmented import Solution, prepared, refuse_singular
+from lapwing.dynamics.multibody.body_kinematics import place
+from lapwing.dynamics.multibody.constraints import equations
 
 
 class Reaction(NamedTuple):

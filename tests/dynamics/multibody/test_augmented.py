@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from multibody_angles import euler_from_quaternion
 
-from dynamics.lie.quaternion import Quaternion
-from dynamics.multibody import augmented, pivoted_qr
-from dynamics.multibody.augmented import accelerations
-from dynamics.multibody.delivery_drone import delivery_drone
-from dynamics.multibody.five_bodies import BodyState, arrays, machine
-from dynamics.multibody.hold import together
-from dynamics.multibody.mechanisms import bricard, drone_system
-from dynamics.multibody.stabilisation import rows
-from dynamics.multibody.system import assemble
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.multibody import augmented, pivoted_qr
+from lapwing.dynamics.multibody.augmented import accelerations
+from lapwing.dynamics.multibody.delivery_drone import delivery_drone
+from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
+from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
+from lapwing.dynamics.multibody.stabilisation import rows
+from lapwing.dynamics.multibody.system import assemble
 
 PAPER = {
     "central_frame": 8.0,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from multibody_angles import euler_from_quaternion, quaternion_from_euler
 
-from dynamics.multibody.constraints import velocity_defect
-from dynamics.multibody.placement import displaced, place
-from dynamics.multibody.stabilisation import rows
-from dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble
+from lapwing.dynamics.multibody.body_kinematics import displaced, place
+from lapwing.dynamics.multibody.constraints import velocity_defect
+from lapwing.dynamics.multibody.stabilisation import rows
+from lapwing.dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble
 
 RNG = np.random.default_rng(3)
 BODIES = [Body(f"b{k}", 1.0 + k, (1.0, 2.0, 2.5)) for k in range(3)]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from test_augmented import PAPER
 
-from dynamics.integrators import get, march
-from dynamics.lie import quaternion
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
-from dynamics.multibody.five_bodies import BodyState, Wrench, arrays, machine, rate
-from dynamics.multibody.hold import together
+from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
+from lapwing.dynamics.multibody.five_bodies import BodyState, Wrench, arrays, machine, rate
+from lapwing.dynamics.multibody.five_body_stabilisation import together
 
 ZERO4 = (0.0, 0.0, 0.0, 0.0)
 GRAVITY = (0.0, 0.0, -9.81)

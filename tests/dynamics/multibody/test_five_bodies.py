@@ -6,15 +6,15 @@ from multibody_reactions import reactions
 from test_augmented import PAPER
 from test_delivery_drone import without_propeller
 
-from dynamics.lie.quaternion import Quaternion
-from dynamics.multibody import augmented
-from dynamics.multibody.augmented import accelerations
-from dynamics.multibody.delivery_drone import delivery_drone
-from dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
-from dynamics.multibody.five_bodies import reactions as from_chassis
-from dynamics.multibody.hold import together
-from dynamics.multibody.mechanisms import drone_system
-from dynamics.multibody.placement import displaced
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.multibody import augmented
+from lapwing.dynamics.multibody.augmented import accelerations
+from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.delivery_drone import delivery_drone
+from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
+from lapwing.dynamics.multibody.five_bodies import reactions as from_chassis
+from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.mechanisms import drone_system
 
 GRAVITY = (0.0, 0.0, -9.81)
 
@@ -54,7 +54,7 @@ def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):
 
 
 def rotation(q):
-    from dynamics.lie import quaternion
+    from lapwing.dynamics.lie import quaternion
 
     return np.array(quaternion.rotation_matrix(tuple(q))).reshape(3, 3)
 

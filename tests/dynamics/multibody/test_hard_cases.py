@@ -7,15 +7,15 @@ from multibody_angles import euler_from_quaternion
 from test_augmented import PAPER
 from test_delivery_drone import momentum, without_propeller
 
-from dynamics.integrators import get, march
-from dynamics.lie import quaternion
-from dynamics.multibody.augmented import ANY, RANK_TOLERANCE, accelerations, solve
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone
-from dynamics.multibody.five_bodies import BodyState, arrays, machine
-from dynamics.multibody.hold import NONE, PARTITION, PROJECTION, advance, together, violation
-from dynamics.multibody.mechanisms import bricard, drone_system
-from dynamics.multibody.placement import displaced
-from dynamics.multibody.simulation import energy, simulate
+from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, accelerations, solve
+from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone
+from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
+from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, together, violation
+from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
+from lapwing.dynamics.multibody.simulation import energy, simulate
 
 GRAVITY, NOWHERE = (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)
 ZERO4 = (0.0,) * 4

@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
-from dynamics.multibody.mechanisms import bricard, four_bars, pendulum
-from dynamics.multibody.simulation import energy, simulate
+from lapwing.dynamics.multibody.mechanisms import bricard, four_bars, pendulum
+from lapwing.dynamics.multibody.simulation import energy, simulate
 
 G = 9.81
 

@@ -5,9 +5,9 @@ import pytest
 from test_augmented import PAPER
 from test_delivery_drone import state
 
-from dynamics.integrators import get, march
-from dynamics.lie import quaternion
-from dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
+from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
 
 try:
     import mujoco

@@ -6,9 +6,9 @@ from multibody_angles import euler_from_quaternion
 from multibody_reactions import reactions
 from test_augmented import state
 
-from dynamics.multibody.augmented import accelerations
-from dynamics.multibody.mechanisms import drone_system, pendulum
-from dynamics.multibody.placement import place
+from lapwing.dynamics.multibody.augmented import accelerations
+from lapwing.dynamics.multibody.body_kinematics import place
+from lapwing.dynamics.multibody.mechanisms import drone_system, pendulum
 
 G = 9.81
 

@@ -5,12 +5,12 @@ import pytest
 from multibody_angles import euler_from_quaternion, quaternion_from_euler
 from test_augmented import PAPER
 
-from dynamics.lie.quaternion import Quaternion
-from dynamics.multibody.delivery_drone import delivery_drone
-from dynamics.multibody.five_bodies import BodyState, arrays, machine
-from dynamics.multibody.hold import together
-from dynamics.multibody.mechanisms import drone_system, four_bars
-from dynamics.multibody.simulation import energy, simulate
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.multibody.delivery_drone import delivery_drone
+from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
+from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.mechanisms import drone_system, four_bars
+from lapwing.dynamics.multibody.simulation import energy, simulate
 
 SPEEDS = (40.0, -30.0, 35.0, -45.0)
 

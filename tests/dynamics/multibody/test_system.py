@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble, triad
+from lapwing.dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble, triad
 
 BAR = Body("bar", 1.0, (0.1, 0.2, 0.2))
 HINGE = Revolute("hinge", GROUND, 0, (0.0, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))

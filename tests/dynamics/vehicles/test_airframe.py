@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.airframe import load_airframe
 
-DRONE = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
+DRONE = Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml"
 
 
 def test_the_delivery_drone_loads():

@@ -5,13 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from dynamics.integrators import get, rate, simulate
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion, exp, from_matrix
-from dynamics.lie.ts2 import Swing, normalise
-from dynamics.tree import retract, scale, unflatten
-from dynamics.vehicles import cooperative_forces as forces_of
-from dynamics.vehicles.cooperative_control import FormationControl
-from dynamics.vehicles.cooperative_load import (
+from lapwing.dynamics.integrators import get, rate, simulate
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, exp, from_matrix
+from lapwing.dynamics.lie.ts2 import Swing, normalise
+from lapwing.dynamics.vehicles import cooperative_forces as forces_of
+from lapwing.dynamics.vehicles.cooperative_control import FormationControl
+from lapwing.dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
     CooperativeLoadState,
     command,
@@ -19,6 +18,7 @@ from dynamics.vehicles.cooperative_load import (
     load_acceleration,
     thrust_world,
 )
+from lapwing.kernels.state_tree import retract, scale, unflatten
 
 ZERO = (0.0, 0.0, 0.0)
 INERTIA = (0.0820, 0.0845, 0.1377)

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dynamics.integrators import get, rate, simulate
-from dynamics.lie.quaternion import exp, rotation_matrix
-from dynamics.lie.ts2 import Swing, normalise
-from dynamics.tree import embed, unflatten
-from dynamics.vehicles.cooperative_load import (
+from lapwing.dynamics.integrators import get, rate, simulate
+from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
+from lapwing.dynamics.lie.ts2 import Swing, normalise
+from lapwing.dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
     CooperativeLoadState,
     LiftCommand,
@@ -16,6 +15,7 @@ from dynamics.vehicles.cooperative_load import (
     quad_position,
     quad_velocity,
 )
+from lapwing.kernels.state_tree import embed, unflatten
 
 ZERO = (0.0, 0.0, 0.0)
 INERTIA = (0.0820, 0.0845, 0.1377)

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from dynamics.integrators import get, rate, simulate, solve
-from dynamics.lie.quaternion import NO_ROTATION, exp, log, multiply
-from dynamics.vehicles.gyrostat import GyrostatParameters
-from dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
+from lapwing.dynamics.integrators import get, rate, simulate, solve
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp, log, multiply
+from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
+from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 
 ZERO = (0.0, 0.0, 0.0)
 INERTIA = (500.0, 500.0, 1000.0)

@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.optimize import brentq
 
-from dynamics.vehicles.inflow import axial, induced_velocity
+from lapwing.dynamics.vehicles.inflow import axial, induced_velocity
 
 
 @pytest.mark.parametrize(("climb", "across"), [(0, 0), (0, 1), (0.5, 0.3), (2, 0), (0, 10), (-0.5, 2), (-3, 4), (5, 1)])

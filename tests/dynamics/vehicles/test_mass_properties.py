@@ -5,15 +5,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lapwing
-from dynamics import effects
-from dynamics.effects._types import FullMassProperties, body_of
-from dynamics.integrators import get
-from dynamics.lie.quaternion import Quaternion
-from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe, load_airframe
-from dynamics.vehicles.airframe_tables import Mass
-from services.common.sections import SHIPPED
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._types import FullMassProperties, body_of
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
+from lapwing.dynamics.vehicles.airframe_tables import Mass
+from lapwing.services.common.run_schema import SHIPPED
 
 DRONE = load_airframe(SHIPPED / "vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()

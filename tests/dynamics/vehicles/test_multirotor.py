@@ -8,15 +8,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from dynamics import effects
-from dynamics.integrators import get
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion
-from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics import effects
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
-DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
 BARE = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))

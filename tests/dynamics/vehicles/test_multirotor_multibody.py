@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.effects._types import body_of
-from dynamics.integrators import get
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION, exp
-from dynamics.noise import stream_key
-from dynamics.vehicles import multirotor, multirotor_equations, multirotor_multibody
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor_equations import MultirotorDrive
-from dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._types import body_of
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vehicles import multirotor, multirotor_equations, multirotor_multibody
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.kernels import kernel
 
-DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
 ACTIVE = effects.from_scene({"gravity": {}, "rotor_thrust": {}, "gyroscopic_torque": {}, "body_drag": {}}, DRONE)

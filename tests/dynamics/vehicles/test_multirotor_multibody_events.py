@@ -5,25 +5,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.integrators import get
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import exp, rotation_matrix
-from dynamics.vehicles import (
+from lapwing.dynamics import effects
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
+from lapwing.dynamics.vehicles import (
     multirotor,
     multirotor_equations,
     multirotor_euler,
     multirotor_multibody,
     multirotor_multibody_equations,
 )
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.multirotor_equations import MultirotorDrive
-from dynamics.vehicles.multirotor_multibody import BECOMES
-from dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
+from lapwing.dynamics.vehicles.multirotor_multibody import BECOMES
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.kernels import kernel
 
 pytestmark = pytest.mark.long
 
-DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 VOLTS, SPEED = (25.0, 27.0, 24.0, 28.0), 200.0
 VELOCITY, OMEGA, ATTITUDE = (1.0, -2.0, 0.5), (0.6, -0.4, 0.3), exp((0.1, -0.2, 0.3))

@@ -8,16 +8,16 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import lapwing
-from dynamics import effects
-from dynamics.integrators import get
-from dynamics.kernel import uncompiled
-from dynamics.lie.quaternion import NO_ROTATION, rotate
-from dynamics.noise import stream_key
-from dynamics.terrain import LEVEL
-from dynamics.vehicles import multirotor_slung as slung
-from dynamics.vehicles.airframe import load_airframe
-from services.common.sections import SHIPPED
-from services.table import load
+from lapwing.dynamics import effects
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, rotate
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.terrain import LEVEL
+from lapwing.dynamics.vehicles import multirotor_slung as slung
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.kernels import uncompiled
+from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.scene_resolver import load
 
 QUAD = load_airframe(SHIPPED / "vehicles/quad_x.toml")
 RK4 = get("rk4_renormalised").Method()

@@ -7,19 +7,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lapwing
-from dynamics import effects
-from dynamics.effects._types import body_of
-from dynamics.effects.payload import RELEASED
-from dynamics.integrators import get
-from dynamics.lie.quaternion import Quaternion
-from dynamics.noise import stream_key
-from dynamics.validation import fault
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.airframe import Airframe, load_airframe
-from dynamics.vehicles.airframe_tables import CarriedBox
-from services.table import load, resolve
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._types import body_of
+from lapwing.dynamics.effects.payload import RELEASED
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.validation import fault
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
+from lapwing.dynamics.vehicles.airframe_tables import CarriedBox
+from lapwing.services.scene_resolver import load, resolve
 
-DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 BARE = DRONE.mass.model_copy(
     update={"total": 8.0, "payload": 0.0, "centre": (0.01, -0.02, 0.03), "products": (0.01, -0.005, 0.002)}
 )

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.atmosphere import Atmosphere, density
-from dynamics.lie.quaternion import exp
-from dynamics.vehicles import multirotor, performance
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.inflow import thrust_in_wake
+from lapwing.dynamics import effects
+from lapwing.dynamics.atmosphere import Atmosphere, density
+from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.vehicles import multirotor, performance
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.inflow import thrust_in_wake
 
-DRONE = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml")
+DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 WEIGHT = DRONE.mass.total * 9.80665
 
 

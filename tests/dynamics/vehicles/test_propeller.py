@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from dynamics.vehicles.airframe import load_airframe
-from dynamics.vehicles.airframe_tables import Propeller
-from dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.airframe_tables import Propeller
+from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
 
-PROPELLER = load_airframe(Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml").propeller
+PROPELLER = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml").propeller
 
 
 def test_coefficients_by_the_source_formulas_written_out():

@@ -5,16 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from dynamics.integrators import get, rate, simulate
-from dynamics.lie.quaternion import NO_ROTATION, exp, to_roll_pitch_yaw
-from dynamics.tree import unflatten
-from dynamics.vehicles.quadrotor_os4 import (
-    Os4Motors,
-    Os4Parameters,
-    Os4State,
-    hover_speed,
-    net_force,
-)
+from lapwing.dynamics.integrators import get, rate, simulate
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp, to_roll_pitch_yaw
+from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State, hover_speed, net_force
+from lapwing.kernels.state_tree import unflatten
 
 ZERO = (0.0, 0.0, 0.0)
 OS4 = Os4Parameters(0.650, (7.5e-3, 7.5e-3, 1.3e-2), 0.23, 3.13e-5, 7.5e-7, 6.0e-5, 9.81, (0.1, 0.1, 0.1))

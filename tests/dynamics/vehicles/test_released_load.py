@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from dynamics.integrators import get, rate, simulate
-from dynamics.lie.quaternion import NO_ROTATION, exp
-from dynamics.lie.ts2 import Swing
-from dynamics.tree import unflatten
-from dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
-from dynamics.vehicles.released_load import release
+from lapwing.dynamics.integrators import get, rate, simulate
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
+from lapwing.dynamics.lie.ts2 import Swing
+from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from lapwing.dynamics.vehicles.released_load import release
+from lapwing.kernels.state_tree import unflatten
 
 MASS, G, THRUST = 0.7, 9.81, 9.0
 INERTIA, MOMENT, SPIN = (0.08, 0.09, 0.13), (0.0, 0.0, 0.02), (0.0, 0.0, 0.3)

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dynamics.integrators import Controlled, get, march, march_controlled, rate
-from dynamics.lie.quaternion import Quaternion, exp
-from dynamics.tree import retract, scale
-from dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
-from dynamics.vehicles.unloading_places import roller_speed
+from lapwing.dynamics.integrators import Controlled, get, march, march_controlled, rate
+from lapwing.dynamics.lie.quaternion import Quaternion, exp
+from lapwing.dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
+from lapwing.dynamics.vehicles.unloading_contact_points import roller_speed
+from lapwing.kernels.state_tree import retract, scale
 
 RK4 = get("rk4_renormalised").Method()
 G, H = 9.81, 2.5e-4

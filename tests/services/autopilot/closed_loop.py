@@ -5,18 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract, rotate, to_roll_pitch_yaw
-from dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
-from services.autopilot.attitude import wrap
-from services.autopilot.control import START, step
-from services.autopilot.interface import Estimate, PerRotor, Setpoint
-from services.autopilot.law import Airframe
-from services.autopilot.motor import RPM, Motor
-from services.autopilot.stage import LANDED
-from services.trajectory.mission import compile
-from services.trajectory.phases import Phases
-from services.trajectory.piece import evaluate
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract, rotate, to_roll_pitch_yaw
+from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
+from lapwing.kernels import kernel
+from lapwing.services.autopilot.attitude import wrap
+from lapwing.services.autopilot.control import START, step
+from lapwing.services.autopilot.controller_parameters import Airframe
+from lapwing.services.autopilot.interface import Estimate, PerRotor, Setpoint
+from lapwing.services.autopilot.land_detector import LANDED
+from lapwing.services.autopilot.motor import RPM, Motor
+from lapwing.services.trajectory.phases import Phases
+from lapwing.services.trajectory.polynomial_piece import evaluate
+from lapwing.services.trajectory.trajectory_compiler import compile
 
 ARM = 0.4974 / math.sqrt(2.0)
 MOTOR = Motor(thrust_coefficient=2.234e-4, gear_ratio=2.0 / 3.0, speed_constant=150.0, time_constant=0.02)

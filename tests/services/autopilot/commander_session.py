@@ -2,13 +2,13 @@
 
 import math
 
-from dynamics.lie.quaternion import from_roll_pitch_yaw
-from services.autopilot.commander.commander import Commander
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.estimate import EXACT
-from services.autopilot.interface import Setpoint
-from services.common.parameters import table
-from services.table import load
+from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
+from lapwing.services.autopilot.commander.commander import Commander
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.scene_resolver import load
 
 DT = 0.004  # [s]
 CONSTANTS = Constants(table(load("hover")), 0.35, 9.8, 0.4, False, True)

@@ -5,18 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynamics.environment import STANDARD
-from dynamics.kernel import kernel, leaf
-from dynamics.lie import quaternion
-from dynamics.noise import TURN_ON, normal3, stream_key
-from dynamics.terrain import LEVEL
-from dynamics.vector import cross, norm, scale
-from services.autopilot import estimator
-from services.sensors import barometer, gps, imu, magnetometer, sonar
-from services.sensors.line import Fault
-from services.sensors.registry import sensors
-from services.sensors.schedule import SLOTS
-from services.sensors.truth import Truth
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.noise import TURN_ON, normal3, stream_key
+from lapwing.dynamics.terrain import LEVEL
+from lapwing.dynamics.vector import cross, norm, scale
+from lapwing.kernels import kernel, leaf
+from lapwing.services.autopilot import estimator
+from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
+from lapwing.services.sensors.delay_line import Fault
+from lapwing.services.sensors.fault_schedule import SLOTS
+from lapwing.services.sensors.registry import sensors
+from lapwing.services.sensors.sensor_inputs import Truth
 
 INTERVAL = 0.004  # [s]
 STAND = 3.0  # [s] on the ground first

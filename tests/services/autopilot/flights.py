@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from messages import CommandAck, MissionItem, OperatorCommand, Vector3
-from services.common.failures import UNITS
-from services.table import load
+from lapwing.messages import CommandAck, MissionItem, OperatorCommand, Vector3
+from lapwing.services.common.failure_types import UNITS
+from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
 
 SCENE = "hover"
@@ -48,7 +48,7 @@ ENABLED = "autopilot.parameters.SYS_FAILURE_EN=1"
 
 
 def inject(unit, kind, motor=0, id=7):
-    """A failure of `services.common.failures`."""
+    """A failure of `lapwing.services.common.failure_types`."""
     return command("inject_failure", UNITS.index(unit), kind, motor, id=id)
 
 

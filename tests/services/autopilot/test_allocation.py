@@ -6,9 +6,9 @@ from closed_loop import AIRFRAME
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from services.autopilot import law
-from services.autopilot.allocation import demand_effects, effectiveness, shares_of, tables, tilted_effectiveness
-from services.autopilot.mixer import Demands, mix, saturate
+from lapwing.services.autopilot import controller_parameters
+from lapwing.services.autopilot.allocation import demand_effects, effectiveness, shares_of, tables, tilted_effectiveness
+from lapwing.services.autopilot.mixer import Demands, mix, saturate
 
 TOP, YAW = 10.0, 0.02  # [N], [m]
 HALF = 0.5 * np.pi
@@ -58,7 +58,7 @@ def test_of_all_thrusts_that_give_a_wrench_they_are_the_least():
 def test_four_rotors_in_a_cross_have_shares_of_one_to_the_bit():
     a = AIRFRAME
     signs = [(1.0, np.sign(y), -np.sign(x), s) for x, y, s in zip(a.rotor_x, a.rotor_y, a.reaction_sign, strict=True)]
-    assert law.shares(a) == (tuple(signs),)
+    assert controller_parameters.shares(a) == (tuple(signs),)
 
 
 @pytest.mark.parametrize("name", ["hexa X", "octa"])

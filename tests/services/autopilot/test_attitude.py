@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynamics.lie.quaternion import from_roll_pitch_yaw, retract, to_roll_pitch_yaw
-from dynamics.vector import scale, subtract
-from services.autopilot.attitude import angle_rates, body_rates, error_by_angle, error_on_so3, wrap
+from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, retract, to_roll_pitch_yaw
+from lapwing.dynamics.vector import scale, subtract
+from lapwing.services.autopilot.attitude import angle_rates, body_rates, error_by_angle, error_on_so3, wrap
 
 TILT = st.floats(-1.2, 1.2)
 RATES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)

@@ -6,19 +6,19 @@ import math
 import numpy as np
 import pytest
 
-from dynamics import effects
-from dynamics.kernel import uncompiled
-from dynamics.vehicles import multirotor
-from dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
-from services.autopilot import law
-from services.autopilot.allocation import demand_effects
-from services.autopilot.known_airframe import known_airframe
-from services.autopilot.motor import thrust_at
-from services.common.vehicle import Effects, airframe
-from services.table import load, resolve
-from studies.performance import card
-from studies.tune import corners
-from studies.tune.linearise import hover
+from lapwing.dynamics import effects
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from lapwing.kernels import uncompiled
+from lapwing.services.autopilot import controller_parameters
+from lapwing.services.autopilot.allocation import demand_effects
+from lapwing.services.autopilot.motor import thrust_at
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.performance_card import card
+from lapwing.studies.tune import corners
+from lapwing.studies.tune.linearise import hover
 
 DRONE = load("hover").lookup("airframe")
 ARMS = [tuple(place[:2]) for place in DRONE.rotors.position]
@@ -46,7 +46,7 @@ def wrench(scene, thrust):
 
 def test_the_autopilot_knows_the_slopes_of_the_plants_force_and_torques():
     scene = load("hover", X8)
-    found = law.rotor_effectiveness(known_airframe(scene))
+    found = controller_parameters.rotor_effectiveness(known_airframe(scene))
     for k, column in enumerate(found.T):
         step = 1e-3 * np.eye(8)[k]
         assert column == pytest.approx((wrench(scene, 12.0 + step) - wrench(scene, 12.0 - step)) / 2e-3, abs=1e-7)
@@ -56,23 +56,23 @@ def test_hover_is_balanced_at_one_speed_of_all_rotors():
     """The thrust of hovering that is fed forward carries the weight in the plant, which took 1.39 times as much."""
     scene = load("hover", X8)
     known = known_airframe(scene)
-    assert [share[0] for share in law.shares(known)[0]] == pytest.approx([1.0] * 8)
-    force, *torque = wrench(scene, [law.hover_thrust(known)] * 8)
+    assert [share[0] for share in controller_parameters.shares(known)[0]] == pytest.approx([1.0] * 8)
+    force, *torque = wrench(scene, [controller_parameters.hover_thrust(known)] * 8)
     assert force == pytest.approx(known.mass * known.gravity, rel=1e-12)
     assert torque == pytest.approx([0.0] * 3, abs=1e-9)
     without = {key: value for key, value in X8.items() if key != "effects.coaxial_wash"}
-    alone = law.hover_thrust(known_airframe(load("hover", without)))
-    assert law.hover_thrust(known) / alone == pytest.approx(1.39, abs=0.01)
+    alone = controller_parameters.hover_thrust(known_airframe(load("hover", without)))
+    assert controller_parameters.hover_thrust(known) / alone == pytest.approx(1.39, abs=0.01)
 
 
 def test_demands_act_on_their_own_axis_alone():
     known = known_airframe(load("hover", X8))
-    B, shares = law.rotor_effectiveness(known), np.array(law.shares(known)[0])
+    B, shares = controller_parameters.rotor_effectiveness(known), np.array(controller_parameters.shares(known)[0])
     assert B @ shares == pytest.approx(np.diag(demand_effects(B)), abs=1e-12)
 
 
 def test_which_of_two_rotors_over_one_another_has_failed_is_not_guessed():
-    assert len(law.shares(known_airframe(load("hover", X8)))) == 1
+    assert len(controller_parameters.shares(known_airframe(load("hover", X8)))) == 1
 
 
 def test_a_vehicle_that_only_the_lost_thrust_would_carry_is_refused():
@@ -90,7 +90,7 @@ def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
     scene.write_text(f"{text}\n[effects.coaxial_wash]\n[airframe]\n{table}\n")
     known = known_airframe(load(scene))
     assert known == known_airframe(load("hover", X8))
-    ideal = uncompiled(thrust_at)(known.motor, known.voltage_max) / law.hover_thrust(known)
+    ideal = uncompiled(thrust_at)(known.motor, known.voltage_max) / controller_parameters.hover_thrust(known)
     computed = {row.name: row.computed for row in card(scene)}["thrust over weight"]
     assert 0.85 * ideal < computed < ideal
 
@@ -99,10 +99,10 @@ def test_the_tuner_sees_the_plant_that_the_autopilot_is_told_of():
     scene = load("hover", X8)
     found, known = hover(scene), known_airframe(scene)
     assert found.rotor_speed == pytest.approx(
-        math.sqrt(law.hover_thrust(known) / known.motor.thrust_coefficient), rel=1e-3
+        math.sqrt(controller_parameters.hover_thrust(known) / known.motor.thrust_coefficient), rel=1e-3
     )
-    assert found.altitude == pytest.approx(law.lift(known) / known.mass, rel=1e-3)
-    moments = law.moments(known)
+    assert found.altitude == pytest.approx(controller_parameters.lift(known) / known.mass, rel=1e-3)
+    moments = controller_parameters.moments(known)
     for axis, k in (("roll", 0), ("pitch", 1), ("yaw", 2)):
         assert getattr(found, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
     assert found.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)

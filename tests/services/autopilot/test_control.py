@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from closed_loop import AIRFRAME, NOMINAL, TICK, mission, rmse
 
-from dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
-from services.autopilot.control import START, step
-from services.autopilot.gains import load
-from services.autopilot.interface import Estimate, Setpoint
-from services.autopilot.law import build
-from services.autopilot.stage import LANDED
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
+from lapwing.services.autopilot.control import START, step
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.interface import Estimate, Setpoint
+from lapwing.services.autopilot.land_detector import LANDED
 
 TABLE_7 = np.array([0.2373, 0.2700, 0.0981, 0.0334, 0.0277, 0.0220])  # x, y, z [m], roll, pitch, yaw [rad]
 ZERO = (0.0, 0.0, 0.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from flights import ACCEPTED, OPERATED, RATE, REJECTED, UP, command, fly, results, said, scripted
 
-from cosim.log import LogReader
-from lapwing.runs.refly import refly
-from lapwing.runs.single import fly_single
-from services.table import load, resolve
+from lapwing.cosim.log import LogReader
+from lapwing.runs.resimulate import refly
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
 
 EVERY_TICK = f"rates.operator={RATE}"

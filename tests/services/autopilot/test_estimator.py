@@ -7,12 +7,19 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from dynamics.environment import STANDARD
-from dynamics.lie.quaternion import NO_ROTATION, exp, from_roll_pitch_yaw, multiply, rotate_back, rotation_matrix
-from dynamics.vector import ZERO
-from services.autopilot import estimator
-from services.autopilot.estimator import doubt, fuse, state
-from services.autopilot.estimator.predict import _propagate_covariance
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.lie.quaternion import (
+    NO_ROTATION,
+    exp,
+    from_roll_pitch_yaw,
+    multiply,
+    rotate_back,
+    rotation_matrix,
+)
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import covariance_inflation, filter_state, fuse
+from lapwing.services.autopilot.estimator.predict import _propagate_covariance
 
 pytestmark = pytest.mark.long
 
@@ -52,8 +59,8 @@ def test_prediction_follows_a_turning_climb():
 
 
 def random_covariance(rng):
-    a = rng.normal(size=(state.SIZE, state.SIZE))
-    return a @ a.T / state.SIZE
+    a = rng.normal(size=(filter_state.SIZE, filter_state.SIZE))
+    return a @ a.T / filter_state.SIZE
 
 
 def skew(v):
@@ -65,12 +72,12 @@ def test_covariance_propagation_against_dense_matrices():
     rng = np.random.default_rng(0)
     covariance, f, dt = random_covariance(rng), rng.normal(size=3), 0.01
     r = np.array(rotation_matrix(from_roll_pitch_yaw(0.3, -0.5, 2.0))).reshape(3, 3)
-    a = np.zeros((state.SIZE, state.SIZE))
+    a = np.zeros((filter_state.SIZE, filter_state.SIZE))
     a[0:3, 9:12] = -r
     a[3:6, 0:3] = -skew(f)
     a[3:6, 12:15] = -r
     a[6:9, 3:6] = np.eye(3)
-    transition = np.eye(state.SIZE) + dt * a
+    transition = np.eye(filter_state.SIZE) + dt * a
     ours = covariance.copy()
     _propagate_covariance(ours, tuple(f), tuple(r.ravel()), dt)
     np.testing.assert_allclose(ours, transition @ covariance @ transition.T, atol=1e-13)
@@ -83,7 +90,7 @@ def test_scalar_updates_one_by_one_equal_the_joint_update():
     m = at_rest().memory
     m.covariance[:] = random_covariance(rng)
     before = m.covariance.copy()
-    h, y, variance = rng.normal(size=(3, state.SIZE)), rng.normal(size=3), np.array([0.3, 0.5, 0.2])
+    h, y, variance = rng.normal(size=(3, filter_state.SIZE)), rng.normal(size=3), np.array([0.3, 0.5, 0.2])
     nis = 0.0
     for row, innovation, v in zip(h, y, variance, strict=True):
         m.row[:] = row
@@ -106,15 +113,17 @@ def test_rows_of_acceleration_against_differences(axis):
     for i in range(3):
         small = np.eye(3)[i] * h
         turned = np.array(rotation_matrix(multiply(exp(tuple(small)), attitude))).reshape(3, 3)
-        assert m.row[state.THETA + i] == pytest.approx((turned @ force - r @ force)[axis] / h, abs=1e-5)
-        assert m.row[state.ACCELEROMETER + i] == pytest.approx((r @ (force - small) - r @ force)[axis] / h, abs=1e-5)
+        assert m.row[filter_state.THETA + i] == pytest.approx((turned @ force - r @ force)[axis] / h, abs=1e-5)
+        assert m.row[filter_state.ACCELEROMETER + i] == pytest.approx(
+            (r @ (force - small) - r @ force)[axis] / h, abs=1e-5
+        )
 
 
 def heading_innovation(attitude, iron):
     """Innovation of the magnetometer when the truth is level north and the estimate is not."""
     s = at_rest()
     s = s._replace(nominal=s.nominal._replace(attitude=attitude, magnetometer_bias=iron))
-    s.memory.covariance[:] = np.eye(state.SIZE) * 1e-30
+    s.memory.covariance[:] = np.eye(filter_state.SIZE) * 1e-30
     s = estimator.update_magnetometer(P._replace(gate=1e30), s, STANDARD.magnetic_field_world, 1.0, True)
     return s.memory
 
@@ -131,10 +140,10 @@ def test_row_of_the_heading_against_differences():
     for i in range(3):
         small = np.eye(3)[i] * h
         # An error theta of the estimate: the estimate is the truth turned back by it.
-        assert row[state.THETA + i] == pytest.approx(innovation(exp(tuple(-small)), ZERO) / h, abs=1e-5)
+        assert row[filter_state.THETA + i] == pytest.approx(innovation(exp(tuple(-small)), ZERO) / h, abs=1e-5)
         tesla = 1e-12
         change = innovation(NO_ROTATION, tuple(-np.eye(3)[i] * tesla)) / tesla
-        assert row[state.IRON + i] == pytest.approx(change, rel=1e-4, abs=1.0)
+        assert row[filter_state.IRON + i] == pytest.approx(change, rel=1e-4, abs=1.0)
 
 
 def ensemble(**arguments):
@@ -199,7 +208,13 @@ def test_instruments_without_errors_give_an_estimate_without_errors():
 
 
 SETTLED = slice(60, None)  # the look at the standing vehicle is told to be less sure than it could be
-DEGREES = {state.GPS: 3, state.GPS_VELOCITY: 3, state.BARO: 1, state.SONAR: 1, state.MAG: 1}
+DEGREES = {
+    filter_state.GPS: 3,
+    filter_state.GPS_VELOCITY: 3,
+    filter_state.BARO: 1,
+    filter_state.SONAR: 1,
+    filter_state.MAG: 1,
+}
 
 
 @pytest.mark.parametrize("agility", [1.0, 2.0])
@@ -212,7 +227,7 @@ def test_consistent_in_a_world_as_modelled(agility):
     for source, degrees in DEGREES.items():
         share, mean_inside = inside(flights.nis[:, SETTLED, source], degrees)
         assert mean_inside, source
-        assert source == state.SONAR or share > 0.9, source  # above 5 m no echo is used: the last NIS stays
+        assert source == filter_state.SONAR or share > 0.9, source  # above 5 m no echo is used: the last NIS stays
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
@@ -243,9 +258,11 @@ def test_position_alone_will_do():
 def test_doubt_is_only_for_what_lasts():
     s = at_rest()
     before = s.memory.covariance.copy()
-    s.memory.since[state.MAG] = 100
-    doubt.doubt(P, s.memory, state.MAG)
+    s.memory.since[filter_state.MAG] = 100
+    covariance_inflation.doubt(P, s.memory, filter_state.MAG)
     np.testing.assert_array_equal(s.memory.covariance, before)
-    s.memory.since[state.MAG] = 2600  # 10.4 s
-    doubt.doubt(P, s.memory, state.MAG)
-    assert np.all(np.diag(s.memory.covariance)[state.IRON : state.IRON + 3] > np.diag(before)[state.IRON])
+    s.memory.since[filter_state.MAG] = 2600  # 10.4 s
+    covariance_inflation.doubt(P, s.memory, filter_state.MAG)
+    assert np.all(
+        np.diag(s.memory.covariance)[filter_state.IRON : filter_state.IRON + 3] > np.diag(before)[filter_state.IRON]
+    )

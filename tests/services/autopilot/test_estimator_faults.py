@@ -4,8 +4,8 @@ import estimator_flight as ef
 import numpy as np
 import pytest
 
-from services.autopilot import estimator
-from services.sensors import registry
+from lapwing.services.autopilot import estimator
+from lapwing.services.sensors import registry
 
 START, STOP = 16.0, 22.0  # [s]
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from dynamics.environment import STANDARD
-from dynamics.lie.quaternion import exp, multiply, rotation_matrix
-from dynamics.vector import ZERO
-from services.autopilot import estimator
-from services.autopilot.estimator import fuse, gps, late, state
-from services.autopilot.estimator.late import Noise
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.lie.quaternion import exp, multiply, rotation_matrix
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import delayed_measurements, filter_state, fuse, gps_fusion
+from lapwing.services.autopilot.estimator.delayed_measurements import Noise
 
 P = estimator.PRESETS["rtk"]
 AGE = 25  # ticks by which a fix is late: 0.1 s
@@ -28,7 +28,7 @@ def predicted(s, ticks, force=REST):
 
 
 def velocity_std(s):
-    return np.sqrt(np.diag(s.memory.covariance)[state.VELOCITY : state.VELOCITY + 3])
+    return np.sqrt(np.diag(s.memory.covariance)[filter_state.VELOCITY : filter_state.VELOCITY + 3])
 
 
 def velocity_fix(s, velocity, tick):
@@ -46,15 +46,15 @@ def test_a_fix_of_before_an_impact_leaves_open_what_the_impact_did():
     hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s ago, 0.08 s before the impact
     assert np.all(velocity_std(hit) > 0.99 * before)
     after = velocity_fix(predicted(hit, 25), 1.0, 2)  # the first that was measured after it
-    assert after.memory.refused[state.GPS_VELOCITY] == 0
+    assert after.memory.refused[filter_state.GPS_VELOCITY] == 0
     assert np.all(velocity_std(after) < 0.05)
     assert after.nominal.velocity_world[2] == pytest.approx(1.0, abs=0.01)
 
 
 def random_memory(rng):
     m = at_rest().memory
-    a = rng.normal(size=(state.SIZE, state.SIZE))
-    m.covariance[:] = a @ a.T / state.SIZE
+    a = rng.normal(size=(filter_state.SIZE, filter_state.SIZE))
+    m.covariance[:] = a @ a.T / filter_state.SIZE
     return m
 
 
@@ -63,20 +63,20 @@ def test_the_covariance_against_dense_matrices(share):
     """The row sees the error now less what came in since, which has its part of the covariance with the row."""
     rng = np.random.default_rng(round(share * 10))
     m = random_memory(rng)
-    m.row[:] = rng.normal(size=state.SIZE)
+    m.row[:] = rng.normal(size=filter_state.SIZE)
     before, h, variance = m.covariance.copy(), m.row.copy(), 0.02
     since, force = Noise(0.8 * share, 0.3 * share, 0.2 * share, 0.05 * share, 0.02 * share), (7.0, 1.0, -2.0)
-    block = h[[state.VELOCITY, state.POSITION]]
+    block = h[[filter_state.VELOCITY, filter_state.POSITION]]
     now, noise = h @ before @ h, block @ np.array([[0.8, 0.3], [0.3, 0.2]]) @ block * share
     noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0  # 1^2 + 2^2: what the attitude turns onto the axis
     part = min(noise / now, 1.0)
-    s, largest = late.late_innovation_variances(m, 0, since, variance, force)
+    s, largest = delayed_measurements.late_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
     fuse.absorb(m, 0.7, s)
     gain = before @ h * (1.0 - part) / s
     np.testing.assert_allclose(m.correction, gain * 0.7, atol=1e-10)
-    rest, cross = np.eye(state.SIZE) - np.outer(gain, h), np.outer(before @ h * part, gain)
+    rest, cross = np.eye(filter_state.SIZE) - np.outer(gain, h), np.outer(before @ h * part, gain)
     joseph = rest @ before @ rest.T + (now * part + variance) * np.outer(gain, gain) + rest @ cross + (rest @ cross).T
     np.testing.assert_allclose(m.covariance, joseph, atol=1e-10)
     np.testing.assert_array_equal(m.covariance, m.covariance.T)
@@ -98,15 +98,15 @@ def test_rows_of_the_past_do_not_move_with_an_attitude_that_was_wrong_all_along(
     one, other = predicted(at_rest(), 100), predicted(at_rest(), 100)
     turned = multiply(exp(tuple(theta)), other.nominal.attitude)
     one, other = turning(one), turning(other._replace(nominal=other.nominal._replace(attitude=turned)))
-    off = np.zeros(state.SIZE)
-    off[state.THETA : state.THETA + 3] = theta
-    for at, name in ((state.VELOCITY, "velocity_world"), (state.POSITION, "position_world")):
+    off = np.zeros(filter_state.SIZE)
+    off[filter_state.THETA : filter_state.THETA + 3] = theta
+    for at, name in ((filter_state.VELOCITY, "velocity_world"), (filter_state.POSITION, "position_world")):
         off[at : at + 3] = np.subtract(getattr(other.nominal, name), getattr(one.nominal, name))
-    _, _, delay, weighted, mean = gps._past(P, one, AGE)
+    _, _, delay, weighted, mean = gps_fusion._past(P, one, AGE)
     matrix = rotation_matrix(one.nominal.attitude)
     for row, force, at in (
-        (late.late_velocity_row, mean, state.VELOCITY),
-        (late.late_position_row, weighted, state.POSITION),
+        (delayed_measurements.late_velocity_row, mean, filter_state.VELOCITY),
+        (delayed_measurements.late_position_row, weighted, filter_state.POSITION),
     ):
         for axis in range(3):
             row(one.memory, force, matrix, axis, delay)
@@ -119,7 +119,7 @@ def test_noise_of_the_attitude_counts_by_what_it_has_left_to_do():
     for k in range(AGE):
         rate = (0.0, 0.0, 1e-9 * k)  # no two readings alike
         s = estimator.predict(P, s, rate, REST, 1e-2 if k == 4 else 0.0, 1e-12, True)
-    since, noise = gps._noise_since(P, s, AGE), (P.interval * 0.1) ** 2
+    since, noise = gps_fusion._noise_since(P, s, AGE), (P.interval * 0.1) ** 2
     left = (AGE - (AGE - 1 - 4)) * P.interval  # of the delay, before the fifth tick
     assert since.attitude_velocity == pytest.approx(noise * left**2, rel=1e-3)
     assert since.attitude_position == pytest.approx(noise * left**4 / 4.0, rel=1e-3)
@@ -127,9 +127,9 @@ def test_noise_of_the_attitude_counts_by_what_it_has_left_to_do():
 
 def test_an_exact_measurement_of_the_past_leaves_just_what_came_in_since():
     m = at_rest().memory
-    m.covariance[:] = np.eye(state.SIZE)
+    m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0
-    m.row[state.VELOCITY + 1] = 1.0
-    s, _ = late.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
+    m.row[filter_state.VELOCITY + 1] = 1.0
+    s, _ = delayed_measurements.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
     fuse.absorb(m, 0.3, s)
-    assert m.covariance[state.VELOCITY + 1, state.VELOCITY + 1] == pytest.approx(0.25)
+    assert m.covariance[filter_state.VELOCITY + 1, filter_state.VELOCITY + 1] == pytest.approx(0.25)

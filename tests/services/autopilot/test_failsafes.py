@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from flights import REJECTED, UP, at, command, fly, height, mode, place, results, said
 
-from services.table import load
+from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.long
 
 def airframe(tmp_path, capacity):
     """The delivery drone with a battery of another capacity [A s]: its file, as an override."""
-    text = Path("scenes/vehicles/delivery_drone.toml").read_text(encoding="utf-8")
+    text = Path("lapwing/scenes/vehicles/delivery_drone.toml").read_text(encoding="utf-8")
     path = tmp_path / "small.toml"
     path.write_text(text.replace("capacity = 36000.0", f"capacity = {capacity}"), encoding="utf-8")
     return f"vehicle.airframe={path}"

@@ -20,9 +20,9 @@ from flights import (
     said,
 )
 
-from dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
-from services.common.parameters import table
-from services.table import load
+from lapwing.dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
+from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.scene_resolver import load
 
 pytestmark = pytest.mark.long
 

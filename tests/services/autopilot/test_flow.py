@@ -8,13 +8,13 @@ import pytest
 from flights import ENABLED, error, fly_by_sensors, inject, mode, place, said
 
 import lapwing
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import exp, from_roll_pitch_yaw, multiply, rotation_matrix
-from dynamics.noise import TURN_ON, normal3, stream_key
-from services.autopilot import estimator
-from services.autopilot.estimator import flow, state
-from services.common.failures import OFF
-from services.sensors import gps, imu, magnetometer, optical_flow, sonar
+from lapwing.dynamics.lie.quaternion import exp, from_roll_pitch_yaw, multiply, rotation_matrix
+from lapwing.dynamics.noise import TURN_ON, normal3, stream_key
+from lapwing.kernels import kernel
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import filter_state, flow_fusion
+from lapwing.services.common.failure_types import OFF
+from lapwing.services.sensors import gps, imu, magnetometer, optical_flow, sonar
 
 SEEDS = 40
 OUTAGE, END = 15.0, 35.0  # [s]
@@ -34,15 +34,15 @@ def test_row_against_differences_and_the_sensor(axis):
         ahead, left, _ = np.array(rotation_matrix(q)).reshape(3, 3).T @ v
         return (left / distance, -ahead / distance)[axis]
 
-    expected = flow.flow_row(memory, r, tuple(velocity), axis, distance)
+    expected = flow_fusion.flow_row(memory, r, tuple(velocity), axis, distance)
     assert expected == pytest.approx(seen(attitude, velocity))
     h = 1e-6
     for i in range(3):
         small = np.eye(3)[i] * h
         turned = seen(multiply(exp(tuple(small)), attitude), velocity)
-        assert memory.row[state.THETA + i] == pytest.approx((turned - expected) / h, abs=1e-5)
+        assert memory.row[filter_state.THETA + i] == pytest.approx((turned - expected) / h, abs=1e-5)
         faster = seen(attitude, velocity + small)
-        assert memory.row[state.VELOCITY + i] == pytest.approx((faster - expected) / h, abs=1e-5)
+        assert memory.row[filter_state.VELOCITY + i] == pytest.approx((faster - expected) / h, abs=1e-5)
 
 
 @kernel
@@ -112,7 +112,7 @@ def test_without_a_receiver_the_flow_keeps_the_drift_small_and_the_filter_knows_
     velocity = with_flow[:, out, 3:5, None]
     nees = (velocity * np.linalg.solve(covariance[horizontal], velocity)).sum(axis=(-2, -1))
     assert 0.3 < nees.mean() / 2.0 < 1.5
-    lost = 1 << state.GPS
+    lost = 1 << filter_state.GPS
     assert not np.any(health[:, out] & lost)
     assert np.all(health_without[:, out] & lost)
 

@@ -1,8 +1,8 @@
 import pytest
 from closed_loop import AIRFRAME
 
-from services.autopilot.gains import FOLDER, load, names
-from services.autopilot.law import build
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import FOLDER, load, names
 
 
 def test_the_paper_s_set_is_table_6():

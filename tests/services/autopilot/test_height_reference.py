@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from flights import ENABLED, NAN, command, error, fly, fly_by_sensors, height, inject, place
 
-from dynamics.errors import KeyedError
-from services.autopilot import estimator
-from services.autopilot.config import NEEDED
-from services.autopilot.estimator import state
-from services.common.failures import OFF, WRONG
-from services.table import load
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import filter_state
+from lapwing.services.autopilot.schema import NEEDED
+from lapwing.services.common.failure_types import OFF, WRONG
+from lapwing.services.scene_resolver import load
 
 SONAR = "autopilot.parameters.EKF2_HGT_REF=2"
 # the ground station's, whose plant over a slope is compiled anyway
@@ -34,16 +34,16 @@ def test_the_ground_moves_the_height_and_leaves_the_barometers_sum_alone():
     p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
     s = estimator.initial(p, estimator.new_memory(), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
     s = s._replace(nominal=s.nominal._replace(velocity_world=(3.0, 4.0, 1.0)))
-    root = rng.normal(size=(state.SIZE, state.SIZE))
+    root = rng.normal(size=(filter_state.SIZE, filter_state.SIZE))
     s.memory.covariance[:] = root @ root.T
-    s.memory.since[state.SONAR] = 25
+    s.memory.since[filter_state.SONAR] = 25
     before = s.memory.covariance.copy()
     estimator.follow_ground(p, s)
-    z, b = state.POSITION + 2, state.BAROMETER
+    z, b = filter_state.POSITION + 2, filter_state.BAROMETER
     added = s.memory.covariance - before
     dt = 25 * p.interval
     assert added[z, z] == pytest.approx((0.5**2 * 5.0**2 + 0.5**2) * dt**2)
-    total = np.zeros(state.SIZE)
+    total = np.zeros(filter_state.SIZE)
     total[[z, b]] = 1.0
     assert total @ added @ total == pytest.approx(0.0, abs=1e-12)
     added[np.ix_([z, b], [z, b])] = 0.0

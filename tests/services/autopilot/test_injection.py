@@ -25,10 +25,10 @@ from flights import (
     scripted,
 )
 
-from cosim.graph import Graph
-from cosim.single import PAGE
-from services.autopilot.injection.memory import DELAY, SLOWED
-from services.common.failures import (
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.services.autopilot.failure_injection.failure_state import DELAY, SLOWED
+from lapwing.services.common.failure_types import (
     DELAYED,
     GARBAGE,
     INTERMITTENT,
@@ -41,8 +41,8 @@ from services.common.failures import (
     UNITS,
     WRONG,
 )
-from services.processes import create_all
-from services.table import load, resolve
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long

@@ -21,10 +21,10 @@ from flights import (
     said,
 )
 
-from services.autopilot.config import NEEDED
-from services.autopilot.injection.memory import SLOWED
-from services.autopilot.injection.readings import EXCESS_DYNAMIC, EXCESS_RANGE
-from services.common.failures import DELAYED, GARBAGE, INTERMITTENT, KINDS, OFF, SLOW, STUCK, WRONG
+from lapwing.services.autopilot.failure_injection.failure_state import SLOWED
+from lapwing.services.autopilot.failure_injection.reading_failures import EXCESS_DYNAMIC, EXCESS_RANGE
+from lapwing.services.autopilot.schema import NEEDED
+from lapwing.services.common.failure_types import DELAYED, GARBAGE, INTERMITTENT, KINDS, OFF, SLOW, STUCK, WRONG
 
 pytestmark = pytest.mark.long
 

@@ -5,9 +5,9 @@ import pytest
 from closed_loop import AIRFRAME, TICK
 from scipy.signal import cont2discrete
 
-from services.autopilot.gains import load
-from services.autopilot.law import build
-from services.autopilot.margins import FREQUENCIES, margins, open_loops
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops
 
 
 def test_integrator_with_delay_is_the_closed_form():

@@ -5,9 +5,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from services.autopilot.gains import load
-from services.autopilot.law import build
-from services.autopilot.mixer import Demands, mix, saturate
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.mixer import Demands, mix, saturate
 
 SHARES = build(load("paper"), AIRFRAME).shares[0]
 TOP = 48.0

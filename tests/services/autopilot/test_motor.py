@@ -3,7 +3,7 @@ import math
 import pytest
 from closed_loop import MOTOR
 
-from services.autopilot.motor import thrust_at, voltage
+from lapwing.services.autopilot.motor import thrust_at, voltage
 
 
 def test_voltage_follows_belt_and_speed_constant():

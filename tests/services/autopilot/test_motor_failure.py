@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dynamics.kernel import uncompiled
-from services.autopilot import motor_failure as watch
-from services.autopilot.law import Airframe
-from services.autopilot.motor import Motor
+from lapwing.kernels import uncompiled
+from lapwing.services.autopilot import motor_failure as watch
+from lapwing.services.autopilot.controller_parameters import Airframe
+from lapwing.services.autopilot.motor import Motor
 
 ARM, TICK = 0.35, 0.004
 FRAME = Airframe(

@@ -1,6 +1,6 @@
 import pytest
 
-from services.autopilot.pid import Pid, integrate, output
+from lapwing.services.autopilot.pid import Pid, integrate, output
 
 
 def test_output_on_a_ramp_of_error_is_the_closed_form():

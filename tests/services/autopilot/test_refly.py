@@ -5,11 +5,11 @@ from pathlib import Path
 
 from flights import OPERATED, UP, command, scripted
 
-from cosim.log import LogReader
-from cosim.serialise import first_difference
-from lapwing.runs.refly import recorded_setup, refly
-from lapwing.runs.single import fly_single
-from services.table import load, resolve
+from lapwing.cosim.config.serialise import first_difference
+from lapwing.cosim.log import LogReader
+from lapwing.runs.resimulate import recorded_setup, refly
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.scene_resolver import load, resolve
 
 SCENES = Path(__file__).parents[3] / "scenes"
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from cosim.scene import SceneError
-from dynamics.vehicles import performance
-from dynamics.vehicles.airframe import load_airframe
-from services.common.sections import SHIPPED
-from services.table import load
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.vehicles import performance
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.scene_resolver import load
 
 DRONE = load_airframe(SHIPPED / "vehicles" / "delivery_drone.toml")
 ELECTRIC = {"effects.motor_electrics": {}}

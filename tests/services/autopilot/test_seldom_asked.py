@@ -3,9 +3,9 @@
 import pytest
 from flights import ENABLED, NAN, RATE, SCENE, command, inject, item
 
-from services.autopilot.commanding import Commanding
-from services.common.failures import GARBAGE, OFF, SOUND, STUCK, WRONG
-from services.table import load, resolve
+from lapwing.services.autopilot.commander_block import Commanding
+from lapwing.services.common.failure_types import GARBAGE, OFF, SOUND, STUCK, WRONG
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from cosim.scene import SceneError
-from dynamics.effects._axes import thrust_wrench
-from dynamics.effects._types import Loads
-from dynamics.kernel import uncompiled
-from dynamics.vehicles import multirotor
-from services.autopilot import law
-from services.autopilot.allocation import effectiveness, tilted_effectiveness
-from services.autopilot.known_airframe import known_airframe
-from services.common.vehicle import airframe
-from services.table import load, resolve
-from studies.fly import fly
-from studies.tune.linearise import hover
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.effects._axes import thrust_wrench
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.kernels import uncompiled
+from lapwing.services.autopilot import controller_parameters
+from lapwing.services.autopilot.allocation import effectiveness, tilted_effectiveness
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.simulate import fly
+from lapwing.studies.tune.linearise import hover
 
 SCENE = "hexacopter_tilted"
 
@@ -25,7 +25,7 @@ def test_the_autopilot_knows_the_force_and_the_torques_of_the_plant():
     thrust = np.array([3.0, 4.0, 5.0, 2.0, 3.5, 4.5])
     loads = Loads(tuple(map(float, thrust)), tuple(map(float, known.torque_per_thrust * thrust)))
     force, torque = uncompiled(thrust_wrench)(multirotor.parameters(frame).layout, loads)
-    assert law.rotor_effectiveness(known) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
+    assert controller_parameters.rotor_effectiveness(known) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
 
 
 def test_axes_along_z_are_those_of_rotors_without_axes():
@@ -44,7 +44,9 @@ def test_a_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     assert lift == pytest.approx(2.4 * 9.80665, rel=0.01)
     assert abs(flown.truth.position[hover][:, :2]).max() < 0.1
     untilted = known_airframe(load("hexacopter"))
-    assert law.moments(known_airframe(load(SCENE)))[2] > 4.5 * law.moments(untilted)[2]
+    assert (
+        controller_parameters.moments(known_airframe(load(SCENE)))[2] > 4.5 * controller_parameters.moments(untilted)[2]
+    )
 
 
 def test_the_spin_up_reaction_is_that_of_the_plant():

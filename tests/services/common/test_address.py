@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.common.address import host_and_port, is_loopback
+from lapwing.services.common.address import host_and_port, is_loopback
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from cosim.scene import SceneError
-from services.common.vehicle import rotor_constants
-from services.table import load
+from lapwing.cosim.scene import SceneError
+from lapwing.services.common.vehicle_schema import rotor_constants
+from lapwing.services.scene_resolver import load
 
 TABLE = '[effects.rotor_table]\nfile = "prop.txt"'
 
@@ -15,7 +15,7 @@ TABLE = '[effects.rotor_table]\nfile = "prop.txt"'
 @pytest.fixture
 def path(tmp_path):
     found = tmp_path / "table.toml"
-    found.write_text(Path("scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", TABLE))
+    found.write_text(Path("lapwing/scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", TABLE))
     return found
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pymap3d
 import pytest
 
-from cosim.scene import SceneError
-from dynamics.terrain import surface
-from services.common.environment import environment
-from services.table import load
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.terrain import surface
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.scene_resolver import load
 
 rasterio = pytest.importorskip("rasterio")
 

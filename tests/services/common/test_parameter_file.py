@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from cosim.scene import SceneError
-from lapwing.runs.single import fly_single
-from messages import OperatorCommand
-from services.common.parameter_file import read, write
-from services.common.parameters import table
-from services.table import load, resolve
+from lapwing.cosim.scene import SceneError
+from lapwing.messages import OperatorCommand
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.common.parameter_file import read, write
+from lapwing.services.scene_resolver import load, resolve
 
-HOVER = Path("scenes/hover.toml")
+HOVER = Path("lapwing/scenes/hover.toml")
 OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false", "run.duration=1.0"]
 
 
@@ -76,6 +76,6 @@ def test_what_a_run_ended_with_is_saved_and_named_by_a_scene(tmp_path):
 
 
 def test_a_file_that_is_neither_is_refused(tmp_path):
-    result = lapwing("parameters", "scenes/os4_motors.toml")
+    result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "nobody steers there" in result.stderr

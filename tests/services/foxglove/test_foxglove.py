@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from cosim.log import LogReader, LogWriter
-from messages import Clock, Imu, header, stamp
-from services.foxglove.server import Server, check_address, parse_address
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.messages import Clock, Imu, header, stamp
+from lapwing.services.foxglove.server import Server, check_address, parse_address
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import Client, patient
 

@@ -5,9 +5,9 @@ import json
 import jsonschema
 import pytest
 
-from services.mavlink.component_metadata import ACTUATORS, GENERAL, PARAMETERS, files
-from services.mavlink.resolve import describe
-from services.table import load
+from lapwing.services.mavlink.component_metadata import ACTUATORS, GENERAL, PARAMETERS, files
+from lapwing.services.mavlink.resolve import describe
+from lapwing.services.scene_resolver import load
 
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 

@@ -3,12 +3,12 @@
 import math
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from messages import CommandAck
-from services.common.failures import KINDS, UNITS
-from services.mavlink.dialect import mavlink
-from services.mavlink.flavours import ardupilot, px4
+from lapwing.messages import CommandAck
+from lapwing.services.common.failure_types import KINDS, UNITS
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.firmware import ardupilot, px4
 
 NAN = math.nan
 RESTING_HEIGHT = 0.35  # [m] the body origin of the delivery drone above the ground

@@ -6,22 +6,22 @@ import re
 import struct
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from messages import Actuators, VehicleState
-from messages.topics import ACTUATORS, TRUTH
-from services.autopilot.commander.failsafes import FAILSAFES
-from services.autopilot.commander.mode_table import MODES
-from services.autopilot.estimator import NAMES
-from services.common import spoken
-from services.common.events import KINDS
-from services.mavlink.component_metadata import EVENTS, GENERAL, files
-from services.mavlink.dialect import mavlink, message_class
-from services.mavlink.event_log import KEPT, EventLog
-from services.mavlink.event_metadata import events
-from services.mavlink.events import arming_checks, definitions, flight
-from services.mavlink.resolve import describe
-from services.table import load
+from lapwing.messages import Actuators, VehicleState
+from lapwing.messages.topics import ACTUATORS, TRUTH
+from lapwing.services.autopilot.commander.failsafes import FAILSAFES
+from lapwing.services.autopilot.commander.mode_table import MODES
+from lapwing.services.autopilot.estimator import NAMES
+from lapwing.services.common import status_texts
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.services.mavlink.component_metadata import EVENTS, GENERAL, files
+from lapwing.services.mavlink.dialect import mavlink, message_class
+from lapwing.services.mavlink.event_log import KEPT, EventLog
+from lapwing.services.mavlink.event_metadata import events
+from lapwing.services.mavlink.events import arming_checks, definitions, flight
+from lapwing.services.mavlink.resolve import describe
+from lapwing.services.scene_resolver import load
 
 NUMBERS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
 
@@ -122,7 +122,7 @@ def test_a_flight_is_told():
     bench.step()
     bench.vehicle.mode = "orbit"
     bench.step()
-    bench.vehicle.status = {"failsafe": True, "text": spoken.SETPOINTS_LOST, "mode": "hold"}
+    bench.vehicle.status = {"failsafe": True, "text": status_texts.SETPOINTS_LOST, "mode": "hold"}
     bench.step()
     bench.vehicle.status = {"battery_warning": 2, "failed_motor": 3}
     bench.vehicle.mode = "land"
@@ -135,7 +135,7 @@ def test_a_flight_is_told():
         "Takeoff detected",
         "Flight mode: orbit",
         "Flight mode: hold",
-        f"Failsafe: {spoken.SETPOINTS_LOST}, now hold",
+        f"Failsafe: {status_texts.SETPOINTS_LOST}, now hold",
         "Flight mode: land",
         "Low battery",
         "Critical battery",
@@ -147,7 +147,7 @@ def test_a_flight_is_told():
     assert not one.lost
 
 
-@pytest.mark.parametrize("reason", spoken.FAILSAFES)
+@pytest.mark.parametrize("reason", status_texts.FAILSAFES)
 def test_every_failsafe_has_a_number(reason):
     bench = Bench()
     one = reader(bench)
@@ -215,9 +215,9 @@ def test_sequence_numbers_begin_again():
 def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
     bench = Bench()
     bench.vehicle.prearm = (
-        spoken.NO_READINGS.format("gps"),
-        f"{spoken.BATTERY_LOW}: 6%",
-        spoken.NOT_LEVEL,
+        status_texts.NO_READINGS.format("gps"),
+        f"{status_texts.BATTERY_LOW}: 6%",
+        status_texts.NOT_LEVEL,
         "a reason of tomorrow",
     )
     one = reader(bench)
@@ -293,13 +293,13 @@ def test_ground_stations_of_ardupilot_are_told_by_texts_alone():
     assert not station.all("EVENT")
     assert not station.all("CURRENT_EVENT_SEQUENCE")
     assert station.last("STATUSTEXT").text == "armed"
-    found = files(describe(load("scenes/hover.toml", ["mavlink.flavour=ardupilot"])))
+    found = files(describe(load("lapwing/scenes/hover.toml", ["mavlink.flavour=ardupilot"])))
     assert EVENTS not in found
     assert GENERAL in found
 
 
 def test_all_that_the_autopilot_knows_has_its_number():
-    assert {failsafe.reason for failsafe in FAILSAFES} == set(spoken.FAILSAFES)
+    assert {failsafe.reason for failsafe in FAILSAFES} == set(status_texts.FAILSAFES)
     assert set(MODES) <= set(flight.MODES)
     assert set(NAMES) <= set(arming_checks.SOURCES)
     entered = [mode for mode in arming_checks.MODES if not MODES[mode].needs_position]
@@ -312,7 +312,7 @@ def test_every_kind_that_can_be_told_of_a_flight_has_an_event():
 
 
 def test_the_metadata_keeps_the_rules_of_libevents():
-    described = json.loads(files(describe(load("scenes/groundstation.toml")))[EVENTS])
+    described = json.loads(files(describe(load("lapwing/scenes/groundstation.toml")))[EVENTS])
     assert described["version"] == 2
     component = described["components"]["1"]
     assert re.fullmatch("[a-z][a-z0-9_]*", component["namespace"])

@@ -4,14 +4,14 @@ import json
 import struct
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 from pymavlink.dialects.v20 import all as mavlink
 
-from services.mavlink.component_metadata import GENERAL, PARAMETERS, files
-from services.mavlink.dialect import id_of
-from services.mavlink.file_server import DATA, FileServer, crc32
-from services.mavlink.resolve import describe
-from services.table import load
+from lapwing.services.mavlink.component_metadata import GENERAL, PARAMETERS, files
+from lapwing.services.mavlink.dialect import id_of
+from lapwing.services.mavlink.file_server import DATA, FileServer, crc32
+from lapwing.services.mavlink.resolve import describe
+from lapwing.services.scene_resolver import load
 
 CONTENT = bytes(range(256)) * 100
 OPEN, READ, BURST = 4, 5, 15
@@ -155,7 +155,7 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
 
 
 def test_the_metadata_says_what_needs_a_restart_and_what_cannot_be_set():
-    content = files(describe(load("scenes/groundstation.toml")))[PARAMETERS]
+    content = files(describe(load("lapwing/scenes/groundstation.toml")))[PARAMETERS]
     described = {p["name"]: p for p in json.loads(content)["parameters"]}
     assert [name for name, p in described.items() if p.get("rebootRequired")] == ["EKF2_HGT_REF"]
     assert described["SYS_AUTOSTART"]["readOnly"]
@@ -163,5 +163,5 @@ def test_the_metadata_says_what_needs_a_restart_and_what_cannot_be_set():
 
 
 def test_a_scenes_metadata_is_json_without_nan():
-    for content in files(describe(load("scenes/groundstation.toml"))).values():
+    for content in files(describe(load("lapwing/scenes/groundstation.toml"))).values():
         json.loads(content, parse_constant=pytest.fail)

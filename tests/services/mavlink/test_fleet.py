@@ -5,14 +5,14 @@ import subprocess
 import sys
 
 import pytest
+from fake_vehicle import free_port
 from pymavlink import mavutil
-from stand_in import free_port
 
-from cosim.log import LogReader
-from lapwing.runs.refly import refly
-from messages import OperatorInput, VehicleState
-from services.mavlink.dialect import mavlink
-from services.mavlink.links import numbered
+from lapwing.cosim.log import LogReader
+from lapwing.messages import OperatorInput, VehicleState
+from lapwing.runs.resimulate import refly
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.links import numbered
 
 SETS = ("autopilot.trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from services.mavlink.frames import euler, saturated, swap_attitude, swap_body, swap_world, swap_yaw, wrap
+from lapwing.services.mavlink.frames import euler, saturated, swap_attitude, swap_body, swap_world, swap_yaw, wrap
 
 C = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
 D = np.diag([1, -1, -1.0])

@@ -5,12 +5,12 @@ import struct
 from collections import Counter
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from services.mavlink.channel import Channel, Signature
-from services.mavlink.dialect import mavlink
-from services.mavlink.endpoint import MAX_DATAGRAM
-from services.mavlink.framing import frame
+from lapwing.services.mavlink.channel import Channel, Signature
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.endpoint import MAX_DATAGRAM
+from lapwing.services.mavlink.framing import frame
 
 SYSTEM = 7
 SIZES = {"b": 8, "B": 8, "h": 16, "H": 16, "i": 32, "I": 32, "q": 64, "Q": 64}

@@ -5,14 +5,14 @@ import socket
 import time
 
 import pytest
-from bench import Bench, item
+from adapter_harness import Bench, item
+from fake_vehicle import flying, free_port, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from stand_in import flying, free_port, until
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.protocols import handlers
-from services.mavlink.protocols.commands import RULES
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.protocols import handlers
+from lapwing.services.mavlink.protocols.commands import RULES
 
 NAN, INF = float("nan"), float("inf")
 

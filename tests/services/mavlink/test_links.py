@@ -6,11 +6,11 @@ import socket
 import time
 
 import pytest
-from stand_in import flying, free_port, until
+from fake_vehicle import flying, free_port, until
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.links.link import Budget
-from services.mavlink.pacing import Pacing
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.links.link import Budget
+from lapwing.services.mavlink.telemetry_timing import Pacing
 
 
 def frame():

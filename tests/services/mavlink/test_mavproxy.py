@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pymavlink
 import pytest
-from stand_in import flying, free_port, until
+from fake_vehicle import flying, free_port, until
 
 pytestmark = pytest.mark.long
 

@@ -5,7 +5,7 @@ import math
 import socket
 
 import pytest
-from stand_in import PARAMETERS, flying, free_port
+from fake_vehicle import PARAMETERS, flying, free_port
 
 mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
 from mavsdk.action import ActionError, OrbitYawBehavior  # noqa: E402

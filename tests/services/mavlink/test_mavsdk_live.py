@@ -12,7 +12,7 @@ import sys
 from itertools import pairwise
 
 import pytest
-from stand_in import free_port
+from fake_vehicle import free_port
 
 mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
 from mavsdk.action import ActionError  # noqa: E402
@@ -25,12 +25,12 @@ from mavsdk.offboard import (  # noqa: E402
 )
 from mavsdk.param import ParamError  # noqa: E402
 
-from cosim.log import LogReader  # noqa: E402
-from lapwing.runs.refly import refly  # noqa: E402
+from lapwing.cosim.log import LogReader  # noqa: E402
+from lapwing.runs.resimulate import refly  # noqa: E402
 
 pytestmark = pytest.mark.long
 
-SCENE = "scenes/groundstation.toml"
+SCENE = "lapwing/scenes/groundstation.toml"
 END = 150.0  # [s] of wall time a session is held to have failed after
 SPEED = 3.0  # simulated seconds per second
 

@@ -3,13 +3,13 @@
 import math
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from messages import CommandAck, CommandAcks, MissionItem, OperatorCommand, OperatorInput, Vector3, header
-from messages.topics import COMMAND_ACKS, OPERATOR
-from services.mavlink.coordinates import Datum
-from services.mavlink.mission_export import to_mavlink
-from services.mavlink.mission_import import from_mavlink
+from lapwing.messages import CommandAck, CommandAcks, MissionItem, OperatorCommand, OperatorInput, Vector3, header
+from lapwing.messages.topics import COMMAND_ACKS, OPERATOR
+from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.mavlink.mission_export import to_mavlink
+from lapwing.services.mavlink.mission_import import from_mavlink
 
 NAN = math.nan
 

@@ -3,14 +3,14 @@
 import struct
 
 import pytest
-from bench import Bench
-from stand_in import PARAMETERS
+from adapter_harness import Bench
+from fake_vehicle import PARAMETERS
 
-from services.common.parameters import table
-from services.mavlink.dialect import mavlink
-from services.mavlink.px4_facts import px4_facts
-from services.mavlink.resolve import describe
-from services.table import load
+from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.px4_facts import px4_facts
+from lapwing.services.mavlink.resolve import describe
+from lapwing.services.scene_resolver import load
 
 ASKED = {  # by QGroundControl's PX4 plug-in of a multicopter, where a lack opens a dialog; by its files, 2020 to now
     "PX4AutoPilotPlugin.cc": "SYS_HITL COM_RC_IN_MODE",
@@ -56,12 +56,12 @@ def facts(scene, *overrides):
 
 @pytest.mark.parametrize("page", ASKED)
 def test_everything_that_the_pages_ask_for_is_there(page):
-    scene = load("scenes/groundstation.toml")
-    assert not set(ASKED[page].split()) - set(facts("scenes/groundstation.toml")) - set(table(scene))
+    scene = load("lapwing/scenes/groundstation.toml")
+    assert not set(ASKED[page].split()) - set(facts("lapwing/scenes/groundstation.toml")) - set(table(scene))
 
 
 def test_nothing_asks_for_set_up():
-    found = facts("scenes/groundstation.toml")
+    found = facts("lapwing/scenes/groundstation.toml")
     assert found["SYS_AUTOSTART"] == 4001
     assert all(found[f"CAL_{name}0_ID"] for name in ("GYRO", "ACC", "MAG"))
     assert found["COM_RC_IN_MODE"] == 1
@@ -69,17 +69,17 @@ def test_nothing_asks_for_set_up():
 
 
 def test_what_is_not_fitted_says_so():
-    found = facts("scenes/hover.toml")
+    found = facts("lapwing/scenes/hover.toml")
     assert found["BAT1_SOURCE"] == -1
     assert "BAT1_V_CHARGED" not in found
     assert found["SYS_HAS_NUM_DIST"] == 0
-    assert facts("scenes/delivery_mission.toml")["SYS_HAS_NUM_DIST"] == 1
+    assert facts("lapwing/scenes/delivery_mission.toml")["SYS_HAS_NUM_DIST"] == 1
     assert found["PD_GRIPPER_EN"] == 0  # QGroundControl hides the button
-    assert facts("scenes/delivery_full.toml")["PD_GRIPPER_EN"] == 1
+    assert facts("lapwing/scenes/delivery_full.toml")["PD_GRIPPER_EN"] == 1
 
 
 def test_names_fit_into_their_field_and_none_is_there_twice():
-    names = [fact.name for fact in px4_facts(describe(load("scenes/groundstation.toml")))]
+    names = [fact.name for fact in px4_facts(describe(load("lapwing/scenes/groundstation.toml")))]
     assert max(map(len, names)) <= 16
     assert len(set(names)) == len(names)
 

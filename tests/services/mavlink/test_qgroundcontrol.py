@@ -8,11 +8,11 @@ import math
 from pathlib import Path
 
 import pytest
-from bench import Station, item
-from flown import Flown
+from adapter_harness import Station, item
+from autopilot_harness import Flown
 
-from services.mavlink.dialect import mavlink
-from services.mavlink.flavours import px4
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.firmware import px4
 
 pytestmark = pytest.mark.long
 

@@ -3,13 +3,13 @@
 import math
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 from pymavlink.dialects.v20 import all as mavlink
 
-from messages import Actuators, MagneticField, Setpoint, Vector3, VehicleState, header
-from messages.topics import ACTUATORS, IMU, MAG, SETPOINT, TRUTH
-from messages.types import Imu
-from services.mavlink.dialect import id_of, message_class
+from lapwing.messages import Actuators, MagneticField, Setpoint, Vector3, VehicleState, header
+from lapwing.messages.topics import ACTUATORS, IMU, MAG, SETPOINT, TRUTH
+from lapwing.messages.types import Imu
+from lapwing.services.mavlink.dialect import id_of, message_class
 
 NAN = math.nan
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED

@@ -11,14 +11,14 @@ import time
 from pathlib import Path
 
 import pytest
+from fake_vehicle import StandIn, free_port, until
 from pymavlink import mavutil
-from stand_in import StandIn, free_port, until
 
-from cosim.log import LogReader, LogWriter
-from lapwing.runs.single import fly_single
-from services.mavlink.dialect import mavlink
-from services.mavlink.links import check
-from services.table import load, resolve
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.links import check
+from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.participants import participants
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.long
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-HOVER = "scenes/hover.toml"
+HOVER = "lapwing/scenes/hover.toml"
 
 
 def run(tmp_path, key_prefix, *more, **options):
@@ -164,7 +164,7 @@ def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
 def test_the_mission_of_a_plan_can_be_downloaded(tmp_path):
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "scenes/plans/delivery.plan", "--speed", "2"]
+    more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "lapwing/scenes/plans/delivery.plan", "--speed", "2"]
     with run(tmp_path, "test-mavlink-plan", *more) as process:
         heard(station, "HEARTBEAT")
         station.mav.mission_request_list_send(1, 1, 0)

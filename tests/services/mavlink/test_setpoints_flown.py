@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from bench import Station
-from flown import Flown
+from adapter_harness import Station
+from autopilot_harness import Flown
 
 pytestmark = pytest.mark.long
 

@@ -3,10 +3,10 @@
 import hashlib
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from services.mavlink.channel import read_key
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.channel import read_key
+from lapwing.services.mavlink.dialect import mavlink
 
 KEY = hashlib.sha256(b"correct horse").digest()
 REFUSED = "unsigned, forged or replayed"

@@ -1,8 +1,8 @@
 """Before the vehicle speaks: the link is there, says that it starts, and serves what needs no vehicle."""
 
-from bench import Bench
+from adapter_harness import Bench
 
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.dialect import mavlink
 
 
 def test_heartbeats_say_that_it_starts_once_a_second_until_it_speaks():

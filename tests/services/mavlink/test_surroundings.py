@@ -3,12 +3,12 @@
 import math
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from messages import FluidPressure, NavSatFix, NavSatStatus, OpticalFlow, Range, header
-from messages.topics import AIRSPEED, AIRSPEED_RECEIVED, GPS, OPTICAL_FLOW, RANGEFINDER, SONAR
-from services.mavlink.dialect import mavlink
-from services.mavlink.telemetry.surroundings import orientation
+from lapwing.messages import FluidPressure, NavSatFix, NavSatStatus, OpticalFlow, Range, header
+from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, GPS, OPTICAL_FLOW, RANGEFINDER, SONAR
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.telemetry.external_sensors import orientation
 
 HEAD = header(0, "drone1")
 SENSORS = ("imu", "magnetometer", "gps", "barometer", "sonar", "rangefinder", "optical_flow", "airspeed")

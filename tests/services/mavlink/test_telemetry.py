@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from bench import Bench
+from adapter_harness import Bench
 
-from messages import BatteryState, Vector3, VehicleState
-from messages.topics import BATTERY, TRUTH
-from services.mavlink.dialect import mavlink
+from lapwing.messages import BatteryState, Vector3, VehicleState
+from lapwing.messages.topics import BATTERY, TRUTH
+from lapwing.services.mavlink.dialect import mavlink
 
 
 def shown(bench, kind, steps=60):

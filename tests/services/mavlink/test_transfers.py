@@ -5,10 +5,10 @@ import struct
 import threading
 
 import pytest
-from bench import Bench, Station, item
-from stand_in import PARAMETERS, flying, free_port, until
+from adapter_harness import Bench, Station, item
+from fake_vehicle import PARAMETERS, flying, free_port, until
 
-from services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.dialect import mavlink
 
 BAD = {"loss": 0.1, "twice": 0.1}
 

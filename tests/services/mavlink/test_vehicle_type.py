@@ -1,9 +1,9 @@
 import pytest
 
-from services.mavlink.px4_facts import px4_facts
-from services.mavlink.telemetry.state import heartbeat
-from services.mavlink.vehicle import Rotor, VehicleDescription
-from services.mavlink.view import VehicleView
+from lapwing.services.mavlink.px4_facts import px4_facts
+from lapwing.services.mavlink.telemetry.system_status import heartbeat
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_description import Rotor, VehicleDescription
 
 
 @pytest.mark.parametrize(("rotors", "kind", "frame"), [(4, 2, 4001), (6, 13, 6001), (8, 14, 8001), (5, 43, 4001)])

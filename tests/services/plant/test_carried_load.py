@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from cosim.scene import SceneError
-from cosim.serialise import first_difference, from_json, to_json
-from dynamics.lie.quaternion import rotate
-from services.table import from_resolved, load, parse, resolve
+from lapwing.cosim.config.serialise import first_difference, from_json, to_json
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.lie.quaternion import rotate
+from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
 

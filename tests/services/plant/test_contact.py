@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lapwing
-from cosim.scene import SceneError
-from services.table import load, resolve
+from lapwing.cosim.scene import SceneError
+from lapwing.services.scene_resolver import load, resolve
 
 G = 9.80665
 ASKED = {"rates.contact": 250}

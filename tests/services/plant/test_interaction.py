@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cosim.fleet import members
-from cosim.serialise import first_difference, from_json, to_json
-from services.table import from_resolved, parse, reseed, resolve
+from lapwing.cosim.config.serialise import first_difference, from_json, to_json
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.services.scene_resolver import from_resolved, parse, reseed, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
 

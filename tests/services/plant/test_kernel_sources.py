@@ -2,18 +2,20 @@
 
 import numba
 
-from cosim.part import advance
-from dynamics import effects
-from dynamics.kernel._key import key
-from dynamics.kernel._sources import _all
-from services.processes import create
-from services.table import load, resolve
+from lapwing.cosim.diagram.compiled_block import advance
+from lapwing.dynamics import effects
+from lapwing.kernels.compiler.cache_key import key
+from lapwing.kernels.compiler.source_digest import _all
+from lapwing.services.process_table import create
+from lapwing.services.scene_resolver import load, resolve
 
-SHARED = {"dynamics.effects.payload"}  # what hangs below is weighed in any scene
+SHARED = {"lapwing.dynamics.effects.payload"}  # what hangs below is weighed in any scene
 
 
 def test_the_sources_of_a_plant_hold_no_effect_that_its_scene_does_not_name():
     part = create(resolve(load("hover")), "plant").parts[0]
     made_of = key(advance, (numba.typeof(part.parameters), numba.typeof(part.state)), None, ())
-    reached = {f"dynamics.effects.{name}" for name in effects.names()} & _all(made_of.modules)
-    assert reached - SHARED == {f"dynamics.effects.{name}" for name in ("gravity", "ground_contact", "rotor_thrust")}
+    reached = {f"lapwing.dynamics.effects.{name}" for name in effects.names()} & _all(made_of.modules)
+    assert reached - SHARED == {
+        f"lapwing.dynamics.effects.{name}" for name in ("gravity", "ground_contact", "rotor_thrust")
+    }

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import LockStepError
-from cosim.scene import SceneError
-from dynamics.integrators import get, simulate
-from messages import stamp_ns
-from services.plant.models import gyrostat, os4
-from services.table import load
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.integrators import get, simulate
+from lapwing.messages import stamp_ns
+from lapwing.services.plant.models import gyrostat, os4
+from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long

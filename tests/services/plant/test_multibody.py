@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from cosim.errors import LockStepError
-from cosim.scene import SceneError
-from messages.topics import BODIES, TRUTH
-from services.common.ports import MotorCommand
-from services.table import load
-from tests.cosim.alone import Alone
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.scene import SceneError
+from lapwing.messages.topics import BODIES, TRUTH
+from lapwing.services.common.ports import MotorCommand
+from lapwing.services.scene_resolver import load
+from tests.cosim.service_harness import Alone
 
 pytestmark = pytest.mark.long
 
-MISSION = Path(__file__).parents[3] / "scenes/delivery_mission.toml"
+MISSION = Path(__file__).parents[3] / "lapwing/scenes/delivery_mission.toml"
 FLOWN = "vehicle.model=multibody"
 CALM = ["effects.wind_random.mean=[0.0, 0.0, 0.0]", "effects.wind_random.sigma=0.0"]
 

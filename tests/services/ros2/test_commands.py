@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from messages import (
+from lapwing.messages import (
     Actuators,
     Bool,
     OperatorCommand,
@@ -20,7 +20,7 @@ from messages import (
     Vector3,
     header,
 )
-from services.ros2.commands import Commands
+from lapwing.services.ros2.commands import Commands
 
 NAN = math.nan
 QUARTER = math.sqrt(0.5)

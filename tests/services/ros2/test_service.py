@@ -10,14 +10,14 @@ import time
 import numpy as np
 import pytest
 
-from cosim.log import LogReader
-from cosim.watch import WATCHER
-from messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
-from messages.types import FOLDER
-from services.processes import ROS2, needed
-from services.ros2.commands import SOURCE
-from services.ros2.node import ROUTER, Node, parse_router
-from services.table import load, resolve
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
+from lapwing.messages.types import FOLDER
+from lapwing.services.process_table import ROS2, needed
+from lapwing.services.ros2.commands import SOURCE
+from lapwing.services.ros2.node import ROUTER, Node, parse_router
+from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from dynamics.environment import STANDARD
-from dynamics.geodesy import geodetic_to_enu
-from dynamics.kernel import kernel
-from dynamics.lie.quaternion import NO_ROTATION
-from dynamics.noise import stream_key
-from dynamics.vector import ZERO
-from services.sensors import barometer, gps, imu, magnetometer, sonar
-from services.sensors.truth import Truth
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.geodesy import geodetic_to_enu
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vector import ZERO
+from lapwing.kernels import kernel
+from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
+from lapwing.services.sensors.sensor_inputs import Truth
 
 REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, *STANDARD[:2], STANDARD.magnetic_field_world)
 

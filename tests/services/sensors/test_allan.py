@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from record import REST, allan_deviation, record, together
 
-from services.sensors import errors, gps, imu, registry
-from services.sensors.barometer import PRESETS as BAROMETERS
-from services.sensors.magnetometer import PRESETS as MAGNETOMETERS
-from services.sensors.sonar import PRESETS as SONARS
+from lapwing.services.sensors import error_models, gps, imu, registry
+from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
+from lapwing.services.sensors.magnetometer import PRESETS as MAGNETOMETERS
+from lapwing.services.sensors.sonar import PRESETS as SONARS
 
 DPS = math.radians(1.0)
 MG = 1e-3 * 9.80665
@@ -20,7 +20,7 @@ GPSS = {name: p for name, p in gps.PRESETS.items() if name != "ideal"}
 def at_peak(sensor, p, correlation_time, samples=1_000_000):
     """Allan deviation where that of the wandering bias is largest."""
     m = 40
-    p = p._replace(rate=m / (errors.ALLAN_PEAK_TIME * correlation_time))
+    p = p._replace(rate=m / (error_models.ALLAN_PEAK_TIME * correlation_time))
     return allan_deviation(record(sensor, p, samples), m)
 
 
@@ -97,8 +97,8 @@ def test_gps(name):
     assert white("gps", still, p.noise_vertical_m_per_sqrt_hz, slice(2, 3)) == pytest.approx(1.0, rel=0.05)
     assert white("gps", still, p.noise_velocity_m_per_s_per_sqrt_hz, slice(3, 6)) == pytest.approx(1.0, rel=0.05)
     deviation = at_peak("gps", p, p.wander_time)
-    assert together(deviation[:2]) == pytest.approx(errors.ALLAN_PEAK * p.wander_horizontal, rel=0.05)
-    assert together(deviation[2:3]) == pytest.approx(errors.ALLAN_PEAK * p.wander_vertical, rel=0.05)
+    assert together(deviation[:2]) == pytest.approx(error_models.ALLAN_PEAK * p.wander_horizontal, rel=0.05)
+    assert together(deviation[2:3]) == pytest.approx(error_models.ALLAN_PEAK * p.wander_vertical, rel=0.05)
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
@@ -113,7 +113,7 @@ def test_the_same_physical_noise_at_any_rate(rate):
 @pytest.mark.parametrize("rate", [0.05, 0.2])
 def test_the_same_bias_walk_at_any_rate(rate):
     p = imu.Imu(gyro=imu.Gyro(bias_instability_deg_per_h=4.6, bias_time=100.0), rate=rate)
-    m = round(errors.ALLAN_PEAK_TIME * 100.0 * rate)
+    m = round(error_models.ALLAN_PEAK_TIME * 100.0 * rate)
     deviation = together(allan_deviation(record("imu", p, 300_000), m)[:3])
     # With nine or more samples a cluster their mean is the cluster's within 1 %.
     assert deviation == pytest.approx(4.6 * DPS / 3600.0, rel=0.05)

@@ -6,15 +6,24 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dynamics.atmosphere import pressure
-from dynamics.environment import STANDARD
-from dynamics.geodesy import enu_to_geodetic
-from dynamics.lie.quaternion import NO_ROTATION, Quaternion, conjugate, exp, from_roll_pitch_yaw, log, multiply, rotate
-from dynamics.noise import stream_key
-from dynamics.terrain import LEVEL, relief
-from dynamics.vector import ZERO
-from services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
-from services.sensors.truth import Truth
+from lapwing.dynamics.atmosphere import pressure
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.geodesy import enu_to_geodetic
+from lapwing.dynamics.lie.quaternion import (
+    NO_ROTATION,
+    Quaternion,
+    conjugate,
+    exp,
+    from_roll_pitch_yaw,
+    log,
+    multiply,
+    rotate,
+)
+from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.terrain import LEVEL, relief
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
+from lapwing.services.sensors.sensor_inputs import Truth
 
 KEY = stream_key(7, "drone1", "test")
 G = 9.81

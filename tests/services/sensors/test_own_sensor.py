@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 import lapwing
-from dynamics.errors import KeyedError
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.processes import fly_processes
-from lapwing.runs.single import fly_single
-from services.participant import Participation
-from services.sensors.registry import module_of
-from services.table import load, resolve
-from studies.fly import fly
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.process_main import Participation
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.services.sensors.registry import module_of
+from lapwing.studies.simulate import fly
 
 ANEMOMETER = """
 from typing import NamedTuple
-from dynamics.kernel import kernel
-from dynamics.noise import normal
-from dynamics.vector import norm
+from lapwing.kernels import kernel
+from lapwing.dynamics.noise import normal
+from lapwing.dynamics.vector import norm
 
 class Anemometer(NamedTuple):
     deviation: float = 0.0  # [m/s]
@@ -48,7 +48,7 @@ def sample(p, s, key, tick, truth):
     return State(s.samples + 1.0), AnemometerReading(speed, True)
 """
 ESTIMATOR = """
-from services.common.estimators import StateEstimate
+from lapwing.services.common.estimator_api import StateEstimate
 
 class Echo:
     rate = 50.0
@@ -65,7 +65,9 @@ def scene(tmp_path):
         (tmp_path / "own_anemometer.py").write_text(text)
         (tmp_path / "own_echo.py").write_text(ESTIMATOR)
         path = tmp_path / "hover.toml"
-        path.write_text(Path("scenes/hover.toml").read_text() + '[sensors.anemometer]\nmodule = "own_anemometer"\n')
+        path.write_text(
+            Path("lapwing/scenes/hover.toml").read_text() + '[sensors.anemometer]\nmodule = "own_anemometer"\n'
+        )
         return load(path, ["run.duration=3.0", *overrides])
 
     return made

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dynamics.errors import KeyedError
-from services.sensors import registry
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.sensors import registry
 
 
 def test_the_sensors_of_the_folder_are_found():

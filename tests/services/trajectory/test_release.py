@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from services.table import load
-from studies.fly import fly
+from lapwing.services.scene_resolver import load
+from lapwing.studies.simulate import fly
 
 
 def height(to):

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.scene import SceneError
-from services.trajectory.table_file import parse
+from lapwing.cosim.scene import SceneError
+from lapwing.services.trajectory.table_file import parse
 
 FILE = Path("points.csv")
 

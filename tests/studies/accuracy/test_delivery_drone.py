@@ -2,8 +2,8 @@
 
 import pytest
 
-from studies.accuracy.coordinates import error
-from studies.accuracy.systems.delivery_drone import problems
+from lapwing.studies.accuracy.coordinates import error
+from lapwing.studies.accuracy.systems.delivery_drone import problems
 
 pytestmark = pytest.mark.long
 

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.plant.models.multibody import longest_step
-from services.table import load
-from studies.accuracy import plant, scenes
-from studies.accuracy.coordinates import error
+from lapwing.services.plant.models.multibody import longest_step
+from lapwing.services.scene_resolver import load
+from lapwing.studies.accuracy import plant, scenes
+from lapwing.studies.accuracy.coordinates import error
 
 pytestmark = pytest.mark.long
 
-HOVER = Path(__file__).parents[3] / "scenes/hover.toml"
+HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
 
 
 def test_five_bodies_are_integrated_in_steps_that_their_scene_accepts(monkeypatch):

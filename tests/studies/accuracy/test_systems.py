@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from studies.accuracy.coordinates import error, matrices, of_state
-from studies.accuracy.measure import drift
-from studies.accuracy.reference import turning
-from studies.accuracy.systems import free_rigid_body, problems
+from lapwing.studies.accuracy.coordinates import error, matrices, of_state
+from lapwing.studies.accuracy.reference import turning
+from lapwing.studies.accuracy.systems import free_rigid_body, problems
+from lapwing.studies.accuracy.work_precision import drift
 
 pytestmark = pytest.mark.long
 

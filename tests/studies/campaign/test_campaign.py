@@ -8,18 +8,18 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import studies.campaign.folder
-import studies.campaign.table
+import lapwing.studies.campaign.folder
+import lapwing.studies.campaign.run_table
 from lapwing.cli.main import app
-from studies.campaign import local, table
-from studies.campaign.compare import compare
-from studies.campaign.distributions import choice, normal, uniform
-from studies.campaign.folder import begin, manifest, read
-from studies.campaign.plan import plan
-from studies.campaign.results import Results
-from studies.campaign.runs import first_setup, fly_runs, reference, row_of
-from studies.campaign.statistics import interval
-from studies.campaign.study import Count, Ending, campaign
+from lapwing.studies.campaign import local, run_table
+from lapwing.studies.campaign.campaign_comparison import compare
+from lapwing.studies.campaign.distributions import choice, normal, uniform
+from lapwing.studies.campaign.folder import begin, manifest, read
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.results import Results
+from lapwing.studies.campaign.runs import first_setup, fly_runs, reference, row_of
+from lapwing.studies.campaign.shard_loop import Count, Ending, campaign
+from lapwing.studies.campaign.statistics import interval
 
 pytestmark = pytest.mark.long
 
@@ -75,7 +75,7 @@ def test_a_stop_loses_no_shard_that_is_done_and_workers_change_nothing(flown, tm
     assert folder.finish() == flown[1]
 
 
-@pytest.mark.skipif(not table.has_parquet(), reason="pyarrow is not installed: pip install lapwing[campaign]")
+@pytest.mark.skipif(not run_table.has_parquet(), reason="pyarrow is not installed: pip install lapwing[campaign]")
 def test_the_table_is_parquet_with_its_making_in_the_metadata(flown):
     from pyarrow import parquet
 
@@ -91,8 +91,8 @@ def test_the_table_is_parquet_with_its_making_in_the_metadata(flown):
 
 def test_csv_gives_every_bit_back(flown):
     folder, _ = flown
-    rows = table.read_csv(folder.path / "runs.csv", folder.kinds)
-    assert list(table.bits(folder.kinds, rows)) == list(table.bits(folder.kinds, folder.rows(0) + rows[2:]))
+    rows = run_table.read_csv(folder.path / "runs.csv", folder.kinds)
+    assert list(run_table.bits(folder.kinds, rows)) == list(run_table.bits(folder.kinds, folder.rows(0) + rows[2:]))
 
 
 def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_path):
@@ -110,13 +110,13 @@ def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_
 
 
 def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
-    make = studies.campaign.folder._make
+    make = lapwing.studies.campaign.folder._make
 
     def twice(path, about):
         make(path, about | other)  # another machine is a little faster
         make(path, about | other)
 
-    monkeypatch.setattr("studies.campaign.folder._make", twice)
+    monkeypatch.setattr("lapwing.studies.campaign.folder._make", twice)
     other = {}
     assert len(started(tmp_path / "one")[0].missing()) == 20
     other = {"seed": 2}
@@ -146,7 +146,7 @@ def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
 
 
 def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkeypatch):
-    write = studies.campaign.table.write_csv
+    write = lapwing.studies.campaign.run_table.write_csv
 
     def full(path, *arguments):
         if "00002" in path.name:
@@ -154,7 +154,7 @@ def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkey
         write(path, *arguments)
 
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
-    monkeypatch.setattr("studies.campaign.table.write_csv", full)
+    monkeypatch.setattr("lapwing.studies.campaign.run_table.write_csv", full)
     code, said = lapwing(*words)
     expected = "00002.csv: cannot be written: no space left on device; the same command goes on where it stopped"
     assert (code, expected in said, len(read(tmp_path / "c").missing())) == (1, True, 3)
@@ -196,7 +196,7 @@ def test_what_was_flown_beyond_what_is_enough_is_kept(tmp_path):
 
 def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
     asked = []
-    monkeypatch.setattr("studies.campaign.study.interval", lambda k, n: asked.append(n) or interval(k, n))
+    monkeypatch.setattr("lapwing.studies.campaign.shard_loop.interval", lambda k, n: asked.append(n) or interval(k, n))
     ending, done = Ending(1e-9), {}
     for shard in range(300):
         done[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, the second first

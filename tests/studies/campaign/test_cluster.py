@@ -8,13 +8,13 @@ import sys
 
 import pytest
 
-from cosim.launcher import RunFailed
-from studies.campaign import local
-from studies.campaign.cluster import dask
-from studies.campaign.folder import begin, manifest
-from studies.campaign.plan import plan
-from studies.campaign.runs import first_setup, reference
-from studies.campaign.study import campaign
+from lapwing.cosim.processes.launcher import RunFailed
+from lapwing.studies.campaign import local
+from lapwing.studies.campaign.cluster import dask
+from lapwing.studies.campaign.folder import begin, manifest
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.runs import first_setup, reference
+from lapwing.studies.campaign.shard_loop import campaign
 
 pytestmark = pytest.mark.long
 
@@ -72,6 +72,6 @@ def test_a_lost_scheduler_is_told_in_a_line_and_what_was_flown_stays(tmp_path, c
 
 
 def test_nobody_answers(monkeypatch):
-    monkeypatch.setattr("studies.campaign.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("lapwing.studies.campaign.cluster.PATIENCE", 0.5)
     with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers there"):
         dask("tcp://127.0.0.1:9")

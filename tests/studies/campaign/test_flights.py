@@ -1,20 +1,20 @@
 """A flight of a campaign is that of the single executor, column by column."""
 
-import made_up
 import pytest
+import synthetic_flights
 
-from cosim.graph import Graph
-from cosim.log import LogWriter
-from cosim.recording import Recording
-from cosim.single import PAGE, run_single
-from services.processes import create_all
-from services.table import load, reseed, resolve
-from studies.campaign.distributions import parse
-from studies.campaign.plan import plan
-from studies.campaign.runs import row_of
-from studies.campaign.setup import TOPICS, campaign_setup
-from studies.flight import Flight
-from studies.fly import fly
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE, run_single
+from lapwing.cosim.log import LogWriter
+from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, reseed, resolve
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
+from lapwing.studies.campaign.distributions import parse
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.runs import row_of
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
@@ -40,7 +40,7 @@ def test_a_campaign_flies_what_the_single_executor_flies(scene, overrides, tmp_p
     with LogWriter(tmp_path / "log.mcap", {}, {}) as writer:
         run_single(Graph(setup, create_all(setup), PAGE), Recording(writer, setup))
     recorded = Flight.read(tmp_path / "log.mcap")
-    assert made_up.differences(in_memory, recorded, [t.name.removeprefix("{vehicle}/") for t in TOPICS]) == []
+    assert synthetic_flights.differences(in_memory, recorded, [t.name.removeprefix("{vehicle}/") for t in TOPICS]) == []
     assert (in_memory.finished, in_memory.landed) == (recorded.finished, recorded.landed)
     assert in_memory.rmse == recorded.rmse
     assert in_memory.status.failsafe.any() == ("effects.battery.charge=0.071" in overrides)  # the commander acts

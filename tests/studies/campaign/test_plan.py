@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cosim.scene import SceneError
-from studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
-from studies.campaign.plan import plan
-from studies.campaign.runs import _refusal, first_setup
+from lapwing.cosim.scene import SceneError
+from lapwing.studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.runs import _refusal, first_setup
 
 
 def drawn(made, key):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.campaign.statistics import ellipse, has_sobol, interval, paired, rank_correlation, sobol, spread
+from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, paired, rank_correlation, sobol, spread
 
 
 def test_clopper_and_pearson():

@@ -5,19 +5,19 @@ import math
 from pathlib import Path
 
 import pytest
-from made_up import moved
+from synthetic_flights import moved
 
-from services.common.vehicle import Effects
-from services.table import load
-from studies.effects import show
-from studies.effects.influence import Influence, influence
-from studies.effects.study import Row, Study, _smallest
-from studies.effects.study import study as run_study
-from studies.effects.variants import refusal, variant
-from studies.fly import fly
-from studies.terminal import console
+from lapwing.services.common.vehicle_schema import Effects
+from lapwing.services.scene_resolver import load
+from lapwing.studies.effects import console_output
+from lapwing.studies.effects.influence import Influence, influence
+from lapwing.studies.effects.procedure import Row, Study, _smallest
+from lapwing.studies.effects.procedure import study as run_study
+from lapwing.studies.effects.variants import refusal, variant
+from lapwing.studies.simulate import fly
+from lapwing.studies.terminal import console
 
-HOVER = Path(__file__).parents[3] / "scenes/hover.toml"
+HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
 
 
 def test_difference_of_two_flights():
@@ -90,7 +90,7 @@ def study():
 def test_table_json_and_plot(tmp_path, capsys):
     found = study()
     assert [row.name for row in found.missing] == ["wind"]
-    show.show(console(80), found)
+    console_output.show(console(80), found)
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text  # no digit is cut
@@ -98,11 +98,11 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert "ends early" in text
     assert "not flown: gust.peak: field required" in text
     assert "Left out, and worth more than 0.01 m: wind" in text
-    show.write_json(tmp_path / "study.json", found)
+    console_output.write_json(tmp_path / "study.json", found)
     data = json.loads((tmp_path / "study.json").read_text())
     assert data["missing"] == ["wind"]
     assert data["rows"][0]["influence"]["trajectory"] is None
-    show.plot(tmp_path / "study.png", found)
+    console_output.plot(tmp_path / "study.png", found)
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 

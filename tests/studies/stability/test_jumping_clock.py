@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from studies.stability import jumping_clock
-from studies.stability.cases.late_sensors import by_own_clock
+from lapwing.studies.stability import jumping_clock
+from lapwing.studies.stability.cases.late_sensors import by_own_clock
 
 
 @pytest.mark.parametrize(("name", "off"), [(jumping_clock.VICTIM, 3600.0), ("plant", 0.0)])

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dynamics.lie.quaternion import Quaternion, rotation_matrix
-from lapwing.cli.studies import stability
-from studies.stability import cases, other_simulators
-from studies.stability.case import Found, Plot, Row
-from studies.stability.cases import toppling
-from studies.stability.measure import one
-from studies.stability.other_simulators import _ball_feet
+from lapwing.cli.study_commands import stability
+from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
+from lapwing.studies.stability import cases, other_simulators
+from lapwing.studies.stability.case_result import Found, Plot, Row
+from lapwing.studies.stability.case_runner import one
+from lapwing.studies.stability.cases import toppling
+from lapwing.studies.stability.other_simulators import _ball_feet
 
 ROWS = [Row(name, "ours", "x", 1.0, "why", 0.5, "naive", 2.0) for name in ("first", "second")]
 

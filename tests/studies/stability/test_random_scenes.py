@@ -3,8 +3,8 @@
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from studies.stability.cases.random_scenes import flights
-from studies.stability.flights import finite
+from lapwing.studies.stability.cases.random_scenes import flights
+from lapwing.studies.stability.flights import finite
 
 
 @given(st.integers(0, 2**31))

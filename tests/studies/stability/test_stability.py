@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lapwing.cli.studies import stability
-from studies.stability import cases, other_simulators, show
-from studies.stability.case import Curve, Found, Plot, Row, Sweep
-from studies.stability.chart import chart
-from studies.stability.measure import chosen, one
+from lapwing.cli.study_commands import stability
+from lapwing.studies.stability import cases, console_output, other_simulators
+from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_runner import chosen, one
+from lapwing.studies.stability.chart import chart
 
 pytestmark = pytest.mark.long
 
@@ -129,6 +129,6 @@ def test_where_a_method_breaks():
 
 
 def test_how_far_from_the_bound():
-    assert show.distance(1.0, 0.5) == "2 x"
-    assert show.distance(1.0, 0.0) == "exact"
-    assert show.distance(0.0, 0.0) == ""
+    assert console_output.distance(1.0, 0.5) == "2 x"
+    assert console_output.distance(1.0, 0.0) == "exact"
+    assert console_output.distance(0.0, 0.0) == ""

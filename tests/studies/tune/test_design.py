@@ -3,14 +3,14 @@ from pathlib import Path
 
 import pytest
 
-from services.autopilot.gains import load
-from services.autopilot.known_airframe import known_airframe
-from services.autopilot.law import build
-from services.autopilot.margins import margins, open_loops, stable
-from services.table import load as load_scene
-from studies.tune.bandwidths import Bandwidths
-from studies.tune.design import GAIN, PHASE, assumed_airframe, design, gain_set, shortfalls
-from studies.tune.linearise import hover
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.margins import margins, open_loops, stable
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.scene_resolver import load as load_scene
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.design import GAIN, PHASE, assumed_airframe, design, gain_set, shortfalls
+from lapwing.studies.tune.linearise import hover
 
 SCENE = load_scene(Path(__file__).parents[3] / "scenes" / "hover.toml")
 TICK = 0.004

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from services.autopilot.gains import load
-from services.autopilot.known_airframe import known_airframe
-from services.autopilot.law import build
-from services.table import load as load_scene
-from services.table import parse
-from studies.fly import fly
-from studies.tune.identify import identify
-from studies.tune.linearise import hover
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.scene_resolver import load as load_scene
+from lapwing.services.scene_resolver import parse
+from lapwing.studies.simulate import fly
+from lapwing.studies.tune.identify import identify
+from lapwing.studies.tune.linearise import hover
 
 SCENES = Path(__file__).parents[3] / "scenes"
 UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, duration = 4.0 }\n'
@@ -60,5 +60,5 @@ def test_a_vehicle_that_is_heavier_than_assumed_shows(tmp_path):
 
 def test_a_flight_that_moves_nothing_is_refused():
     scene = load_scene(SCENES / "hover.toml")
-    with pytest.raises(ValueError, match=r"hover: roll was not moved .* fly scenes/excitation.toml"):
+    with pytest.raises(ValueError, match=r"hover: roll was not moved .* fly lapwing/scenes/excitation.toml"):
         found(scene)

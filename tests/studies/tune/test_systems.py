@@ -7,12 +7,12 @@ import control
 import numpy as np
 import pytest
 
-from services.autopilot.gains import load
-from services.autopilot.known_airframe import known_airframe
-from services.autopilot.law import build
-from services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
-from services.table import load as load_scene
-from studies.tune.systems import closed, step, systems
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.scene_resolver import load as load_scene
+from lapwing.studies.tune.systems import closed, step, systems
 
 TICK, DELAY = 0.004, 1
 SCENES = Path(__file__).parents[3] / "scenes"

@@ -2,10 +2,10 @@
 
 import math
 
-from services.autopilot.commander.attitude_flight import AttitudeFlight
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.modes import stabilized
-from services.autopilot.commander.view import View
+from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight
+from lapwing.services.autopilot.commander.commander_input import View
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.modes import stabilized
 
 NAME = "acro"
 

@@ -1,10 +1,10 @@
 """By hand without knowing where: the sticks ask for tilts, a vertical speed and a yaw rate."""
 
-from services.autopilot.commander.altitude_flight import AltitudeFlight
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.interface import Setpoint
 
 NAME = "altitude_control"
 

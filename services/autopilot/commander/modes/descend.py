@@ -1,11 +1,11 @@
 """Down without knowing where: level but for what leans against the wind, as PX4's mode of this name does."""
 
-from services.autopilot.commander.altitude_flight import AltitudeFlight
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.modes.land import descent_speed
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.modes.land import descent_speed
+from lapwing.services.autopilot.interface import Setpoint
 
 NAME = "descend"
 RECOVERY_TIME = 1.0  # [s] for which the position must be known again

@@ -2,10 +2,10 @@
 
 import math
 
-from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.leg import Leg
-from services.autopilot.commander.view import Constants, View
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.leg import Leg
 
 NAME = "goto"
 

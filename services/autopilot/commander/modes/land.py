@@ -1,10 +1,10 @@
 """Down to the ground, where it is."""
 
-from dynamics.vector import ZERO
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.smoothing import braking_speed
-from services.autopilot.commander.view import Constants, View
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.smoothing import braking_speed
 
 NAME = "land"
 SLOW_HEIGHT = 3.0  # [m] above the ground, as estimated; below it the last metres begin

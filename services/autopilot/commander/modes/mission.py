@@ -4,14 +4,14 @@ import math
 from itertools import islice
 from typing import Any
 
-from dynamics.vector import ZERO, Vec3, norm, subtract
-from services.autopilot.commander.flight_mode import FlightMode, fill_in, value
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.leg import Leg, Place, passing_speed
-from services.autopilot.commander.modes import land, return_, takeoff
-from services.autopilot.commander.route import GRAB, INSTANT, TO_PLACES
-from services.autopilot.commander.smoothing import wrap_angle
-from services.autopilot.commander.view import Constants, View
+from lapwing.dynamics.vector import ZERO, Vec3, norm, subtract
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.leg import Leg, Place, passing_speed
+from lapwing.services.autopilot.commander.modes import land, return_, takeoff
+from lapwing.services.autopilot.commander.route import GRAB, INSTANT, TO_PLACES
+from lapwing.services.autopilot.commander.smoothing import wrap_angle
 
 NAME = "mission"
 ARRIVED = 0.05  # [m]

@@ -3,15 +3,15 @@ motors' voltages, past the controller."""
 
 import math
 
-from dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, to_roll_pitch_yaw
-from dynamics.vector import ZERO, Vec3, add, scale
-from services.autopilot.commander.attitude_flight import AttitudeFlight
-from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.smoothing import clamp_norm
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
-from services.autopilot.stage import CUT_HEIGHT
+from lapwing.dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, to_roll_pitch_yaw
+from lapwing.dynamics.vector import ZERO, Vec3, add, scale
+from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.smoothing import clamp_norm
+from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.land_detector import CUT_HEIGHT
 
 NAME = "offboard"
 ACCELERATION_TIME = 0.5  # [s] for which an acceleration is taken to last

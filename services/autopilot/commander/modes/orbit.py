@@ -2,11 +2,11 @@
 
 import math
 
-from dynamics.vector import Vec3
-from services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.smoothing import clamp_norm
-from services.autopilot.commander.view import Constants, View
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.smoothing import clamp_norm
 
 NAME = "orbit"
 TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR; the last is the usual one

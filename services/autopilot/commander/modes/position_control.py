@@ -2,10 +2,10 @@
 
 import math
 
-from dynamics.vector import ZERO, Vec3, norm
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.view import Constants, View
+from lapwing.dynamics.vector import ZERO, Vec3, norm
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
 
 NAME = "position_control"
 STOPPED = 0.05  # [m/s] at which the position is held

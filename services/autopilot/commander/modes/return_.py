@@ -2,12 +2,12 @@
 
 import math
 
-from dynamics.vector import norm, subtract
-from services.autopilot.commander.avoidance import Point, way_round
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.leg import Leg
-from services.autopilot.commander.view import Constants, View
+from lapwing.dynamics.vector import norm, subtract
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.geofence_routing import Point, way_round
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.leg import Leg
 
 NAME = "return"
 ACCEPTANCE_RADIUS = 0.3  # [m] around a corner of the path

@@ -2,12 +2,12 @@
 
 import math
 
-from dynamics.lie.quaternion import from_roll_pitch_yaw
-from services.autopilot.commander.attitude_flight import AttitudeFlight, stick_thrust
-from services.autopilot.commander.flight_mode import FlightMode
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.view import Constants, View
-from services.autopilot.interface import Setpoint
+from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
+from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight, stick_thrust
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.interface import Setpoint
 
 NAME = "stabilized"
 

@@ -2,10 +2,10 @@
 
 import math
 
-from services.autopilot.commander.flight_mode import FlightMode, value
-from services.autopilot.commander.guidance import Guidance
-from services.autopilot.commander.route import MAXIMUM_TAKEOFF_HEIGHT
-from services.autopilot.commander.view import Constants, View
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.flight_mode import FlightMode, value
+from lapwing.services.autopilot.commander.guidance import Guidance
+from lapwing.services.autopilot.commander.route import MAXIMUM_TAKEOFF_HEIGHT
 
 NAME = "takeoff"
 REACHED = 0.1  # [m]

@@ -7,9 +7,9 @@ import pytest
 from commander_session import CONSTANTS, DT, HIGH, Session
 from flights import command, item
 
-from messages import CommandAck
-from services.autopilot.commander.commander import Commander
-from services.autopilot.estimate import EXACT
+from lapwing.messages import CommandAck
+from lapwing.services.autopilot.commander.commander import Commander
+from lapwing.services.autopilot.initial_estimate import EXACT
 
 WAITING = CONSTANTS._replace(has_trajectory=False)
 GROUND = EXACT._replace(position_world=(1.0, 2.0, 0.35))

@@ -7,8 +7,8 @@ import pytest
 from commander_session import Flight
 from flights import command, item
 
-from services.autopilot.commander.avoidance import way_round
-from services.autopilot.commander.fence import Fence
+from lapwing.services.autopilot.commander.fence import Fence
+from lapwing.services.autopilot.commander.geofence_routing import way_round
 
 BOX = [(10.0, -15.0), (20.0, -15.0), (20.0, 10.0), (10.0, 10.0)]
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from services.autopilot.commander.smoothing import Limits, PositionSmoothing, braking_speed, wrap_angle
+from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing, braking_speed, wrap_angle
 
 LIMITS = Limits(horizontal=5.0, up=3.0, down=1.5, acceleration=2.0, jerk=8.0, yaw_rate=0.8)
 DT = 0.004

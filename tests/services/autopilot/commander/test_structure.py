@@ -5,8 +5,8 @@ from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
 
-from services.autopilot import commander
-from services.autopilot.commander.mode_table import MODES
+from lapwing.services.autopilot import commander
+from lapwing.services.autopilot.commander.mode_table import MODES
 
 FOLDER, PACKAGE = Path(commander.__file__).parent, commander.__name__
 

@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.log import LogReader
-from dynamics.errors import KeyedError
+from lapwing.cosim.log import LogReader
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.processes import fly_processes
-from lapwing.runs.refly import refly
-from lapwing.runs.single import fly_single
-from services.participant import Participation
-from services.table import from_resolved, load, resolve
-from studies.fly import fly
+from lapwing.runs.resimulate import refly
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.process_main import Participation
+from lapwing.services.scene_resolver import from_resolved, load, resolve
+from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
-HOVER = Path("scenes/hover.toml")
+HOVER = Path("lapwing/scenes/hover.toml")
 
 LAW = """
 def law(weight, estimate, setpoint):
@@ -28,7 +28,7 @@ def law(weight, estimate, setpoint):
     return thrust, (-3.0 * w[0], -3.0 * w[1], -3.0 * w[2])
 """
 IN_PYTHON = f"""
-from services.common.controllers import ThrustAndMoments
+from lapwing.services.common.controller_api import ThrustAndMoments
 {LAW}
 class Altitude:
     rate = 125.0
@@ -41,8 +41,8 @@ class Altitude:
 """
 COMPILED = f"""
 from typing import NamedTuple
-from dynamics.kernel import kernel
-from services.common.controllers import ThrustAndMoments
+from lapwing.kernels import kernel
+from lapwing.services.common.controller_api import ThrustAndMoments
 
 class Parameters(NamedTuple):
     rate: float
@@ -61,7 +61,7 @@ def step(p, s, time, estimate, setpoint):
     return State(s.steps + 1.0), ThrustAndMoments(thrust, moments)
 """
 VOLTS = """
-from services.common.controllers import MotorVoltages
+from lapwing.services.common.controller_api import MotorVoltages
 
 class Full:
     rate = 250

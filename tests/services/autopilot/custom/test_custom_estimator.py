@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamics.errors import KeyedError
-from services.table import load, resolve
-from studies.fly import fly
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.simulate import fly
 
 # Integrates the IMU from rest: good for seconds, with ideal sensors.
 DEAD_RECKONING = """
 import numpy as np
 from scipy.spatial.transform import Rotation
-from services.common.estimators import StateEstimate
+from lapwing.services.common.estimator_api import StateEstimate
 
 class DeadReckoning:
     rate = 250.0
@@ -40,7 +40,9 @@ def scene(tmp_path):
     def made(text, name, *overrides):
         (tmp_path / "own_estimator.py").write_text(text)
         path = tmp_path / "hover.toml"
-        path.write_text(Path("scenes/hover.toml").read_text() + '[sensors.imu]\npreset = "ideal"\n[sensors.gps]\n')
+        path.write_text(
+            Path("lapwing/scenes/hover.toml").read_text() + '[sensors.imu]\npreset = "ideal"\n[sensors.gps]\n'
+        )
         return load(path, [f"autopilot.estimator=own_estimator:{name}", *overrides])
 
     return made

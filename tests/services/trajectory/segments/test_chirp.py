@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from services.trajectory.piece import Channel, channel_at
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.polynomial_piece import Channel, channel_at
+from lapwing.services.trajectory.segments import KINDS
 
 
 def test_frequency_rises_linearly_from_first_to_last():

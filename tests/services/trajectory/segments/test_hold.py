@@ -1,5 +1,5 @@
-from services.trajectory.piece import Piece
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments import KINDS
 
 
 def test_hold_stays_where_it_is():

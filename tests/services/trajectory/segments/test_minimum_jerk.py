@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from services.trajectory.piece import Channel, channel_at
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.polynomial_piece import Channel, channel_at
+from lapwing.services.trajectory.segments import KINDS
 
 
 def test_it_starts_and_ends_at_rest_and_peaks_halfway():

@@ -1,7 +1,7 @@
 import pytest
 
-from services.trajectory.piece import Piece
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments import KINDS
 
 Ramp = KINDS["ramp"]
 

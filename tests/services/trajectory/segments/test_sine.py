@@ -1,7 +1,7 @@
 import math
 
-from services.trajectory.piece import Piece
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments import KINDS
 
 Sine = KINDS["sine"]
 

@@ -1,4 +1,4 @@
-from services.trajectory.segments import KINDS
+from lapwing.services.trajectory.segments import KINDS
 
 
 def test_step_takes_no_time_and_ends_at_its_value():

@@ -1,0 +1,47 @@
+"""What a campaign takes as it grows: processor time a run and peak memory of the whole command, report included.
+
+    python -m benchmarks.campaign_scaling [MOST]
+
+Two seconds of hover on one worker, 100, 1000, 10000 ... runs up to MOST, each campaign a process of its own.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from itertools import pairwise
+
+from benchmarks._targets import LAPWING, Row, show
+
+CAMPAIGN = [*LAPWING, "campaign", "hover", "--set", "run.duration=2", "--workers", "1"]
+
+
+def main(most=10000):
+    counts, cost = [10**k for k in range(2, 9) if 10**k <= most], {}
+    with tempfile.TemporaryDirectory() as folder:
+        taken([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
+        for runs in counts:
+            cost[runs] = taken([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
+            print(f"{runs:9} runs: {cost[runs][0]:8.1f} s, {cost[runs][1]:5.0f} MB", flush=True)
+    each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] of every further run
+    for runs, further in zip(counts[1:], each, strict=True):
+        print(f"up to {runs:9} runs: {1e3 * further:.2f} ms for every further one")
+    found = [
+        Row(f"campaign: a further run up to {most} runs to one up to 1000", each[-1] / each[0], "", 1.1),
+        Row(f"campaign: peak memory, {most} runs to 1000", cost[most][1] / cost[1000][1], "", 1.1),
+    ]
+    show(found)
+    return found
+
+
+def taken(command):
+    """Processor time [s] and peak memory [MB] of a command."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        raise subprocess.CalledProcessError(os.waitstatus_to_exitcode(status), command)
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

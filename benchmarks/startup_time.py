@@ -1,0 +1,31 @@
+"""What a command takes from its start to its end where all kernels are on the disk.
+
+python -m benchmarks.startup_time [REPEATS]
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks._targets import LAPWING, Row, show, wall
+
+
+def rows(repeats=5):
+    with tempfile.TemporaryDirectory() as folder:
+        fly = [*LAPWING, "run", "hover", "--log", str(Path(folder, "log.mcap")), "--key-prefix", "benchmark", "--mode"]
+        yield Row("hover, one process, warm, whole command", wall([*fly, "single"], repeats), "s", 1.6)
+        yield Row(
+            "hover, a process for each service, warm, whole command", wall([*fly, "processes"], repeats), "s", 3.5
+        )
+    yield Row("lapwing --help", wall([*LAPWING, "--help"], repeats), "s", 0.3)
+    yield Row("lapwing scenes", wall([*LAPWING, "scenes"], repeats), "s", 0.5)
+
+
+def main(repeats=5):
+    found = list(rows(repeats))
+    show(found)
+    return found
+
+
+if __name__ == "__main__":
+    main(*[int(a) for a in sys.argv[1:]])

@@ -1,0 +1,106 @@
+"""The airframe that figures of a vehicle make, as a file."""
+
+import json
+import math
+import tomllib
+from typing import Any
+
+from pydantic import ValidationError
+
+from lapwing.dynamics.validation import fault
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.dynamics.vehicles.airframe_tables import Propeller
+from lapwing.dynamics.vehicles.propeller import from_stand
+from lapwing.vehicle_measurements import CELL_VOLTAGE, FIGURES, Values
+
+FAMILY = {  # blade-element constants of common two-blade propellers
+    "aspect_ratio": 6.0,
+    "downwash_factor": 0.85,
+    "radius_weight": 0.5,
+    "oswald_factor": 0.83,
+    "zero_lift_angle": 0.0,
+    "lift_curve_slope": 6.11,
+}
+SPINS = {  # clockwise or counter-clockwise seen from above; six survive most single failures
+    4: ("cw", "ccw", "cw", "ccw"),
+    6: ("cw", "cw", "ccw", "ccw", "cw", "ccw"),
+    8: ("cw", "ccw", "cw", "ccw", "cw", "ccw", "cw", "ccw"),
+}
+
+
+def airframe_of(v: Values) -> Airframe:
+    """The airframe of the figures.
+
+    Raises:
+        ValueError: figures that do not go together.
+    """
+    try:
+        return Airframe.model_validate(tomllib.loads(written("new", v, set(v))))
+    except ValidationError as error:
+        raise fault(error, Airframe) from None
+
+
+def written(name: str, v: Values, known: set[str]) -> str:
+    """The airframe's file; figures that are not `known` are marked as guessed."""
+    count = int(v["rotors"])
+    geometry = {"diameter": v["diameter"], "pitch": v["pitch"], "blades": int(v["blades"]), **FAMILY}
+    shape = Propeller.model_validate({**geometry, "lift_correction": 1.0, "zero_lift_drag": 0.0})
+    stand = v["stand_density"], v["stand_speed"], v["stand_thrust"], v["stand_torque"]
+    geometry["lift_correction"], geometry["zero_lift_drag"] = from_stand(shape, *stand)
+    hubs = [_place(v["arm"], math.pi / count + 2.0 * math.pi * k / count, 0.0) for k in range(count)]
+    feet = [_place(v["foot_distance"], math.pi / 4.0 + math.pi / 2.0 * k, -v["foot_depth"]) for k in range(4)]
+    inertia = [v["inertia_x"], v["inertia_y"], v["inertia_z"]]
+    guessed = ", ".join(sorted(set(v) - known))
+
+    motor = ("speed_constant", "gear_ratio", "no_load_current", "resistance", "time_constant")
+    units = {figure.name: figure.unit for figure in FIGURES}
+    lines = [
+        f"# {name}, written by `lapwing new vehicle`; docs/new_airframe.md says how each figure is measured. SI units.",
+        f"# Guessed, not measured: {guessed or 'nothing'}.",
+        "",
+        "[mass]",
+        _line("total", v["mass"], "kg"),
+        _line("payload", v["payload"], "kg, part of the total"),
+        _line("inertia", inertia, "kg m^2 about body x, y, z"),
+        "",
+        "[rotors]  # from ahead on the left, counter-clockwise seen from above",
+        _line("position", hubs, "m, body"),
+        _line("spin_direction", list(SPINS[count]), "seen from above: compare with yours"),
+        _line("inertia", v["rotor_inertia"], "kg m^2 about the shaft"),
+        "",
+        "[propeller]  # lift_correction and zero_lift_drag meet the thrust stand, the others are of the family",
+        *[_line(key, value) for key, value in geometry.items()],
+        "",
+        "[motor]",
+        *[_line(key, v[key], units[key]) for key in motor],
+        _line("max_voltage", CELL_VOLTAGE * v["cells"], "V, nominal"),
+        _line("esc_current", v["esc_current"], "A"),
+        "",
+        "[battery]",
+        _line("cells", int(v["cells"]), "in series"),
+        _line("capacity", 3.6 * v["capacity"], "A s"),
+        _line("c_rating", v["c_rating"], "C"),
+        _line("cell_resistance", v["cell_resistance"], "ohm"),
+        "",
+        "[contact]",
+        _line("feet", feet, "m, body"),
+        _line("hull", hubs, "m, body"),
+        "",
+        "[drag]",
+        _line("area", [v["drag_area"], v["drag_area"], 2.5 * v["drag_area"]], "m^2 along body x, y, z"),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _place(radius: float, angle: float, height: float) -> list[float]:
+    return [round(radius * math.cos(angle), 6), round(radius * math.sin(angle), 6), height]
+
+
+def _line(key: str, value: Any, comment: str = "") -> str:
+    return f"{key} = {_toml(value)}" + (f"  # {comment}" if comment else "")
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return str(float(f"{value:.6g}")) if isinstance(value, float) else json.dumps(value)

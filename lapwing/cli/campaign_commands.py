@@ -1,0 +1,194 @@
+"""Campaigns: many runs of a scene, and two campaigns beside each other."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lapwing.cli.app import app
+from lapwing.cli.error_exit import user_errors
+from lapwing.cli.options import Overrides, SceneFile
+from lapwing.cli.output_paths import check_distinct, check_report, check_writable
+from lapwing.cli.preflight import decided
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from lapwing.studies.campaign.folder import Folder
+    from lapwing.studies.campaign.plan import Plan
+    from lapwing.studies.campaign.runs import Reference
+    from lapwing.studies.campaign.shard_loop import Workers
+
+LINES = 5.0  # [s] between two lines of progress where there is no terminal
+
+
+@app.command()
+def campaign(
+    scene: SceneFile,
+    set_: Overrides = None,
+    runs: Annotated[
+        int | None, typer.Option(metavar="N", help="how many [100, or the lines of the sweep, the points of the grid]")
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="S", help="of the campaign: of every run's seed and draws")] = 1,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=DISTRIBUTION",
+            help="a key that varies: vehicle.mass=normal(10.4,0.2), autopilot.gains=choice(a.toml,b.toml) (repeatable)",
+        ),
+    ] = None,
+    sweep: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="keys that vary together: a column each, a line for a run")
+    ] = None,
+    design: Annotated[
+        str, typer.Option(metavar="random|lhs|sobol|grid", help="how the runs fill the space of what varies")
+    ] = "random",
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="its folder; the same command goes on there [campaigns/...]")
+    ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="write the table as CSV, too")] = False,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write what it came to as JSON")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="the report [DIR/report.html]")
+    ] = None,
+    until_ci: Annotated[
+        float | None,
+        typer.Option("--until-ci", metavar="P", help="end when the failure probability is known to +-P (95 %)"),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="processes [one for each core]")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="fly on a Dask cluster: tcp://scheduler:8786")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="fly the I-th of N parts only: for arrays of batch jobs")
+    ] = None,
+) -> None:
+    """Fly a scene many times with what varies drawn anew: errors as distributions, and how often it fails."""
+    from lapwing.studies.campaign import console_output
+    from lapwing.studies.campaign.campaign_report import write
+    from lapwing.studies.campaign.distributions import parse
+    from lapwing.studies.campaign.folder import begin, default_path, manifest
+    from lapwing.studies.campaign.plan import plan
+    from lapwing.studies.campaign.results import Results
+    from lapwing.studies.terminal import console
+
+    with user_errors():
+        if workers is not None and workers < 1:
+            raise ValueError(f"--workers {workers}: expected at least 1")
+        if until_ci is not None and not 0.0 < until_ci < 1.0:
+            raise ValueError(f"--until-ci {until_ci:g}: expected a probability between 0 and 1, for example 0.01")
+        if until_ci is not None and shard is not None:
+            raise ValueError("--until-ci: a part does not know how the others end; expected without --shard")
+        if cluster is not None and workers is not None:
+            raise ValueError("--workers: a cluster has its own; expected without --cluster")
+        check_distinct({"SCENE": scene, "--sweep": sweep, "--json": json, "--report": report})
+        check_writable(json)
+        check_report("--report", report)
+        screen, varied = console(), {}
+        for text in vary or []:
+            key, equals, drawn = (part.strip() for part in text.partition("="))
+            if not equals or not key:
+                raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
+            if key in varied:
+                raise ValueError(f"--vary {text}: {key} has a distribution already; expected one of each key")
+            try:
+                varied[key] = parse(drawn)
+            except ValueError as fault:
+                raise ValueError(f"--vary {text}: {fault}") from None
+        given = plan(str(scene), decided(scene, set_ or []).overrides, runs, seed, varied, sweep, design)
+        first = _reference(screen, given)
+        about = manifest(given, first)
+        folder = begin(out or default_path(about), given, about)
+        part = _part(shard, len(folder.shards))
+        _fly(screen, folder, first, _workers(screen, cluster, workers, folder), until_ci, part)
+        if shard is not None and folder.missing():
+            screen.print(f"{folder.path}: part {shard} is done; {len(folder.missing())} shards are still missing")
+            return
+        digest, found = folder.finish(csv), Results(folder)
+        console_output.show(screen, found)
+        if json:
+            console_output.write_json(json, found, digest)
+        page = report or folder.path / "report.html"
+        if len(found):
+            write(page, found)
+            screen.print(f"{'report':<7} {page}", soft_wrap=True)
+        screen.print(f"{'digest':<7} {digest}\n{'folder':<7} {folder.path}", soft_wrap=True)
+
+
+@app.command()
+def compare(
+    one: Annotated[Path, typer.Argument(metavar="DIR", help="the folder of a campaign")],
+    other: Annotated[Path, typer.Argument(metavar="DIR", help="of another one with the same seed")],
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the differences as JSON")] = None,
+) -> None:
+    """Two campaigns beside each other, run by run: what the second does better or worse, with intervals."""
+    from lapwing.studies.campaign import campaign_comparison as study
+    from lapwing.studies.terminal import console
+
+    with user_errors():
+        check_writable(json)
+        found = study.compare(one, other)
+        study.show(console(), found)
+        if json:
+            study.write_json(json, found)
+
+
+def _reference(screen: "Console", given: "Plan") -> "Reference":
+    from lapwing.runs.compile_notice import told
+    from lapwing.studies.campaign.runs import first_setup, reference
+
+    run, setup = first_setup(given)
+    with told(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
+        return reference(run, setup)
+
+
+def _part(shard: str | None, shards: int) -> range | None:
+    """The shards of the I-th of N parts."""
+    if shard is None:
+        return None
+    i, _, n = shard.partition("/")
+    if not (i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n)):
+        raise ValueError(f"--shard {shard}: expected I/N with I from 1 to N, for example 3/8")
+    if int(n) > shards:
+        raise ValueError(f"--shard {shard}: this campaign has {shards} shards; expected at most I/{shards}")
+    return range(int(i) - 1, shards, int(n))
+
+
+def _workers(screen: "Console", cluster: str | None, count: int | None, folder: "Folder") -> "Workers":
+    from lapwing.studies.campaign import local
+
+    if cluster is not None:
+        from lapwing.studies.campaign.cluster import dask
+
+        return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
+    number = min(count or local.cores(), len(folder.missing()))
+    return local.here if number <= 1 else local.processes(number)
+
+
+def _fly(
+    screen: "Console",
+    folder: "Folder",
+    first: "Reference",
+    workers: "Workers",
+    until: float | None,
+    part: range | None,
+) -> None:
+    import time
+
+    from lapwing.cli.study_progress import Countdown
+    from lapwing.studies.campaign.shard_loop import Count
+    from lapwing.studies.campaign.shard_loop import campaign as study
+
+    began, before = time.monotonic(), -1
+    mine = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
+    with Countdown(screen, LINES) as countdown:
+
+        def say(count: Count) -> None:
+            nonlocal before
+            before = count.runs if before < 0 else before
+            flown, rate = count.runs - before, (count.runs - before) / max(time.monotonic() - began, 1e-9)
+            p = count.failure
+            text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
+            countdown.say(text, flown, mine)
+
+        study(folder, first, workers, say, until, part)

@@ -1,0 +1,22 @@
+"""The command `lapwing` from its first moment on: it answers Ctrl-C before it has imported the rest."""
+
+
+def main() -> None:
+    """Entry point of `lapwing`."""
+    try:
+        from lapwing.cosim.processes.interrupt import Interrupted, end_at_once, say_end
+
+        try:
+            end_at_once()
+            from lapwing.cli.std_streams import open_closed
+
+            open_closed()
+            from lapwing.cli.main import main as carry_out
+
+            carry_out()
+        except Interrupted as interrupted:
+            raise SystemExit(say_end(interrupted)) from None
+    except KeyboardInterrupt:  # what Python makes of SIGINT up to `end_at_once`
+        from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, say_end
+
+        raise SystemExit(say_end(Interrupted(SIGINT))) from None

@@ -1,0 +1,179 @@
+"""What a log holds, whether two are the same, what is left of a damaged one, and a log as tables."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lapwing.cli.app import app
+from lapwing.cli.error_exit import DIFFERENT, fail, user_errors
+from lapwing.cli.output_paths import check_distinct, check_writable
+
+if TYPE_CHECKING:
+    from lapwing.studies.logs.log_comparison import Comparison
+    from lapwing.studies.logs.log_info import Info
+
+LogFile = Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]
+
+
+@app.command()
+def info(log: LogFile) -> None:
+    """Tell what a log holds: its making, its topics, what happened, and where messages are missing."""
+    from lapwing.cli.run_summary import fleet, show_events
+    from lapwing.studies.logs.log_info import info as look
+    from lapwing.studies.terminal import console
+
+    with user_errors():
+        found = look(log)
+        for label, line in _about(found).items():
+            typer.echo(f"  {label:<9} {line}")
+        for line in _topics(found):
+            typer.echo(line)
+        flights = fleet(log)
+        for flight in flights:
+            if len(flights) > 1:
+                typer.echo(f"{flight.vehicle}:")
+            show_events(console(), [event._asdict() for event in flight.events])
+
+
+@app.command()
+def verify(
+    log: LogFile,
+    other: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="another one, to compare it with")] = None,
+) -> None:
+    """Recompute a log's digest, or find the first message at which two logs differ; exit code 3 where they do."""
+    from lapwing.cosim.log import LogReader
+
+    with user_errors():
+        if other is not None:
+            from lapwing.studies.logs.log_comparison import compare
+
+            check_distinct({"FILE": log, "the second FILE": other})
+            found = compare(log, other)
+            for line in _differences(found):
+                typer.echo(line)
+            if not found.same:
+                fail(f"{log} and {other} differ", DIFFERENT)
+            typer.echo(f"{log} and {other}: the same messages")
+            return
+        with LogReader(log) as read:
+            stated, computed = read.metadata.get("digest"), read.digest()
+        if stated is None:
+            raise ValueError(f"{log}: states no digest to compare with; expected a log that has its end")
+        if stated != computed:
+            fail(f"{log}: states the digest {stated}, its messages have {computed}", DIFFERENT)
+        typer.echo(f"{log}: digest {stated}, as its messages have it")
+
+
+@app.command()
+def recover(
+    log: LogFile,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="where to write it [FILE_recovered.mcap]")] = None,
+) -> None:
+    """Write what is left of a log without an end, or with damaged parts, as a whole log."""
+    from lapwing.cosim.log.recover import recover as save
+
+    with user_errors():
+        target = out or log.with_name(f"{log.stem}_recovered.mcap")
+        check_distinct({"FILE": log, "--out": target})
+        check_writable(target)
+        found = save(log, target)
+        for line in found.damaged:
+            typer.echo(f"left out: {line}")
+        typer.echo(f"{target}: {found.messages} messages up to t = {found.end_ns * 1e-9:g} s, digest {found.digest}")
+
+
+@app.command()
+def export(
+    log: LogFile,
+    parquet: Annotated[Path | None, typer.Option(metavar="FOLDER", help="an Apache Parquet file a topic")] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FOLDER", help="a CSV file a topic")] = None,
+    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="a MATLAB file with a struct a topic")] = None,
+    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="only these")] = None,
+) -> None:
+    """Write a log as tables for other programs: one a topic, numbers and texts with their units."""
+    from lapwing.cosim.log import LogReader
+    from lapwing.studies.logs import log_export as tables
+
+    with user_errors():
+        if not (parquet or csv or mat):
+            raise ValueError("export: expected --parquet FOLDER, --csv FOLDER or --mat FILE")
+        check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
+        check_writable(mat)
+        with LogReader(log) as read:
+            found = tables.tables(read, topics.split(",") if topics is not None else None)
+        for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
+            if folder is None:
+                continue
+            try:
+                if folder is not mat:
+                    folder.mkdir(exist_ok=True)
+                for path in write(found, folder):
+                    typer.echo(path)
+            except OSError as fault:
+                raise ValueError(f"{folder}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
+
+
+def _about(found: "Info") -> dict[str, str]:
+    """What `info` tells of the whole, by label."""
+    said = found.metadata
+    solver = f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else ""
+    exchange = f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else ""
+    count = sum(topic.messages for topic in found.topics)
+    lines = {
+        "scene": said.get("scene", ""),
+        "vehicle": said.get("vehicle", ""),
+        "seed": said.get("seed", ""),
+        "mode": said.get("mode", ""),
+        "version": " ".join(filter(None, (said.get("version", ""), said.get("commit", "")))),
+        "solver": solver,
+        "exchange": exchange,
+        "duration": f"{found.end - found.start:g} s, from {found.start:g} to {found.end:g} s",
+        "size": f"{found.size / 1e6:.2f} MB, {count} messages",
+        "files": ", ".join(found.files),
+        "digest": said.get("digest", ""),
+        "failure": said.get("failure", ""),
+        "waited": f"{said['waited_for_disk']} for the disk" if "waited_for_disk" in said else "",
+        "recovered": said.get("recovered", ""),
+        "end": "" if found.complete else "none, its writer was ended; lapwing recover makes a whole log of it",
+    }
+    lines |= {f"no {command}": f"lacks {what}" for command, what in found.missing.items()}
+    return {label: line for label, line in lines.items() if line}
+
+
+def _topics(found: "Info") -> list[str]:
+    """A line for each topic, under a head, in columns."""
+    rows = [("topic", "messages", "rate [Hz]", "kB", "type", "gaps")]
+    for topic in found.topics:
+        rate = f"{topic.rate:g}" if topic.rate else ""
+        gaps = f"{topic.gaps}, longest {topic.longest:g} s" if topic.gaps else ""
+        rows.append((topic.name, str(topic.messages), rate, f"{topic.size / 1000:.1f}", topic.kind, gaps))
+    wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    left = (True, False, False, False, True, True)
+    return [
+        "  ".join(
+            f"{cell:{'<' if at_left else '>'}{width}}" for cell, at_left, width in zip(row, left, wide, strict=True)
+        )
+        for row in rows
+    ]
+
+
+def _differences(found: "Comparison") -> list[str]:
+    """What `verify` tells of two logs that differ."""
+    lines = [f"{key}: {one or 'none'} | {other or 'none'}" for key, (one, other) in found.about.items()]
+    lines += [
+        f"only in the {where}: {', '.join(o)}" for where, o in zip(("first", "second"), found.only, strict=True) if o
+    ]
+    if found.first is None:
+        return lines
+    first = found.first
+    values = " | ".join(map(str, first.values))
+    lines.append(
+        f"first difference: {first.topic} at t = {first.time_ns * 1e-9:g} s, {first.field or 'messages'}: {values}"
+    )
+    if first.growth:
+        lines.append(f"  {'after [s]':>10}  {'apart by':>10}  {'true position apart by [m]':>26}")
+    for growth in first.growth:
+        position = f"{growth.position:26.3e}" if growth.position is not None else ""
+        lines.append(f"  {growth.after:>10g}  {growth.apart:>10.3e}  {position}".rstrip())
+    return lines

@@ -1,0 +1,58 @@
+"""Missions from files: `--plan FILE`, or for a scene of several vehicles `--plan NAME=FILE` for each that flies one."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lapwing.cosim.scene import Scene
+
+
+def overrides(given: list[str], scene: Path, set_: list[str]) -> list[str]:
+    """What goes with the plans in the scene: their vehicles are operated, and leave its trajectory.
+
+    Raises:
+        ValueError: it is not said which vehicle flies which, or one that is not there.
+        SceneError: the scene is not sound.
+    """
+    from lapwing.services.common.flight_plan_file import OPERATED
+    from lapwing.services.scene_resolver import load
+
+    if not given:
+        return []
+    loaded = load(scene, set_)
+    if not loaded.vehicles:
+        files(given, loaded)
+        return OPERATED
+    names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
+    return [f"vehicle.{names.index(name)}.{text}" for name in files(given, loaded) for text in OPERATED]
+
+
+def commands(given: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]:
+    """The commands of each vehicle that flies a plan, by its name. ValueError: as of `overrides`, or no such plan."""
+    from lapwing.services.common.environment_schema import environment
+    from lapwing.services.common.flight_plan_file import read
+    from lapwing.services.common.vehicle_schema import start_height
+
+    scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.vehicles or (loaded,)}
+    return {
+        name: tuple(read(path, start_height(scenes[name]), environment(scenes[name]).home))
+        for name, path in files(given, loaded).items()
+    }
+
+
+def files(given: list[str], loaded: "Scene") -> dict[str, Path]:
+    """The plan of each vehicle that flies one, by its name. ValueError: as of `overrides`."""
+    if not loaded.vehicles:
+        if len(given) > 1:
+            raise ValueError(f"--plan {given[1]}: expected one plan, the scene has one vehicle")
+        return {loaded.lookup("vehicle.name"): Path(path) for path in given}
+    names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
+    found: dict[str, Path] = {}
+    for text in given:
+        name, equals, path = text.partition("=")
+        if not equals or name not in names or name in found:
+            expected = f"NAME=FILE, a plan for each of {', '.join(names)} that flies one"
+            raise ValueError(f"--plan {text}: the scene has several vehicles; expected {expected}")
+        found[name] = Path(path)
+    return found

@@ -1,0 +1,158 @@
+"""What a run comes to: the verdict, the events and the figures that `lapwing run` prints and writes as JSON."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.cosim.scene import Scene
+from lapwing.flight import Flight
+from lapwing.services.common.run_schema import Published
+from lapwing.studies import terminal
+from lapwing.studies.flight_data import SHOWN
+from lapwing.studies.separation import Separation, nearest
+from lapwing.studies.tracking import shown
+
+if TYPE_CHECKING:
+    from lapwing.runs.observer import Elapsed
+    from lapwing.services.process_main import Participation
+
+MOST = 60  # events that are printed
+COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all others
+
+
+def fleet(log: Path) -> list[Flight]:
+    """The flights of all vehicles of a log, as far as a run's end shows them; empty where nothing was flown."""
+    try:
+        return [flight for flight in Flight.read_all(log, SHOWN) if len(flight.truth)]
+    except ValueError:
+        return []
+
+
+def conclude(
+    scene: Scene,
+    given: "Participation",
+    flights: Sequence[Flight],
+    elapsed: "Elapsed | None",
+    write_to: Path | None,
+    report: Path | None,
+) -> None:
+    """Write report and figures, and print them.
+
+    Args:
+        scene: that was flown.
+        given: how.
+        flights: of each vehicle, as the log has them.
+        elapsed: how long it took; None where it was ended before its time.
+        write_to: the JSON file, if any.
+        report: the report's path, None for the log's with another ending.
+    """
+    first, several = flights[0], bool(scene.vehicles)
+    result = {
+        "scene": scene.name,
+        "seed": given.setup.seed,
+        "mode": given.mode,
+        "digest": first.digest,
+        **(_of_fleet(flights) if several else _of_vehicle(first)),
+        "sim_time_s": elapsed.simulated if elapsed else float(first.truth.times[-1]),
+        "wall_time_s": elapsed.wall if elapsed else None,
+        "real_time_factor": (elapsed.simulated / elapsed.wall if elapsed.wall else 0.0) if elapsed else None,
+        "log": str(first.origin.source),
+        "report": str(first.report(report)),
+    }
+    if write_to:
+        write_json(write_to, result)
+    if several:
+        show_fleet(terminal.console(), result)
+    else:
+        show(terminal.console(), scene, result)
+
+
+def _of_vehicle(flight: Flight) -> dict[str, Any]:
+    verdict = flight.verdict
+    return {
+        "verdict": {"text": str(verdict), **verdict._asdict()},
+        "events": [event._asdict() for event in flight.events],
+        "rmse": flight.rmse,
+        "landed": flight.landed,
+    }
+
+
+def _of_fleet(flights: Sequence[Flight]) -> dict[str, Any]:
+    return {
+        "vehicles": {flight.vehicle: _of_vehicle(flight) for flight in flights},
+        "separation": nearest(flights[0].fleet)._asdict() if len(flights) > 1 else None,
+    }
+
+
+def write_json(path: Path, result: dict[str, Any]) -> None:
+    """Write `result` for other programs."""
+    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+
+
+def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
+    """Print `result` for people."""
+    show_events(console, result["events"])
+    _errors(console, scene[Published], result["rmse"])
+    _verdict(console, result["verdict"])
+    _ending(console, result)
+
+
+def show_fleet(console: Console, result: dict[str, Any]) -> None:
+    """Print `result` of several vehicles for people."""
+    for name, one in result["vehicles"].items():
+        _verdict(console, one["verdict"], f"{name}: ")
+    if result["separation"]:
+        console.print(str(Separation(**result["separation"])), highlight=False)
+    _ending(console, result)
+
+
+def _verdict(console: Console, verdict: dict[str, Any], of: str = "") -> None:
+    console.print(f"{of}{verdict['text']}", style=f"bold {COLOURS.get(verdict['kind'], 'red')}")
+
+
+def _ending(console: Console, result: dict[str, Any]) -> None:
+    if result["wall_time_s"] is not None:
+        console.print(
+            f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
+            f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
+            highlight=False,
+        )
+    for name in ("digest", "log", "report"):
+        if result[name]:
+            console.print(f"{name:<7} {result[name]}", soft_wrap=True)
+
+
+def show_events(console: Console, events: list[dict[str, Any]]) -> None:
+    """Print what happened, the first of many."""
+    if not events:
+        return
+    table = Table("time [s]", "event", "", box=None, pad_edge=False, header_style="dim")
+    table.columns[0].justify = "right"
+    for event in events[:MOST]:
+        table.add_row(f"{event['time']:.2f}", event["kind"], event["text"])
+    console.print(table)
+    if len(events) > MOST:
+        console.print(f"and {len(events) - MOST} more events: the report and --json have all of them")
+
+
+def _errors(console: Console, published: Published, rmse: dict[str, float]) -> None:
+    if not any(map(math.isfinite, rmse.values())):
+        return  # there is no reference, or the motors were never armed
+    console.print("Root-mean-square error against the reference")
+    table = Table()
+    table.add_column("axis")
+    table.add_column("this run", justify="right")
+    if published.rmse:
+        table.add_column(published.source, justify="right")
+    for axis, value in rmse.items():
+        unit, scale = shown(axis)
+        row = [f"{axis} [{unit}]", f"{scale * value:.4f}"]
+        if published.rmse:
+            row.append(f"{scale * published.rmse[axis]:.4f}" if axis in published.rmse else "")
+        table.add_row(*row)
+    console.print(table)

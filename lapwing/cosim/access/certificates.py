@@ -1,0 +1,117 @@
+"""Certificates for participants that meet over a network: one authority, and a folder for each of them.
+
+FOLDER/NAME/authority.pem     who is trusted
+FOLDER/NAME/certificate.pem   NAME as its common name
+FOLDER/NAME/key.pem           its private key, mode 0600
+FOLDER/NAME/zenoh.json5       all of it in a Zenoh configuration for programs of one's own, wherever it is taken; 0600
+"""
+
+import base64
+import json
+import os
+import stat
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+AUTHORITY, CERTIFICATE, KEY, CONFIGURATION = "authority.pem", "certificate.pem", "key.pem", "zenoh.json5"
+_CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
+_LINKS = {
+    "enable_mtls": True,
+    # who is at the other end is told by the common name, at both ends (lapwing.cosim.access.zenoh_access), whatever its address
+    "verify_name_on_connect": False,
+    "close_link_on_expiration": True,
+}
+
+
+def make(folder: Path, names: Iterable[str], days: int) -> None:
+    """Make a folder of certificates, whole or not at all; the authority's own key is thrown away.
+
+    Args:
+        folder: must not be there.
+        names: of the participants.
+        days: for which they are valid.
+
+    Raises:
+        ValueError: the folder is there or cannot be made, or the program openssl is missing or fails.
+    """
+    if folder.exists():
+        raise ValueError(f"{folder}: is there already; remove it, or name another folder")
+    try:
+        with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=".keys-") as place:
+            made = Path(place) / "made"
+            made.mkdir(mode=0o700)
+            authority, secret = Path(place) / AUTHORITY, Path(place) / "authority.key"
+            _openssl(
+                *("-x509", *_CURVE, "-days", str(days), "-subj", "/CN=lapwing authority"),
+                *("-addext", "basicConstraints=critical,CA:TRUE", "-addext", "keyUsage=critical,keyCertSign"),
+                *("-keyout", str(secret), "-out", str(authority)),
+            )
+            for name in names:
+                own = made / name
+                own.mkdir(mode=0o700)
+                _openssl(
+                    *("-x509", *_CURVE, "-days", str(days), "-subj", f"/CN={name}"),
+                    *("-CA", str(authority), "-CAkey", str(secret), "-addext", f"subjectAltName=DNS:{name}"),
+                    *("-addext", "basicConstraints=critical,CA:FALSE"),
+                    *("-addext", "extendedKeyUsage=serverAuth,clientAuth"),
+                    *("-keyout", str(own / KEY), "-out", str(own / CERTIFICATE)),
+                )
+                (own / AUTHORITY).write_bytes(authority.read_bytes())
+                (own / CONFIGURATION).write_text(json.dumps(_configuration(own)) + "\n")
+                for file in (AUTHORITY, CERTIFICATE):  # whatever the umask
+                    (own / file).chmod(0o644)
+                for file in (KEY, CONFIGURATION):
+                    (own / file).chmod(0o600)
+            made.rename(folder)
+    except OSError as error:
+        raise ValueError(f"{folder}: cannot be made: {(error.strerror or str(error)).lower()}") from None
+
+
+def tls(folder: Path, name: str) -> dict[str, Any]:
+    """Zenoh's settings for the certificate of a participant.
+
+    Raises:
+        ValueError: it is not there, cannot be read, or others can read its key.
+    """
+    own = folder.absolute() / name
+    for file in (AUTHORITY, CERTIFICATE, KEY):
+        if not os.access(own / file, os.R_OK):
+            raise ValueError(f"--keys {folder}: {name}/{file} cannot be read; `lapwing keys {folder}` makes them")
+    if stat.S_IMODE((own / KEY).stat().st_mode) & 0o077:
+        raise ValueError(f"--keys {folder}: others can read {name}/{KEY}; chmod 600 mends it")
+    return {"transport/link/tls": _tls(own)}
+
+
+def _tls(own: Path) -> dict[str, Any]:
+    key, certificate = str(own / KEY), str(own / CERTIFICATE)
+    return {
+        "root_ca_certificate": str(own / AUTHORITY),
+        "listen_private_key": key,
+        "listen_certificate": certificate,
+        "connect_private_key": key,
+        "connect_certificate": certificate,
+        **_LINKS,
+    }
+
+
+def _configuration(own: Path) -> dict[str, Any]:
+    """For a client: what the files hold instead of where they are."""
+    entries = {
+        "root_ca_certificate_base64": AUTHORITY,
+        "connect_private_key_base64": KEY,
+        "connect_certificate_base64": CERTIFICATE,
+    }
+    held = {entry: base64.b64encode((own / file).read_bytes()).decode() for entry, file in entries.items()}
+    return {"mode": "client", "transport": {"link": {"tls": {**held, **_LINKS}}}}
+
+
+def _openssl(*arguments: str) -> None:
+    try:
+        subprocess.run(["openssl", "req", *arguments], check=True, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise ValueError("openssl: no such program; certificates are made with it") from None
+    except subprocess.CalledProcessError as error:
+        raise ValueError(f"openssl: {error.stderr.strip().splitlines()[-1]}") from None

@@ -1,0 +1,72 @@
+"""Who may say what: Zenoh's access control, for both ends of every link. What is not allowed is denied."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from lapwing.cosim.access.private_sockets import SCHEME
+from lapwing.cosim.transport.bus_keys import SETUP_KEY
+
+VIEWER = "viewer"  # whose certificate reads, and says nothing
+
+_LISTEN = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
+_SAY = ["put", "liveliness_token", "declare_queryable", "reply"]
+_VIEWING = {"rules": ["receive", "listen", "withhold"], "subjects": [VIEWER]}
+_ALL = [*_LISTEN, *_SAY, "query", "delete"]
+
+
+def by_certificate(key_prefix: str, says: Mapping[str, Iterable[str]]) -> dict[str, Any]:
+    """Zenoh's settings for a run whose participants have certificates.
+
+    Args:
+        key_prefix: of the run.
+        says: what each participant may publish: key expressions, by the common name of its certificate.
+    """
+    everything = f"{key_prefix}/**"
+    rules = [
+        *_reading(everything),
+        _rule("ask", ["query"], "ingress", [f"{key_prefix}/{SETUP_KEY}/*"]),
+        *(_rule(f"say {name}", _SAY, "ingress", keys) for name, keys in says.items()),
+    ]
+    subjects = [{"id": name, "cert_common_names": [name]} for name in [*says, VIEWER]]
+    policies = [{"rules": ["receive", "listen", "ask", f"say {name}"], "subjects": [name]} for name in says]
+    return _settings([*rules, _withheld(key_prefix)], subjects, [*policies, _VIEWING])
+
+
+def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
+    """Zenoh's settings for the door of a run on one machine: who comes in reads, and says nothing.
+
+    Args:
+        key_prefix: of the run.
+        certificates: whether only a viewer's certificate lets in.
+    """
+    inside = {"id": "inside", "link_protocols": [SCHEME.rstrip("/")]}
+    outside = {"id": VIEWER, "cert_common_names": [VIEWER]}
+    if not certificates:
+        outside = {"id": VIEWER, "link_protocols": ["tcp", "udp", "ws", "quic"]}
+    rules = [*_reading(f"{key_prefix}/**"), _rule("all", _ALL, "ingress", ["**"]), _rule("any", _ALL, "egress", ["**"])]
+    policies = [{"rules": ["all", "any"], "subjects": ["inside"]}]
+    return _settings([*rules, _withheld(key_prefix)], [inside, outside], [*policies, _VIEWING])
+
+
+def withholding(key_prefix: str) -> dict[str, Any]:
+    """Zenoh's settings for a router that cannot tell viewers from participants, who are joined without it."""
+    policies = [{"rules": ["withhold"], "subjects": ["anybody"]}]
+    return _settings([_withheld(key_prefix)], [{"id": "anybody"}], policies, default="allow")
+
+
+def _reading(key: str) -> list[dict[str, Any]]:
+    return [_rule("receive", _ALL, "egress", [key]), _rule("listen", _LISTEN, "ingress", [key])]
+
+
+def _withheld(key_prefix: str) -> dict[str, Any]:
+    """Rule that keeps lock-step messages from viewers: a sender would wait for one that stops reading."""
+    return _rule("withhold", ["put", "delete"], "egress", [f"{key_prefix}/_$*/**"]) | {"permission": "deny"}
+
+
+def _rule(name: str, messages: list[str], flow: str, keys: Iterable[str]) -> dict[str, Any]:
+    return {"id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": list(keys)}
+
+
+def _settings(rules: list, subjects: list, policies: list, default: str = "deny") -> dict[str, Any]:
+    settings = {"enabled": True, "default_permission": default, "rules": rules, "subjects": subjects}
+    return {"access_control": {**settings, "policies": policies}}

@@ -1,0 +1,195 @@
+"""Trees of values as canonical JSON and back, exactly: the same tree gives the same text, on every machine.
+
+Dicts and lists are JSON's own. All else is an object with the key "$", which says what it is:
+
+    {"$": "tuple", "of": [...]}
+    {"$": "float", "of": "inf"}                             what JSON has no number for: inf, -inf, nan
+    {"$": "scalar", "dtype": "uint64", "of": 3}             a number of numpy
+    {"$": "array", "dtype": "float64", "shape": [2], "of": [0.5, 1.0]}
+    {"$": "dict", "of": {...}}                              a dict that itself has the key "$"
+    {"$": "lapwing.dynamics.effects.gravity:Gravity", "acceleration": 9.80665}      a NamedTuple or frozen dataclass
+"""
+
+import dataclasses
+import hashlib
+import importlib
+import json
+import math
+import sys
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+TAG = "$"
+DTYPES = ("bool", "float64", "int64")  # of arrays
+SCALARS = ("bool", "float64", "int64", "uint64")
+
+
+def to_json(tree: Any) -> str:
+    """Canonical text of a tree: keys sorted, no spaces, floats as Python's `repr` writes them.
+
+    Args:
+        tree: NamedTuples, frozen dataclasses, tuples, lists, dicts with texts as keys, str, bool, int, float, None,
+            numpy arrays of float64, int64 and bool, numpy scalars.
+
+    Raises:
+        ValueError: anything else, or a class that cannot be imported by its name; says where in the tree.
+    """
+    return json.dumps(_encoded(tree, ""), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def from_json(text: str, modules: Collection[str] = ()) -> Any:
+    """The tree of a text that `to_json` gave.
+
+    Args:
+        text: may be a stranger's: nothing is imported for it but this project's own packages, and what is declared.
+        modules: further modules whose classes it may have.
+
+    Raises:
+        ValueError: not JSON, an unknown tag, or a class that is not there, has other fields now, or is not declared.
+    """
+    try:
+        return _decoded(json.loads(text), modules)
+    except RecursionError:
+        raise ValueError("not a tree of values: nested too deeply") from None
+
+
+def digest(tree: Any) -> str:
+    """BLAKE2b of the canonical text, hexadecimal."""
+    return hashlib.blake2b(to_json(tree).encode(), digest_size=16).hexdigest()
+
+
+class Absent:
+    """Stands for a value that only one of two trees has."""
+
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+ABSENT = Absent()
+OWN = ("cosim", "dynamics", "messages", "services")  # packages whose modules a text may have imported
+
+
+def first_difference(a: Any, b: Any) -> tuple[str, Any, Any] | None:
+    """Where two trees differ first: (dotted path, value in `a`, value in `b`); None if they are the same to the bit.
+
+    A value that one of them does not have is `ABSENT`.
+    """
+    return _difference(a, b, "")
+
+
+def _difference(a: Any, b: Any, path: str) -> tuple[str, Any, Any] | None:
+    children_a, children_b = _children(a), _children(b)
+    if type(a) is not type(b) or children_a is None or children_b is None:
+        same = a is not ABSENT and b is not ABSENT and to_json(a) == to_json(b)
+        return None if same else (path, a, b)
+    for key in dict.fromkeys([*children_a, *children_b]):
+        inner = f"{path}.{key}" if path else str(key)
+        found = _difference(children_a.get(key, ABSENT), children_b.get(key, ABSENT), inner)
+        if found:
+            return found
+    return None
+
+
+def _children(value: Any) -> dict[Any, Any] | None:
+    """The members of a tree's node by name or index; None for a leaf."""
+    if isinstance(value, dict):
+        return dict(sorted(value.items()))
+    if _is_record(type(value)):
+        return {name: getattr(value, name) for name in _fields(type(value))}
+    if isinstance(value, tuple | list):
+        return dict(enumerate(value))
+    if isinstance(value, np.ndarray) and value.ndim:
+        return {"dtype": value.dtype.name, "shape": value.shape, **dict(enumerate(value))}
+    return None
+
+
+def _encoded(value: Any, path: str) -> Any:
+    kind = type(value)
+    if value is None or kind in (bool, int, str):
+        return value
+    if kind is float:
+        return value if math.isfinite(value) else {TAG: "float", "of": repr(value)}
+    if kind is list:
+        return [_encoded(item, f"{path}.{i}") for i, item in enumerate(value)]
+    if kind is tuple:
+        return {TAG: "tuple", "of": [_encoded(item, f"{path}.{i}") for i, item in enumerate(value)]}
+    if kind is dict:
+        for key in value:
+            if type(key) is not str:
+                raise ValueError(f"{path or 'tree'}: key {key!r}: expected a text")
+        inner = {key: _encoded(item, f"{path}.{key}") for key, item in value.items()}
+        return {TAG: "dict", "of": inner} if TAG in value else inner
+    if _is_record(kind):
+        return {TAG: _name_of(kind), **{f: _encoded(getattr(value, f), f"{path}.{f}") for f in _fields(kind)}}
+    if isinstance(value, np.ndarray) and value.dtype.name in DTYPES:
+        flat = [_encoded(item, path) for item in value.ravel().tolist()]
+        return {TAG: "array", "dtype": value.dtype.name, "shape": list(value.shape), "of": flat}
+    if isinstance(value, np.generic) and value.dtype.name in SCALARS:
+        return {TAG: "scalar", "dtype": value.dtype.name, "of": _encoded(value.item(), path)}
+    raise ValueError(f"{path.lstrip('.') or 'tree'}: a {kind.__module__}.{kind.__qualname__} cannot be serialised")
+
+
+def _decoded(value: Any, modules: Collection[str]) -> Any:
+    if isinstance(value, list):
+        return [_decoded(item, modules) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if TAG not in value:
+        return {key: _decoded(item, modules) for key, item in value.items()}
+    tag = value[TAG]
+    try:
+        if tag == "float":
+            return float(value["of"])
+        if tag == "tuple":
+            return tuple(_decoded(item, modules) for item in value["of"])
+        if tag == "dict":
+            return {key: _decoded(item, modules) for key, item in value["of"].items()}
+        if tag == "scalar":
+            return np.dtype(value["dtype"]).type(_decoded(value["of"], modules))
+        if tag == "array":
+            return np.array(_decoded(value["of"], modules), dtype=value["dtype"]).reshape(value["shape"])
+    except (KeyError, TypeError, OverflowError) as error:
+        raise ValueError(f"damaged {tag!r}: {error!r}") from None
+    members = {key: _decoded(item, modules) for key, item in value.items() if key != TAG}
+    return _record(_class_of(str(tag), modules), str(tag), members)
+
+
+def _record(cls: type, name: str, members: dict[str, Any]) -> Any:
+    if set(members) != set(_fields(cls)):
+        raise ValueError(f"{name}: has the fields {', '.join(_fields(cls))}, got {', '.join(members)}")
+    return cls(**members)
+
+
+def _is_record(cls: type) -> bool:
+    """Whether it is a NamedTuple or a frozen dataclass."""
+    if issubclass(cls, tuple):
+        return hasattr(cls, "_fields")
+    return dataclasses.is_dataclass(cls) and cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+
+
+def _fields(cls: type) -> tuple[str, ...]:
+    return cls._fields if hasattr(cls, "_fields") else tuple(f.name for f in dataclasses.fields(cls))  # type: ignore
+
+
+def _name_of(cls: type) -> str:
+    name = f"{cls.__module__}:{cls.__qualname__}"
+    if _class_of(name, [cls.__module__]) is not cls:
+        raise ValueError(f"{name}: is another class of the same name; it cannot be serialised")
+    return name
+
+
+def _class_of(name: str, modules: Collection[str]) -> type:
+    module, _, path = name.partition(":")
+    if module.partition(".")[0] not in OWN and module not in sys.modules and module not in modules:
+        raise ValueError(f"{name}: no such class; expected one of {', '.join(OWN)} or of a declared module")
+    try:
+        found: Any = importlib.import_module(module)
+        for part in path.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"{name}: no such class can be imported ({error})") from None
+    if not (isinstance(found, type) and _is_record(found)):
+        raise ValueError(f"{name}: expected a NamedTuple or a frozen dataclass")
+    return found

@@ -1,0 +1,194 @@
+"""A user's own modules: found beside the scene or where Python finds modules, and carried in the set-up as text.
+
+Whoever takes part in a run, and whoever flies it again, runs that text: no process looks for the file a second time,
+and an edit while a run starts reaches nobody. The text is laid down in a folder of the cache that is named by its
+content, so that tracebacks can show it and machine code made of it can be kept. A package, or a module in one, is
+imported as usual: it has to be installed wherever the run is flown.
+"""
+
+import ast
+import atexit
+import hashlib
+import importlib
+import importlib.util
+import os
+import shutil
+import sys
+import tempfile
+import traceback
+import uuid
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from types import ModuleType
+
+from lapwing.cosim.access.private_sockets import only_ours
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.kernels import cache_folder, forget_sources
+
+
+def find(key: str, name: str, folder: Path) -> dict[str, Path]:
+    """The file of a module, beside the scene or on `sys.path`, and those beside it that it imports; none is imported.
+
+    Args:
+        key: dotted key of the scene that names it.
+        name: of the module.
+        folder: of the scene.
+
+    Returns:
+        Files by the name of the module; the first is its own.
+
+    Raises:
+        KeyedError: there is none, it has no source, or its name is taken.
+    """
+    if not all(part.isidentifier() for part in name.split(".")):
+        raise KeyedError(key, f"got module {name!r}", "a name that Python can import")
+    file, installed = (folder / f"{name}.py").resolve(), installed_module(name)
+    if file.is_file():
+        if _taken(name, file):
+            raise KeyedError(key, f"{file}: another module has this name", "a name of its own")
+    elif installed is None:
+        raise KeyedError(key, f"no module {name}", f"{file}, or a module on Python's path")
+    elif not (installed.origin or "").endswith(".py"):
+        raise KeyedError(key, f"module {name} has no source", "one written in Python")
+    else:
+        file = Path(str(installed.origin)).resolve()
+    found = {name: file}
+    ahead = [file] if _is_carried(name, file) else []
+    while ahead:
+        for imported in _imports(ahead.pop()):
+            beside = file.parent / f"{imported}.py"
+            if imported not in found and beside.is_file() and not _taken(imported, beside):
+                found[imported] = beside
+                ahead.append(beside)
+    return found
+
+
+def _taken(name: str, file: Path) -> bool:
+    """Whether Python would import another file of that name."""
+    installed = installed_module(name)
+    other = installed is not None and Path(str(installed.origin)).resolve() != file
+    return other or name in sys.stdlib_module_names
+
+
+def installed_module(name: str) -> ModuleSpec | None:
+    """The module of that name on `sys.path`, without the folders that this module has laid down."""
+    if "." not in name:
+        return PathFinder.find_spec(name, [path for path in sys.path if path not in _laid_down])
+    with suppress(ImportError, ValueError):
+        return importlib.util.find_spec(name)
+    return None
+
+
+def _is_carried(name: str, file: Path) -> bool:
+    return "." not in name and file.name != "__init__.py"
+
+
+def _imports(file: Path) -> list[str]:
+    """Top-level names that a source imports; none where it is no Python."""
+    found: set[str] = set()
+    with suppress(SyntaxError, ValueError, OSError):
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.Import):
+                found.update(alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.partition(".")[0])
+    return sorted(found)
+
+
+FAULTS = (Exception, SystemExit)  # what a user's code may raise, and a run ends with one line
+_laid_down: set[str] = set()  # folders on `sys.path` with the texts of set-ups
+
+
+def load(name: str, texts: Mapping[str, str]) -> ModuleType:
+    """The module of that name, run from its text unless it has been imported from the same text before.
+
+    Args:
+        name: of the module.
+        texts: of all modules that the set-up carries, by name.
+
+    Raises:
+        Exception: whatever the module raises; ImportError where one that is not carried is missing.
+    """
+    install(texts)
+    return importlib.import_module(name)
+
+
+def install(texts: Mapping[str, str]) -> None:
+    """Let imports find the modules that a set-up carries; what was imported from other texts is forgotten."""
+    plain = {n: text for n, text in texts.items() if "." not in n}
+    stale = [n for n in plain if n in sys.modules and source(sys.modules[n]) not in (None, plain[n])]
+    for n in plain if stale else ():
+        sys.modules.pop(n, None)  # those that import a stale one are stale, too
+    if stale:
+        forget_sources()
+    if any(n not in sys.modules for n in plain):
+        folder = _lay_down(plain)
+        if folder not in sys.path:
+            sys.path.append(folder)
+        _laid_down.add(folder)
+        for other in _laid_down - {folder}:
+            if other in sys.path:
+                sys.path.remove(other)
+        importlib.invalidate_caches()
+
+
+def source(module: ModuleType) -> str | None:
+    """Source of a module that has a file of its own; None where it is a package."""
+    file = Path(getattr(module, "__file__", None) or "__init__.py")
+    with suppress(OSError, UnicodeDecodeError):
+        return None if file.name == "__init__.py" else file.read_text(encoding="utf-8")
+    return ""
+
+
+def _lay_down(texts: Mapping[str, str]) -> str:
+    """The folder with these modules as files: in the cache, or of this process where others could write to that."""
+    digest = hashlib.blake2b("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode(), digest_size=16).hexdigest()
+    kept = cache_folder()
+    if kept is not None:
+        folder = kept / "modules" / digest
+        with suppress(OSError):
+            for path in (kept, folder.parent, folder):
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
+            if all(map(only_ours, (kept, folder.parent, folder))):
+                _write(folder, texts)
+                return str(folder)
+    folder = _folder_of_this_process() / digest
+    folder.mkdir(exist_ok=True)
+    _write(folder, texts)
+    return str(folder)
+
+
+def _write(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write what is not there as it should be."""
+    for name, text in texts.items():
+        file, content = folder / f"{name}.py", text.encode()
+        if not file.exists() or not only_ours(file) or file.read_bytes() != content:
+            temporary = folder / f"{name}.{uuid.uuid4().hex}"
+            with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
+                out.write(content)
+            temporary.replace(file)
+
+
+@cache
+def _folder_of_this_process() -> Path:
+    """A new one, which goes with this process; its forks may use it, too."""
+    folder, maker = tempfile.mkdtemp(prefix="lapwing-"), os.getpid()
+
+    @atexit.register
+    def remove() -> None:
+        if os.getpid() == maker:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    return Path(folder)
+
+
+def blame(error: BaseException, module: ModuleType) -> str:
+    """What an exception says, with the last line of the module on its way."""
+    file = getattr(module, "__file__", None)  # what is typed at a prompt has none
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""
+    said = str(error).strip().partition("\n")[0]
+    return f"{type(error).__name__}{': ' if said else ''}{said}{where}"

@@ -1,0 +1,254 @@
+"""A part of a service's core, compiled: takes the rows that are due, steps, and gives rows.
+
+A part is described by its parameters, a NamedTuple. The module of their class has the pure function
+
+    step(parameters, state, tick, inputs) -> (state, outputs, signal)
+
+`inputs` is a tuple of `Received`, `outputs` a tuple of trees, one for each port; the state lives in a cell, which parts
+of one service may share. Every part is compiled once, to a function of (its memory, tick), and every executor calls
+that same machine code by its address: whatever the executor, the bits are the same.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port, due
+from lapwing.kernels import kernel, leaf, uncounted
+from lapwing.kernels.cell import Cell
+from lapwing.kernels.codegen import define, implements
+from lapwing.kernels.row_packing import load, store
+
+GO_ON, LOOK, END, FAILED = range(4)
+"""Signals of a step: nothing; Python parts are to act at this tick; the tick is the last; the state is unsound."""
+
+
+class Received(NamedTuple):
+    """What an input has at a tick; without a message that is due the value means nothing."""
+
+    due: bool
+    value: Any
+
+
+class InputRows(NamedTuple):
+    """Where an input is read: a ring of rows."""
+
+    like: Any
+    rows: np.ndarray  # (depth, width), the depth a power of two
+    period: int
+    delay: int
+
+
+class OutputRows(NamedTuple):
+    """Where an output is written: a ring of rows."""
+
+    rows: np.ndarray  # (depth, width)
+    period: int
+
+
+class Core(NamedTuple):
+    """All that a compiled part is given at a tick."""
+
+    parameters: Any
+    state: Any  # cell
+    inputs: tuple
+    outputs: tuple
+
+
+@dataclass
+class Part:
+    """A compiled part, as its service declares it.
+
+    Attributes:
+        name: "plant", "sensors.imu".
+        parameters: a NamedTuple whose module has `step`.
+        state: the cell that holds its state.
+        inputs: what it takes, in the order of the argument `inputs`.
+        outputs: the ports that it gives, in the order of its outputs.
+        every: ticks between two steps.
+        failure: the error of a step at a tick that says that the state is unsound.
+        vehicle: of a fleet, whose part it is.
+        trusted: whether its step changes arrays in place or not at all, so that references need not be counted.
+    """
+
+    name: str
+    parameters: Any
+    state: Any
+    inputs: tuple[Input, ...] = ()
+    outputs: tuple[Port, ...] = ()
+    every: int = 1
+    failure: Callable[[int], Exception] | None = None
+    vehicle: str = ""
+    trusted: bool = True
+
+
+class Code(NamedTuple):
+    """The machine code of a bound part."""
+
+    function: int  # address
+    memory: int  # address
+    cell: Any  # what is at that address; it must live as long as the code is called
+
+
+def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Code:
+    """Compile a part or load it, on the rows of its ports."""
+    inputs = tuple(InputRows(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
+    outputs = tuple(OutputRows(rows[port.name], port.period) for port in part.outputs)
+    cell = Cell(Core(part.parameters, part.state, inputs, outputs))
+    return Code(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
+
+
+@cache
+def _address(cell: types.Type, trusted: bool) -> int:
+    """The machine code that advances a part whose `Core` is in a cell of this type."""
+    signature, function = (cell, types.int64), advance if trusted else advance_counted
+    function.compile(signature)  # type: ignore[attr-defined]
+    compiled: Any = function.overloads[signature]  # type: ignore[attr-defined]
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+
+def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
+    """`step` of the module that declares the class of the parameters."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(step, inline=True)
+def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
+    return sys.modules[parameters.instance_class.__module__].step
+
+
+@leaf
+def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
+    """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
+    if period == 1:
+        return stamp & (rows.shape[0] - 1)
+    return 0 if period == KEPT else (stamp // period) & (rows.shape[0] - 1)
+
+
+@leaf
+def _take(given: InputRows, tick: int) -> Received:
+    stamp = due(tick, given.period, given.delay)
+    return Received(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
+
+
+@leaf
+def _give(value: Any, taken: OutputRows, tick: int) -> None:
+    if due(tick, taken.period, 0) >= 0:
+        store(value, taken.rows, row_of(tick, taken.period, taken.rows))
+
+
+def _take_all(inputs: tuple[InputRows, ...], tick: int) -> tuple[Received, ...]:
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_take_all, inline=True)
+def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
+    calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
+    return define("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
+
+
+def _give_all(values: tuple, outputs: tuple[OutputRows, ...], tick: int) -> None:
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_give_all, inline=True)
+def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
+    calls = [f"give(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
+    return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
+
+
+@uncounted
+def advance(memory: Any, tick: int) -> int:
+    """One step of the part whose `Core` is in the cell `memory`; its signal."""
+    core = memory.value
+    s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
+    core.state.value = s
+    _give_all(outputs, core.outputs, tick)
+    return signal
+
+
+@kernel
+def advance_counted(memory: Any, tick: int) -> int:
+    """The same for parts that may put an array in another's place (docs/decisions/0017)."""
+    return advance(memory, tick)
+
+
+@intrinsic
+def _invoke(typing_context: Any, function: types.Type, memory: types.Type, tick: types.Type) -> tuple[Any, Callable]:
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
+        pointer = ir.IntType(8).as_pointer()
+        structure = ir.LiteralStructType([pointer])
+        kind = ir.FunctionType(ir.IntType(64), [structure, ir.IntType(64)])
+        cell = builder.insert_value(ir.Constant(structure, ir.Undefined), builder.inttoptr(arguments[1], pointer), 0)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [cell, arguments[2]])
+
+    return types.int64(types.int64, types.int64, types.int64), generate
+
+
+class Schedule(NamedTuple):
+    """The parts of a graph in their order of execution, as the compiled loop calls them."""
+
+    function: np.ndarray  # (n,) int64 address; 0: a part in Python
+    memory: np.ndarray  # (n,) int64 address
+    every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled part
+    next: np.ndarray  # (n,) int64 tick of the next step, or of a Python part's next say
+    vehicle: np.ndarray  # (n,) int64 number of the vehicle whose part it is
+    done: np.ndarray  # (vehicles,) int64: 1 once a part of the vehicle has said that the tick is its last
+    ended: np.ndarray  # (1,) int64: 1 once all vehicles have
+
+
+def schedule(codes: Sequence[Code | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
+    """The schedule of these parts, with the vehicle of each; None stands for a part in Python, which looks first at
+    tick 0."""
+    names = list(dict.fromkeys(vehicles)) or [""]
+    return Schedule(
+        np.array([code.function if code else 0 for code in codes], np.int64),
+        np.array([code.memory if code else 0 for code in codes], np.int64),
+        np.array(every, np.int64),
+        np.zeros(len(codes), np.int64),
+        np.array([names.index(name) for name in vehicles], np.int64),
+        np.zeros(len(names), np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+@kernel
+def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]:
+    """Run the schedule in a cell from part `first` of `tick` until before the tick `stop`, or until somebody has a say.
+
+    Returns:
+        (tick, part, signal): LOOK: the Python part is to act at the tick, then go on with the next; FAILED: the part's
+        state is unsound; END: the tick before was the last; GO_ON: `stop` is reached.
+    """
+    plan = schedule.value
+    while tick < stop:
+        for k in range(first, len(plan.function)):
+            if plan.next[k] > tick:
+                continue
+            if plan.function[k] == 0:
+                return tick, k, LOOK
+            plan.next[k] = tick + plan.every[k]
+            signal = _invoke(plan.function[k], plan.memory[k], tick)
+            if signal != GO_ON:
+                if signal == FAILED:
+                    return tick, k, FAILED
+                if signal == END:
+                    plan.done[plan.vehicle[k]] = 1
+                    plan.ended[0] = plan.done.min()
+                elif signal == LOOK:
+                    for j in range(k + 1, len(plan.function)):
+                        if plan.function[j] == 0 and plan.vehicle[j] == plan.vehicle[k]:
+                            plan.next[j] = tick
+        first = 0
+        tick += 1
+        if plan.ended[0] == 1:
+            return tick, 0, END
+    return tick, 0, GO_ON

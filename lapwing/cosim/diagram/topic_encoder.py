@@ -1,0 +1,83 @@
+"""From the rows of a port to the messages of a topic: one description for each topic, in the services' `wire.py`.
+
+A page of rows becomes a page of payloads at once: `fields` gives the columns of the message's numbers, `sample` a
+message that fixes its texts and the lengths of its sequences. Where texts change during a run, rows hold their numbers
+in the service's table of texts, and a page falls into parts of the same texts.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.kernels.row_packing import columns
+from lapwing.messages.cdr_arrays import Record
+from lapwing.messages.topics import Topic
+
+Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a scalar, or a function that gives one
+
+
+@dataclass(frozen=True)
+class Wire:
+    """How a topic is made of a port.
+
+    Attributes:
+        topic: the topic.
+        port: name of the port.
+        period: ticks between two messages; a multiple of the port's.
+        fields: (columns of the port's tree, instants [ns] (n,) of int64) to the message's fields.
+        sample: a message with the texts of the given key; the key is () where `texts` is None.
+        texts: the columns, each (n,), whose numbers choose the texts.
+    """
+
+    topic: Topic
+    port: str
+    period: int
+    fields: Callable[[Any, np.ndarray], Fields]
+    sample: Callable[..., Any]
+    texts: Callable[[Any], Sequence[np.ndarray]] | None = None
+
+
+class Page(NamedTuple):
+    """Messages of one topic and of one shape."""
+
+    topic: Topic
+    ticks: np.ndarray  # (n,) int64
+    payloads: np.ndarray  # (n,) records of the message
+
+
+def later(pages: Iterable[Page], first: int) -> list[Page]:
+    """What pages hold of the ticks from `first` on."""
+    found = []
+    for page in pages:
+        k = int(np.searchsorted(page.ticks, first))
+        if k < len(page.ticks):
+            found.append(Page(page.topic, page.ticks[k:], page.payloads[k:]) if k else page)
+    return found
+
+
+def encode(wire: Wire, port: Port, setup: Setup, ticks: np.ndarray, rows: np.ndarray) -> Iterator[Page]:
+    """The messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
+    tree = columns(port.like, rows)
+    if wire.texts is None:
+        yield _page(wire, wire.sample(), tree, ticks, setup)
+        return
+    keys = np.stack([np.asarray(column, np.int64) for column in wire.texts(tree)], axis=1)
+    for key in np.unique(keys, axis=0):
+        chosen = np.flatnonzero((keys == key).all(axis=1))
+        part = columns(port.like, rows[chosen]) if len(chosen) < len(ticks) else tree
+        yield _page(wire, wire.sample(*key.tolist()), part, ticks[chosen], setup)
+
+
+def _page(wire: Wire, sample: Any, tree: Any, ticks: np.ndarray, setup: Setup) -> Page:
+    fields = wire.fields(tree, ticks * setup.interval_ns)
+    return Page(wire.topic, ticks, Record.of(sample).encode(len(ticks), fields))
+
+
+def due_ticks(first: int, stop: int, period: int) -> np.ndarray:
+    """The ticks of [first, stop) at which a message of this period is due, (n,) int64."""
+    begin = -(-max(first, 0) // period) * period
+    return np.arange(begin, stop, period, dtype=np.int64)

@@ -1,0 +1,191 @@
+"""The lock step of a process: wait for what is due, step, publish."""
+
+import os
+import time
+from contextlib import suppress
+
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.executors import realtime
+from lapwing.cosim.executors.deadlines import Deadlines
+from lapwing.cosim.executors.log_backpressure import Backlog
+from lapwing.cosim.executors.participant import Process, Stopped
+from lapwing.cosim.run_errors import DivergedError
+from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
+from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, Outlets, Source, sources
+from lapwing.cosim.transport.packet_schedule import ticks_at_once
+
+
+def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: str) -> None:
+    """Step `service` from tick 0 to the last tick of the run.
+
+    Args:
+        process: the participant.
+        service: what it steps.
+        owns_time: whether it keeps the pace, and says which tick is the last.
+        recorder: the participant whose log whoever owns time does not leave far behind.
+
+    The end travels along the bundles: an empty one says that there will be no other. Whoever owns time says besides
+    whether that was the end of the run.
+
+    Raises:
+        Stopped: asked to end.
+        LockStepError: a message did not come, not the one that was due, or a state is not sound.
+    """
+    setup = process.setup
+    graph = Graph(setup, [service], 2 * PAGE)
+    graph.advance(0)  # nothing is stepped, but the loop over the parts is compiled before the clock begins
+    givers = sources(process, graph)
+    outlets = Outlets(process, service, graph)
+    backlog = Backlog(process, recorder) if owns_time else None
+    linger = process.linger_with(recorder) if process.restarts else None
+    if backlog and process.restarts:
+        backlog.resume(0)  # nobody may be left behind by more than what is held for him
+    if process.journal:
+        _catch_up(process, graph, givers, outlets, backlog, recorder)
+    process.join()
+    outlets.look()
+    if process.core is not None:
+        pin(process.core)
+        if process.speed is None:
+            batch()
+    if process.realtime:
+        realtime.enter()
+    allowed = setup.interval / process.speed if process.speed is not None else None
+    at_once = ticks_at_once(setup, process.name) if process.bundles_ahead else 1
+    deadlines = Deadlines()
+    started = time.perf_counter() - graph.tick * (allowed or 0.0)
+    try:
+        while not graph.ended:
+            if process.stopping:
+                raise Stopped
+            tick = graph.tick
+            known = min([giver.take(tick) for giver in givers], default=tick + 1)
+            if backlog:
+                backlog.hold(tick)
+            if allowed is not None and owns_time:
+                deadlines.note(_pace(started + tick * allowed))
+            begun = time.perf_counter()
+            graph.advance(min(known, tick + at_once))
+            outlets.publish(tick, graph.tick)
+            if allowed is not None and not owns_time:
+                deadlines.note(time.perf_counter() - begun - allowed * (graph.tick - tick))
+        if owns_time:
+            process.say_last(ENDED_KEY)
+    except EndOfRun as end:
+        if owns_time:
+            process.say_last(ENDED_KEY, f"{end} ended before the run did")
+    except DivergedError as error:  # said before the end is
+        process.say_last(DIVERGED_KEY, str(error))
+        raise
+    finally:
+        if allowed is not None:
+            process.say_last(DEADLINES_KEY, deadlines.told())
+        _leave(process, outlets, graph.tick)
+    if linger:  # somebody may be started again who has missed the last bundles
+        linger()
+
+
+def _leave(process: Process, outlets: Outlets, stop: int) -> None:
+    """Hand over what is left of the ticks before `stop`, and wait until everybody has received it."""
+    outlets.end(stop)
+    process.confirm()
+    process.leave(lambda: outlets.say_end(stop))
+
+
+def _catch_up(
+    process: Process, graph: Graph, givers: list[Source], outlets: Outlets, backlog: Backlog | None, recorder: str
+) -> None:
+    """Step once more through what the service had been given before it was killed; errors as of `run_lockstep`."""
+    assert process.journal
+    for tick in process.journal.recall():
+        if tick == 0:
+            process.await_participant(recorder)
+            recorded = outlets.resume(recorder)
+            if backlog:
+                backlog.resume(recorded)
+        if process.stopping:
+            raise Stopped
+        for giver in givers:
+            giver.take(tick)
+        graph.advance(tick + 1)
+        outlets.repeat(tick)
+
+
+class _Rows:
+    """Stands for the parts of a service elsewhere: its ports, whose rows come on the bus."""
+
+    def __init__(self, service: str, ports: tuple[Port, ...]):
+        self.name, self.outputs = service, ports
+
+    def bind(self, graph: Graph) -> None:
+        """Nothing to be known."""
+
+    def act(self, tick: int) -> int:
+        """The rows have come."""
+        return NEVER
+
+
+def run_encoder(process: Process, service: Service) -> None:
+    """Make the messages of a service that is somebody else's program, and gives rows only.
+
+    Args:
+        process: the participant.
+        service: its wires are used, its parts are not.
+
+    Raises:
+        Stopped: asked to end.
+        LockStepError: a bundle did not come, or not the one that was due.
+    """
+    ports = process.setup.services[service.name].ports
+    elsewhere = Service(service.name, [_Rows(service.name, ports)], service.wires)
+    graph = Graph(process.setup, [elsewhere], 2 * PAGE)
+    giver = Source(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
+    outlets = Outlets(process, elsewhere, graph, hands_over=False)
+    process.join()
+    outlets.look()
+    try:
+        while not process.stopping:
+            tick = graph.tick
+            giver.take(tick)
+            graph.advance(tick + 1)
+            outlets.publish(tick, tick + 1)
+    except EndOfRun:
+        return
+    finally:
+        _leave(process, outlets, graph.tick)
+    raise Stopped
+
+
+def pin(core: int) -> None:
+    """Keep all threads of this process on one core.
+
+    In sequential lock step only one process works at a time; handing over on one core costs half of what waking
+    another core costs (docs/benchmarks.md).
+    """
+    if hasattr(os, "sched_setaffinity"):
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), {core})
+
+
+def batch() -> None:
+    """Let the scheduler take this process for batch work, where it is an ordinary one.
+
+    What it wakes then runs when it waits, instead of interrupting it: on a core that all services share that spares a
+    third of the switches from one thread to another (docs/benchmarks.md).
+    """
+    if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
+        for thread in os.listdir("/proc/self/task"):
+            with suppress(OSError):  # it has ended meanwhile, or a sandbox knows no classes
+                os.sched_setscheduler(int(thread), os.SCHED_BATCH, os.sched_param(0))
+
+
+def _pace(when: float) -> float:
+    """Sleep until `when` on the performance counter; says by how much [s] that has passed, negative where it has not.
+
+    A run that is late hurries until it is on time again.
+    """
+    left = when - time.perf_counter()
+    if left > 0:
+        time.sleep(left)
+    return -left

@@ -1,0 +1,158 @@
+"""The messages of a chunk: from columns to MCAP message records in their order, and the index of them."""
+
+import struct
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+
+from lapwing.messages.digest import Digest
+
+_INDEX = struct.Struct("<BQHI")  # opcode, length of what follows, channel, length of the entries
+
+
+class WrittenTopic:
+    """A topic that is being written."""
+
+    def __init__(self, name: str, channel_id: int, deterministic: bool) -> None:
+        self.name = name
+        self.channel_id = channel_id
+        self.deterministic = deterministic  # whether it enters the digest
+        self.count = 0  # messages so far
+
+
+class Rows(NamedTuple):
+    """n messages of a topic that have the same size."""
+
+    topic: WrittenTopic
+    records: np.ndarray  # MCAP message records, shape (n,); their sequence numbers are filled in later
+    order: np.ndarray  # int64, shape (n,): the messages of a chunk stand in ascending order
+
+
+class Index(NamedTuple):
+    """Where the messages of a channel are."""
+
+    channel_id: int
+    times_ns: np.ndarray  # int64, shape (n,)
+    offsets: np.ndarray  # [bytes] from the first message of the chunk, int64, shape (n,)
+
+    def record(self, shift: int) -> bytes:
+        """The MCAP message index record, with offsets from `shift` [bytes] further ahead."""
+        entries = np.column_stack([self.times_ns, self.offsets + shift]).astype("<u8").tobytes()
+        return _INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), self.channel_id, len(entries)) + entries
+
+
+class Messages(NamedTuple):
+    """The messages of a chunk as MCAP has them."""
+
+    data: bytes
+    indexes: list[Index]  # one for each channel
+    start_ns: int
+    end_ns: int
+
+
+def rows(topic: WrittenTopic, times_ns: np.ndarray, payloads: np.ndarray, order: np.ndarray) -> Rows:
+    """Copy messages into MCAP message records.
+
+    Args:
+        topic: theirs.
+        times_ns: simulation times [ns], shape (n,).
+        payloads: uint8, shape (n, size).
+        order: shape (n,).
+    """
+    n, size = payloads.shape
+    records = np.empty(n, _record_dtype(size))
+    records["opcode"] = Opcode.MESSAGE
+    records["length"] = records.itemsize - 9  # all but opcode and length itself
+    records["channel"] = topic.channel_id
+    records["log_time"] = records["publish_time"] = times_ns
+    records["payload"] = payloads
+    return Rows(topic, records, order)
+
+
+def rows_of(entries: list[tuple[WrittenTopic, int, bytes]]) -> list[Rows]:
+    """Rows of single messages (topic, time [ns], payload), in their order: one `Rows` for each topic and size."""
+    groups: dict[tuple[WrittenTopic, int], list[int]] = {}
+    for k, (topic, _, payload) in enumerate(entries):
+        groups.setdefault((topic, len(payload)), []).append(k)
+    found = []
+    for (topic, size), places in groups.items():
+        payloads = np.frombuffer(b"".join([entries[k][2] for k in places]), np.uint8).reshape(len(places), size)
+        found.append(rows(topic, np.array([entries[k][1] for k in places]), payloads, np.array(places)))
+    return found
+
+
+def add_to_digest(digest: Digest, parts: list[Rows]) -> None:
+    """Add the messages of deterministic topics, those of each topic in order."""
+    for topic, of_topic in _by_topic(parts).items():
+        if not topic.deterministic:
+            continue
+        if len({part.records.itemsize for part in of_topic}) == 1:
+            order = np.concatenate([part.order for part in of_topic])
+            records = np.concatenate([part.records for part in of_topic])[np.argsort(order, kind="stable")]
+            digest.update_page(topic.name, records["log_time"].astype(np.int64), records["payload"])
+            continue
+        entries: list[tuple[int, int, bytes]] = []
+        for part, places in zip(of_topic, _places(of_topic), strict=True):
+            payloads = [payload.tobytes() for payload in part.records["payload"]]
+            entries += zip(places.tolist(), part.records["log_time"].tolist(), payloads, strict=True)
+        for _, time_ns, payload in sorted(entries):
+            digest.update(topic.name, time_ns, payload)
+
+
+def arrange(parts: list[Rows]) -> Messages:
+    """Number the messages of each topic, and lay all of them out in ascending order.
+
+    Args:
+        parts: at least one message; where two have the same order, the earlier part goes first.
+    """
+    for topic, of_topic in _by_topic(parts).items():
+        for part, places in zip(of_topic, _places(of_topic), strict=True):
+            part.records["sequence"] = topic.count + places
+        topic.count += sum(len(part.records) for part in of_topic)
+    all_places = _places(parts)
+    sizes = np.empty(sum(map(len, all_places)), np.int64)
+    for part, places in zip(parts, all_places, strict=True):
+        sizes[places] = part.records.itemsize
+    ends = np.cumsum(sizes)
+    data = np.empty(ends[-1], np.uint8)
+    found: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for part, places in zip(parts, all_places, strict=True):
+        size = part.records.itemsize
+        offsets = ends[places] - size
+        # A view of `data` with an element of this size at every byte: one assignment copies record by record.
+        windows = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
+        windows[offsets] = part.records.view(f"V{size}")
+        times_ns = part.records["log_time"].astype(np.int64)
+        found.setdefault(part.topic.channel_id, []).append((times_ns, offsets))
+    indexes = []
+    for channel_id, pieces in found.items():
+        times, starts = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        by_offset = np.argsort(starts)
+        indexes.append(Index(channel_id, times[by_offset], starts[by_offset]))
+    start = min(int(index.times_ns.min()) for index in indexes)
+    end = max(int(index.times_ns.max()) for index in indexes)
+    return Messages(data.tobytes(), indexes, start, end)
+
+
+@cache
+def _record_dtype(size: int) -> np.dtype:
+    """An MCAP message record with a payload of this size."""
+    numbers = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
+    return np.dtype([*numbers, ("log_time", "<u8"), ("publish_time", "<u8"), ("payload", "u1", (size,))])
+
+
+def _by_topic(parts: list[Rows]) -> dict[WrittenTopic, list[Rows]]:
+    found: dict[WrittenTopic, list[Rows]] = {}
+    for part in parts:
+        found.setdefault(part.topic, []).append(part)
+    return found
+
+
+def _places(parts: list[Rows]) -> list[np.ndarray]:
+    """The place of every message among all of the parts, by part."""
+    order = np.concatenate([part.order for part in parts])
+    places = np.empty(len(order), np.int64)
+    places[np.argsort(order, kind="stable")] = np.arange(len(order))
+    return np.split(places, np.cumsum([len(part.order) for part in parts])[:-1])

@@ -1,0 +1,173 @@
+"""Reading a log, also one that was cut short."""
+
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator
+from operator import attrgetter, itemgetter
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from lapwing.cosim.config.provenance import package_version
+from lapwing.cosim.log.mcap_contents import Contents
+from lapwing.cosim.log.mcap_writer import DETERMINISTIC
+from lapwing.messages import message_class
+from lapwing.messages.digest import Digest
+from lapwing.messages.topic_columns import Gathered, History
+from lapwing.messages.type_compatibility import otherwise
+
+_FOREVER = 1 << 64
+_time, _place = itemgetter(0), itemgetter(0, 1)
+
+
+class LogReader:
+    """Reads one log, also one whose writer was killed; a context manager.
+
+    Attributes:
+        metadata: of the record `lapwing`; empty in other tools' logs.
+        attachments: file name to contents.
+        complete: False if the file has no end (its writer was killed); it then ends with its last whole chunk.
+        damaged: a line for each chunk that was left out because it is damaged; with `skip_damaged` only.
+
+    Raises:
+        ValueError: the file is missing or no MCAP file; from `messages` and `digest`, also if a chunk is damaged.
+    """
+
+    def __init__(self, path: str | Path, skip_damaged: bool = False) -> None:
+        self.path = Path(path)
+        try:
+            self._file = open(self.path, "rb")  # noqa: SIM115 (closed in close)
+        except OSError as fault:
+            raise ValueError(f"{self.path}: cannot read the log: {fault.strerror}") from None
+        try:
+            self._contents = Contents(self.path, self._file, skip_damaged)
+        except BaseException:
+            self._file.close()
+            raise
+        self.metadata = self._contents.metadata
+        self.attachments = self._contents.attachments
+        self.complete, self.damaged = self._contents.complete, self._contents.damaged
+
+    def topics(self) -> dict[str, str]:
+        """Full type name of each topic, in order of the topics' names."""
+        channels = sorted(self._contents.channels.values(), key=lambda channel: channel.topic)
+        return {channel.topic: self._contents.schemas[channel.schema_id] for channel in channels}
+
+    def check_topics(self, topics: Iterable[str] | None) -> set[str]:
+        """The topics that are named; all where None is given.
+
+        Raises:
+            ValueError: the log has no such topic; names those that it has.
+        """
+        names = self.topics()
+        wanted = set(names if topics is None else topics)
+        if wanted - set(names):
+            missing = ", ".join(sorted(wanted - set(names)))
+            raise ValueError(f"{self.path}: the log has no topic {missing}; it has {', '.join(names)}")
+        return wanted
+
+    def of_other_versions(self, topics: Iterable[str] | None = None) -> dict[str, str]:
+        """What the type of a topic has otherwise than this version's, by topic (None: of all); empty where none has."""
+        labels, channels = self._labels(topics), self._contents.channels
+        texts = {topic: self._contents.definitions.get(channels[i].schema_id, "") for i, (topic, _) in labels.items()}
+        found = {topic: otherwise(kind, texts[topic]) for topic, kind in labels.values()}
+        return {topic: f"{dict(labels.values())[topic]} {how}" for topic, how in found.items() if how}
+
+    @property
+    def versions(self) -> str:
+        """Which version reads, and which one wrote."""
+        wrote = self.metadata.get("version")
+        return f"Lapwing {package_version()}, got one of {f'Lapwing {wrote}' if wrote else 'another program'}"
+
+    def check_versions(self, topics: Iterable[str] | None = None) -> None:
+        """Refuse topics (None: any) whose messages this version would read wrongly.
+
+        Raises:
+            ValueError: names the first, what is otherwise, and both versions.
+        """
+        for topic, how in self.of_other_versions(topics).items():
+            raise ValueError(f"{self.path}: {topic}: {how}; expected a log of this version, {self.versions}")
+
+    def messages(
+        self, topics: Iterable[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[tuple[str, str, int, bytes]]:
+        """Messages in order of time, and of writing within the same time.
+
+        Args:
+            topics: only these; None: all.
+            start_ns: the first instant [ns]; None: the log's.
+            end_ns: the first instant left out [ns]; None: to the end.
+
+        Yields:
+            topic, full type name, simulation time [ns], payload.
+
+        Raises:
+            ValueError: the log has no such topic, or a chunk is damaged.
+        """
+        labels = self._labels(topics)
+        first, last = start_ns or 0, _FOREVER if end_ns is None else end_ns
+        chunks = [c for c in self._contents.chunks if c.end_ns >= first and c.start_ns < last and c.may_hold(labels)]
+        chunks.sort(key=attrgetter("start_ns"))
+        horizons = [*(chunk.start_ns for chunk in chunks[1:]), _FOREVER][: len(chunks)]
+        waiting: list[tuple[int, int, int, bytes]] = []  # time, offset of the chunk, channel, payload
+        for chunk, horizon in zip(chunks, horizons, strict=True):
+            for time_ns, channel, payload in self._contents.read_chunk(chunk.offset, labels):
+                if first <= time_ns < last:
+                    waiting.append((time_ns, chunk.offset, channel, payload))
+            waiting.sort(key=_place)  # stable: equal times keep the order of writing
+            ready = bisect_left(waiting, horizon, key=_time)
+            for time_ns, _, channel, payload in waiting[:ready]:
+                yield *labels[channel], time_ns, payload
+            del waiting[:ready]
+
+    def history(self, topic: str) -> tuple[np.ndarray, History]:
+        """A whole topic as columns.
+
+        Returns:
+            simulation times [ns], int64, shape (n,), in order; the messages' columns by dotted field name.
+
+        Raises:
+            ValueError: the log has no such topic, its type is not one of ours or of another version, or a chunk or
+                message is damaged.
+        """
+        return self.histories([topic])[topic]
+
+    def histories(self, topics: Iterable[str] | None = None) -> dict[str, tuple[np.ndarray, History]]:
+        """The same of several topics (None: all), reading the file only once.
+
+        Raises:
+            ValueError: as `history`.
+        """
+        labels = self._labels(topics)
+        self.check_versions(topics)
+        classes = {topic: message_class(type_name) for topic, type_name in labels.values()}
+        gathered = {topic: Gathered(message) for topic, message in classes.items()}
+        for topic, _, time_ns, payload in self.messages(list(classes)):
+            gathered[topic].add(time_ns, payload)
+        return {topic: messages.history() for topic, messages in gathered.items()}
+
+    def deterministic_topics(self) -> set[str]:
+        """The topics that enter the digest."""
+        return {c.topic for c in self._contents.channels.values() if c.metadata.get(DETERMINISTIC) != "false"}
+
+    def digest(self) -> str:
+        """Digest of the deterministic messages, computed anew; equals `metadata["digest"]` of an intact log."""
+        digest = Digest()
+        for topic, _, time_ns, payload in self.messages(self.deterministic_topics()):
+            digest.update(topic, time_ns, payload)
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _labels(self, topics: Iterable[str] | None) -> dict[int, tuple[str, str]]:
+        """Topic and type of the channels of these topics, None: of all."""
+        names, wanted = self.topics(), self.check_topics(topics)
+        return {i: (c.topic, names[c.topic]) for i, c in self._contents.channels.items() if c.topic in wanted}

@@ -1,0 +1,91 @@
+"""Pages of messages into a log, in one order: by tick, within a tick in the order of the topic table."""
+
+import time
+from collections.abc import Iterable
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.log import LogWriter
+from lapwing.messages import WallTime, header
+from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, place
+
+CHUNK = 1000  # ticks of one vehicle: of several fewer, so that what is sorted at once stays in the processor's cache
+SHORTEST = 250  # ticks
+FLUSH_PERIOD = (
+    0.25  # [s] of wall time after which what has come of a chunk is in the file, too; batches take 0.1 s more
+)
+SPARED = 10.0  # times as long as bringing it there has taken, where that is longer: a chunk's beginning is written anew
+
+
+def chunk(setup: Setup) -> int:
+    """Ticks of a chunk: chunks begin at multiples of it, so that a run gives the same file whenever its pages come."""
+    return max(SHORTEST, CHUNK // len(setup.vehicles))
+
+
+class Recording:
+    """Writes pages, and with every chunk the wall time. Call `finish` after the last page."""
+
+    def __init__(self, writer: LogWriter, setup: Setup):
+        """Into `writer`, the messages of the run `setup`."""
+        self._writer, self._setup = writer, setup
+        self._started = time.monotonic()
+        self._flushed = self._started
+        self._tail_took = 0.0  # [s] of this thread for the newest tail
+        self._waiting: list[Page] = []  # of the chunk that is not yet complete
+        self._chunk = chunk(setup)
+        self._cut = self._chunk  # the tick at which it ends
+        self.newest: dict[Topic, bytes] = {}
+        self.time_ns = 0
+        self._write_wall_time(0)
+
+    def write(self, pages: Iterable[Page], last: int) -> None:
+        """Write all messages of some ticks, up to the tick `last`."""
+        for page in pages:
+            self._waiting.append(page)
+            self.newest[page.topic] = page.payloads[-1].tobytes()
+        self.time_ns = max(last, 0) * self._setup.interval_ns
+        while last + 1 >= self._cut:
+            self._write_chunk()
+        now = time.monotonic()
+        if now - self._flushed >= max(FLUSH_PERIOD, SPARED * (self._tail_took + self._writer.tail_took)):
+            self._writer.write_tail(self._parts(self._waiting))
+            self._flushed = time.monotonic()
+            self._tail_took = self._flushed - now
+
+    def finish(self) -> None:
+        """Write what is left: the last chunk."""
+        self._write_chunk()
+
+    def _write_chunk(self) -> None:
+        """Write the messages of the ticks before the cut, and the wall time."""
+        complete, left = [], []
+        for page in self._waiting:
+            k = int(np.searchsorted(page.ticks, self._cut))
+            if k > 0:
+                complete.append(Page(page.topic, page.ticks[:k], page.payloads[:k]))
+            if k < len(page.ticks):
+                left.append(Page(page.topic, page.ticks[k:], page.payloads[k:]))
+        if complete:
+            self._writer.write_page(self._parts(complete))
+            self._flushed = time.monotonic()
+        self._write_wall_time(min(self.time_ns, (self._cut - 1) * self._setup.interval_ns))
+        self._waiting = left
+        self._cut += self._chunk
+
+    def _parts(self, pages: list[Page]) -> list[tuple]:
+        interval, vehicles = self._setup.interval_ns, self._setup.vehicles
+        parts = []
+        for page in sorted(pages, key=lambda page: place(page.topic)):  # whoever's pages come first
+            which = vehicles.index(page.topic.vehicle) if page.topic.vehicle else 0
+            order = (page.ticks * (len(TOPICS) + 1) + place(page.topic)) * len(vehicles) + which
+            name = page.topic.key(self._setup.vehicle)
+            parts.append((name, page.topic.message, page.ticks * interval, page.payloads, order))
+        return parts
+
+    def _write_wall_time(self, time_ns: int) -> None:
+        elapsed = time.monotonic() - self._started
+        factor = time_ns * 1e-9 / elapsed if elapsed > 0.0 else 0.0
+        message = WallTime(header(time_ns, ""), time.time(), factor)
+        self._writer.write(WALL_TIME.key(), WallTime, message.encode(), time_ns, deterministic=False)

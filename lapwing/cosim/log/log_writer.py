@@ -1,0 +1,246 @@
+"""Writing a log: message by message, or a page of columns at a time."""
+
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from mcap.records import Channel, Schema
+
+from lapwing.cosim.log.chunk import Rows, WrittenTopic, add_to_digest, arrange, rows, rows_of
+from lapwing.cosim.log.mcap_writer import DETERMINISTIC, METADATA, METADATA_END, Container
+from lapwing.messages import message_class
+from lapwing.messages.digest import Digest
+
+CHUNK_SIZE = 512 * 1024  # [bytes] of single messages that make a chunk
+FLUSH_PERIOD = 0.5  # [s] of wall time
+
+Part = tuple[str, Any, np.ndarray, np.ndarray, np.ndarray]
+"""Messages of a page: topic, message class, times [ns] (n,), payloads (n, size) uint8 or (n,) records, order (n,)."""
+
+
+class LogWriter:
+    """Writes one log; a context manager. A thread of its own hashes, arranges, compresses and writes chunks.
+
+    Pages and single messages may be mixed; they stand in the file in the order of the calls. Every page is a chunk;
+    single messages are collected into chunks of at most `CHUNK_SIZE` and 0.5 s of wall time. So a log that is written
+    by pages has the same bytes whenever it is written from the same pages, attachments and metadata with the same
+    version of zstd; the wall clock shows only in how single messages are parted into chunks.
+
+    Args:
+        path: the file; overwritten.
+        metadata: goes into the record `lapwing` at the start; what the attribute `metadata` is given later, and the key
+            `digest`, into the record `lapwing_end`.
+        attachments: file name to contents.
+        waiting: called twice a second while a chunk has to wait for the one before to be written.
+
+    Raises:
+        ValueError: the file cannot be written (also from `write`, `write_page`, `flush` and `close`).
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        metadata: dict[str, str],
+        attachments: dict[str, bytes],
+        waiting: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.path = Path(path)
+        self.metadata = dict(metadata)
+        self._about = dict(metadata)
+        self._waiting = waiting
+        self._failed = False  # a chunk could not be written
+        self.waited = 0.0  # [s] for chunks that were not yet written when the next one came
+        self.tail_took = 0.0  # [s] to write the newest tail
+        self._digest = Digest()
+        self._topics: dict[str, WrittenTopic] = {}
+        self._schemas: dict[str, int] = {}
+        self._declarations: list[Schema | Channel] = []  # that no chunk holds yet
+        self._entries: list[tuple[WrittenTopic, int, bytes]] = []
+        self._size = 0
+        self._pending: Future | None = None
+        try:
+            self._file = open(self.path, "wb", buffering=0)  # noqa: SIM115 (closed in close)
+            self._container = Container(self._file)
+            self._container.add_metadata(METADATA, self.metadata)
+            for name, data in attachments.items():
+                self._container.add_attachment(name, data)
+        except OSError as fault:
+            raise self._error(fault) from None
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="log")
+        self._due = time.monotonic()  # the first message makes a chunk of its own: even a short log is readable
+
+    def write(self, topic: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
+        """Record one message.
+
+        Args:
+            topic: "/drone1/imu".
+            message: message class, or full name of the type.
+            payload: the encoded message.
+            time_ns: simulation time [ns], not negative.
+            deterministic: whether it enters the digest.
+
+        Raises:
+            ValueError: the time is negative, or the log cannot be written.
+        """
+        if time_ns < 0:
+            raise ValueError(f"{topic}: time {time_ns} ns is negative")
+        written = self._topics.get(topic) or self._declare(topic, message, deterministic)
+        self._entries.append((written, time_ns, payload))
+        self._size += len(payload)
+        if self._size >= CHUNK_SIZE or time.monotonic() >= self._due:
+            self._cut()
+
+    def write_page(self, parts: Iterable[Part]) -> None:
+        """Record messages that enter the digest as one chunk, in ascending order over all parts.
+
+        A topic may come in several parts, if its messages differ in size; where orders are equal, the earlier part
+        goes first. The arrays may be reused after the call. Who wants to lose no more than 0.5 s when killed writes a
+        page at least so often.
+
+        Raises:
+            ValueError: arrays of different lengths, payloads of another type, shape or layout, or a negative time.
+        """
+        self._cut()
+        if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
+            self._submit(lambda declarations: self._write_chunk(declarations, page))
+
+    def write_tail(self, parts: Iterable[Part]) -> None:
+        """Bring the beginning of the next page into the file, for the case that nothing follows; see `write_page`."""
+        self._cut()
+        if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
+            self._submit(lambda declarations: self._write_tail(declarations, page), keep=True)
+
+    def flush(self) -> None:
+        """Bring everything written so far into the file. `write` does it every 0.5 s; call this when none comes."""
+        if self._failed:
+            return
+        self._cut()
+        self._wait()
+
+    @property
+    def digest(self) -> str:
+        """Digest of the deterministic messages so far (hex)."""
+        self.flush()
+        return self._digest.hexdigest()
+
+    def close(self) -> None:
+        """Write what is left, the metadata with the digest, and the summary; close the file.
+
+        After a chunk could not be written, the file is ended where it could be read so far.
+        """
+        if self._file.closed:
+            return
+        try:
+            self.flush()
+        finally:
+            try:
+                self._end()
+            except OSError as fault:
+                if not self._failed:
+                    raise self._error(fault) from None
+            finally:
+                self._worker.shutdown()
+                self._container.close()
+                self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _end(self) -> None:
+        self.metadata["digest"] = self._digest.hexdigest()
+        added = {key: value for key, value in self.metadata.items() if key not in self._about}
+        self._container.add_metadata(METADATA_END, added)
+        self._container.finish()
+
+    def _declare(self, topic: str, message: Any, deterministic: bool) -> WrittenTopic:
+        """Give a topic its channel; the next chunk declares it."""
+        cls = message_class(message) if isinstance(message, str) else message
+        if cls.type_name not in self._schemas:
+            schema_id = self._schemas[cls.type_name] = len(self._schemas) + 1
+            self._declarations.append(
+                Schema(data=cls.schema_text.encode(), encoding="ros2msg", id=schema_id, name=cls.type_name)
+            )
+        written = self._topics[topic] = WrittenTopic(topic, len(self._topics) + 1, deterministic)
+        self._declarations.append(
+            Channel(
+                id=written.channel_id,
+                topic=topic,
+                message_encoding="cdr",
+                metadata={DETERMINISTIC: "true" if deterministic else "false"},
+                schema_id=self._schemas[cls.type_name],
+            )
+        )
+        return written
+
+    def _rows(self, topic: str, message: Any, times_ns: np.ndarray, payloads: np.ndarray, order: np.ndarray) -> Rows:
+        if payloads.ndim == 1 and payloads.dtype.names is not None:
+            size = payloads.dtype.itemsize
+            payloads = np.ascontiguousarray(payloads.view(f"V{size}")).view(np.uint8).reshape(len(payloads), size)
+        if payloads.ndim != 2 or payloads.dtype != np.uint8:
+            raise ValueError(
+                f"{topic}: payloads are {payloads.dtype} {payloads.shape}, expected uint8 (n, size) or records (n,)"
+            )
+        if not times_ns.shape == order.shape == payloads.shape[:1]:
+            raise ValueError(f"{topic}: {len(payloads)} payloads, times {times_ns.shape}, order {order.shape}")
+        if (times_ns < 0).any():
+            raise ValueError(f"{topic}: time {times_ns.min()} ns is negative")
+        if len(payloads):
+            message.layouts.measure(payloads[0].tobytes())  # refuses what is laid out in another way
+        written = self._topics.get(topic) or self._declare(topic, message, True)
+        return rows(written, times_ns, payloads, np.array(order, np.int64))
+
+    def _cut(self) -> None:
+        """Make a chunk of the single messages."""
+        entries, self._entries, self._size = self._entries, [], 0
+        self._due = time.monotonic() + FLUSH_PERIOD
+        if entries:
+            self._submit(lambda declarations: self._write_chunk(declarations, rows_of(entries)))
+
+    def _submit(self, job: Callable[[list[Schema | Channel]], None], keep: bool = False) -> None:
+        """Give a chunk to the worker, once it has finished the one before; a later one declares again what is kept."""
+        if self._failed:
+            raise ValueError(f"{self.path}: {self.metadata['failure']}")
+        declarations = self._declarations
+        if not keep:
+            self._declarations = []
+        self._wait()
+        self._pending = self._worker.submit(job, list(declarations))
+
+    def _wait(self) -> None:
+        pending, self._pending = self._pending, None
+        if pending is not None:
+            started = time.perf_counter()
+            try:
+                while not wait([pending], FLUSH_PERIOD).done:
+                    self._waiting()
+                pending.result()
+            except OSError as fault:
+                self._failed = True
+                self.metadata["failure"] = _failure(fault)
+                raise self._error(fault) from None
+            self.waited += time.perf_counter() - started
+
+    def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
+        began = time.monotonic()
+        counts = {part.topic: part.topic.count for part in parts}
+        self._container.add_tail(declarations, arrange(parts))
+        for topic, count in counts.items():  # its messages come again
+            topic.count = count
+        self.tail_took = time.monotonic() - began
+
+    def _write_chunk(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
+        self._container.add_chunk(declarations, arrange(parts))
+        add_to_digest(self._digest, parts)
+
+    def _error(self, fault: OSError) -> ValueError:
+        return ValueError(f"{self.path}: {_failure(fault)}")
+
+
+def _failure(fault: OSError) -> str:
+    return f"cannot write the log: {fault.strerror or fault}"

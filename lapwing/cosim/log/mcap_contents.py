@@ -1,0 +1,197 @@
+"""The contents of an MCAP file: what it declares, where its chunks are, and the messages of a chunk."""
+
+import io
+import os
+import struct
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import zstandard
+from lz4.frame import LZ4FrameDecompressor
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.stream_reader import get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC
+
+from lapwing.cosim.log.mcap_writer import METADATA, METADATA_END
+
+_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
+_TIMES = struct.Struct("<QQ")
+_CHANNEL = struct.Struct("<H")
+_DECLARATIONS: dict[int, Any] = {
+    Opcode.SCHEMA: records.Schema,
+    Opcode.CHANNEL: records.Channel,
+    Opcode.METADATA: records.Metadata,
+    Opcode.ATTACHMENT: records.Attachment,
+}
+
+ROS2 = "ros2msg"  # encoding of schemas
+LARGEST = 1 << 28  # [bytes] of a chunk; those of the usual writers have some millions
+
+
+class ChunkPlace(NamedTuple):
+    """Where a chunk is, the times of its first and last message, and whose messages it holds."""
+
+    offset: int  # [bytes]
+    start_ns: int
+    end_ns: int
+    channels: set[int]  # as the index behind the chunk says; empty: not known
+
+    def may_hold(self, channels: Collection[int]) -> bool:
+        """Whether a message of these channels can be in it."""
+        return not self.channels or not self.channels.isdisjoint(channels)
+
+
+class Contents:
+    """What is in a file.
+
+    Attributes:
+        metadata: of the records `lapwing` and `lapwing_end`.
+        attachments: file name to contents.
+        schemas: type name by schema id.
+        definitions: text of the type by schema id, where ROS 2's encoding has one.
+        channels: by channel id.
+        chunks: in order of the file.
+        complete: whether the file has its end.
+        damaged: a line for each chunk that was left out, where that is asked for.
+
+    Raises:
+        ValueError: no MCAP file, or a damaged one.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO, skip_damaged: bool = False) -> None:
+        self.metadata: dict[str, str] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.schemas: dict[int, str] = {}
+        self.definitions: dict[int, str] = {}
+        self.channels: dict[int, records.Channel] = {}
+        self.chunks: list[ChunkPlace] = []
+        self.complete = False
+        self.damaged: tuple[str, ...] = ()
+        self._path, self._file = path, file
+        try:
+            self._scan()
+        except struct.error as fault:
+            raise ValueError(f"{path}: damaged record: {fault}") from None
+        if skip_damaged or not (self.complete and self.channels):
+            self._read_declarations(skip_damaged)
+
+    def read_chunk(self, offset: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
+        """Time, channel and payload of a chunk's messages of some channels, in order of writing.
+
+        Raises:
+            ValueError: the chunk is damaged.
+        """
+        self._file.seek(offset + _RECORD.size)
+        try:
+            chunk = records.Chunk.read(ReadDataStream(self._file))
+            _check_size(chunk)
+            _unpack_lz4(chunk)
+            stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+            data = stream.read(size)
+            return self._messages(data, size, channels)
+        except Exception as fault:  # whatever the decompressor raises, or records that are none
+            raise ValueError(f"{self._path}: damaged chunk at byte {offset}: {fault}") from None
+
+    def _messages(self, data: bytes, size: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
+        found = []
+        place = 0
+        while place < size:
+            opcode, length = _RECORD.unpack_from(data, place)
+            place += _RECORD.size
+            if opcode == Opcode.MESSAGE:
+                channel, _, time_ns, _ = _MESSAGE.unpack_from(data, place)
+                if channel in channels:
+                    found.append((time_ns, channel, data[place + _MESSAGE.size : place + length]))
+            elif opcode in _DECLARATIONS:
+                self._declare(opcode, data[place : place + length])
+            place += length
+        return found
+
+    def _scan(self) -> None:
+        """Walk over the records, noting where the chunks are without reading them."""
+        file = self._file
+        size = os.fstat(file.fileno()).st_size
+        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            raise ValueError(f"{self._path}: not an MCAP file")
+        offset = len(MCAP0_MAGIC)
+        while offset + _RECORD.size <= size:
+            opcode, length = _RECORD.unpack(file.read(_RECORD.size))
+            if opcode == 0 or offset + _RECORD.size + length > size:
+                break  # a record that was never finished
+            if opcode == Opcode.FOOTER:
+                self.complete = True
+                break
+            if opcode == Opcode.CHUNK:
+                start_ns, end_ns = _TIMES.unpack(file.read(_TIMES.size))
+                self.chunks.append(ChunkPlace(offset, start_ns, end_ns, set()))
+            elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
+                self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
+            elif opcode == Opcode.MESSAGE:
+                raise ValueError(f"{self._path}: holds messages outside of chunks, expected a chunked log")
+            elif opcode in _DECLARATIONS:
+                self._declare(opcode, file.read(length))
+            offset += _RECORD.size + length
+            file.seek(offset)
+        if not self.complete and self.chunks:
+            self.chunks[-1].channels.clear()  # its index may lack channels
+
+    def _read_declarations(self, skip_damaged: bool) -> None:
+        """Those that stand in chunks; chunks that cannot be read are left out, or are an error."""
+        for chunk in list(self.chunks):
+            try:
+                self.read_chunk(chunk.offset, ())
+            except ValueError as fault:
+                if not skip_damaged:
+                    raise
+                self.damaged += (str(fault).removeprefix(f"{self._path}: "),)
+                self.chunks.remove(chunk)
+
+    def _declare(self, opcode: int, data: bytes) -> None:
+        try:
+            record = _DECLARATIONS[opcode].read(ReadDataStream(io.BytesIO(data)))
+        except (McapError, struct.error, UnicodeDecodeError, OverflowError, MemoryError) as fault:
+            raise ValueError(f"{self._path}: damaged {Opcode(opcode).name.lower()} record: {fault}") from None
+        if isinstance(record, records.Schema):
+            self.schemas[record.id] = record.name
+            if record.encoding == ROS2:
+                self.definitions[record.id] = record.data.decode(errors="replace")
+        elif isinstance(record, records.Channel):
+            self.schemas.setdefault(record.schema_id, "")
+            self.channels[record.id] = record
+        elif isinstance(record, records.Attachment):
+            self.attachments[record.name] = record.data
+        elif record.name in (METADATA, METADATA_END):
+            self.metadata |= record.metadata
+
+
+def _check_size(chunk: records.Chunk) -> None:
+    """Refuse a chunk that would fill the memory, whichever of its two sizes says so.
+
+    Raises:
+        ValueError: with the size.
+    """
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        size = max(size, zstandard.frame_content_size(chunk.data))  # -1: not told
+    if size > LARGEST:
+        raise ValueError(f"{size} bytes, expected at most {LARGEST}")
+
+
+def _unpack_lz4(chunk: records.Chunk) -> None:
+    """Unpack a chunk of this kind here: mcap's reader has no limit for it, and what is packed does not tell its size.
+
+    Raises:
+        ValueError: it is larger than `LARGEST`, or cut short.
+    """
+    if chunk.compression != "lz4":
+        return
+    unpacking = LZ4FrameDecompressor()
+    data = unpacking.decompress(chunk.data, max_length=LARGEST)
+    if not unpacking.eof:
+        raise ValueError(f"cut short, or larger than {LARGEST} bytes")
+    chunk.compression, chunk.data = "", data

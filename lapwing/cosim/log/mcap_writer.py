@@ -1,0 +1,257 @@
+"""The MCAP container: records one after the other, and at the end the index of what is where."""
+
+import mimetypes
+import zlib
+from collections.abc import Sequence
+from contextlib import suppress
+from io import FileIO
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
+
+from lapwing.cosim.log.chunk import Messages
+from lapwing.cosim.log.chunk_indexes import ChunkIndexes, Extent
+
+METADATA = "lapwing"  # name of the metadata record at the start
+METADATA_END = "lapwing_end"  # and of that at the end, with what was not known before: no key is in both
+DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
+COMPRESSION_LEVEL = 2  # zstd: level 3, its default, makes such logs larger; level 9 saves 3 % for five times the work
+SMALL = 1024  # [bytes] of messages that are not worth compressing
+_CRC = 4  # [bytes] of the footer's checksum, which it does not cover itself
+
+
+class _State(NamedTuple):
+    """What a file had before its tail."""
+
+    offset: int  # [bytes]
+    schemas: int
+    channels: int
+    chunks: Extent
+    counts: dict[int, int]
+
+
+class Container:
+    """Writes a file's records in order and remembers where they are, until `close`. All methods may raise OSError."""
+
+    def __init__(self, file: FileIO) -> None:
+        """Begin a file that is open for writing, without a buffer, and empty."""
+        self._begin(file)
+        self._write(MCAP0_MAGIC)
+        self._write(encoded(Header(profile="ros2", library="lapwing")))
+
+    @classmethod
+    def resume(cls, file: FileIO, summary: Summary, offset: int) -> Self:
+        """Go on with a file that has its end: from `offset` on [bytes], where the record DATA_END stands."""
+        self = cls.__new__(cls)
+        self._begin(file)
+        self._offset = offset
+        self._schemas, self._channels = list(summary.schemas.values()), list(summary.channels.values())
+        for index in summary.chunk_indexes:
+            self._chunks.add(encoded(index), index.message_start_time, index.message_end_time)
+        self._attachments, self._metadata = summary.attachment_indexes, summary.metadata_indexes
+        self._counts = dict(summary.statistics.channel_message_counts) if summary.statistics else {}
+        file.seek(offset)
+        return self
+
+    def _begin(self, file: FileIO) -> None:
+        self._file = file
+        self._offset = 0
+        self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._chunks = ChunkIndexes(Path(file.name).parent)
+        self._attachments: list[AttachmentIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._counts: dict[int, int] = {}  # messages by channel
+        self._before_tail: _State | None = None
+        self._length = 0  # [bytes] of the file, with a tail that is no longer valid
+
+    def add_attachment(self, name: str, data: bytes) -> None:
+        """Write an attachment; its media type follows from the file name."""
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        record = encoded(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
+        self._attachments.append(
+            AttachmentIndex(
+                offset=self._offset,
+                length=len(record),
+                log_time=0,
+                create_time=0,
+                data_size=len(data),
+                name=name,
+                media_type=kind,
+            )
+        )
+        self._write(record)
+
+    def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
+        """Write a metadata record."""
+        self._drop_tail()
+        record = encoded(Metadata(metadata=metadata, name=name))
+        self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
+        self._write(record)
+
+    def add_tail(self, declarations: list[Schema | Channel], messages: Messages) -> None:
+        """Write a chunk that the next record takes the place of: what a reader finds if that never comes."""
+        self._drop_tail()
+        before = _State(self._offset, len(self._schemas), len(self._channels), self._chunks.extent, self._counts.copy())
+        self.add_chunk(declarations, messages)
+        self._before_tail = before
+
+    def add_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
+        """Write a compressed chunk with the index of its messages, and bring it to the disk.
+
+        Args:
+            declarations: the schemas and channels that this chunk is the first to use; they go into it.
+            messages: at least one.
+        """
+        self._drop_tail()
+        head = b"".join(map(encoded, declarations))
+        data = head + messages.data
+        small = len(messages.data) < SMALL
+        stored = data if small else self._compressor.compress(data)
+        chunk = Chunk(
+            compression="" if small else "zstd",
+            data=stored,
+            message_start_time=messages.start_ns,
+            message_end_time=messages.end_ns,
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
+        records = [encoded(chunk)]
+        offset = end = self._offset
+        length = len(records[0])
+        places: dict[int, int] = {}
+        for each in messages.indexes:
+            end += len(records[-1])
+            places[each.channel_id] = end
+            records.append(each.record(len(head)))
+        record = b"".join(records)
+        index = ChunkIndex(
+            chunk_start_offset=offset,
+            chunk_length=length,
+            compression=chunk.compression,
+            compressed_size=len(stored),
+            uncompressed_size=len(data),
+            message_start_time=messages.start_ns,
+            message_end_time=messages.end_ns,
+            message_index_offsets=places,
+            message_index_length=len(record) - length,
+        )
+        before = self._chunks.extent
+        self._chunks.add(encoded(index), messages.start_ns, messages.end_ns)
+        try:
+            self._write(record)
+        except OSError:
+            self._chunks.extent = before
+            raise
+        self._schemas += [each for each in declarations if isinstance(each, Schema)]
+        self._channels += [each for each in declarations if isinstance(each, Channel)]
+        for each in messages.indexes:
+            self._counts[each.channel_id] = self._counts.get(each.channel_id, 0) + len(each.times_ns)
+        self._cut()
+
+    def finish(self) -> None:
+        """Write the summary and the end."""
+        self._drop_tail()
+        self._write(encoded(DataEnd(data_section_crc=0)))
+        start = self._offset
+        groups = [
+            (Opcode.SCHEMA, _joined(self._schemas)),
+            (Opcode.CHANNEL, _joined(self._channels)),
+            (Opcode.STATISTICS, encoded(self._statistics())),
+            (Opcode.CHUNK_INDEX, self._chunks.records()),
+            (Opcode.ATTACHMENT_INDEX, _joined(self._attachments)),
+            (Opcode.METADATA_INDEX, _joined(self._metadata)),
+        ]
+        summary = b""
+        offsets = b""
+        for opcode, data in groups:
+            offsets += encoded(
+                SummaryOffset(group_length=len(data), group_opcode=opcode, group_start=start + len(summary))
+            )
+            summary += data
+        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        summary += offsets
+        footer.summary_crc = zlib.crc32(summary + encoded(footer)[:-_CRC])
+        self._write(summary + encoded(footer) + MCAP0_MAGIC)
+        self._cut()
+
+    def close(self) -> None:
+        """Forget where the records are."""
+        self._chunks.close()
+
+    def _statistics(self) -> Statistics:
+        extent = self._chunks.extent
+        return Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=extent.chunks,
+            message_count=sum(self._counts.values()),
+            message_start_time=extent.start_ns or 0,
+            message_end_time=extent.end_ns,
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+    def _drop_tail(self) -> None:
+        """Go back to where the tail begins; it is written over, so that a reader finds it for as long as possible."""
+        state, self._before_tail = self._before_tail, None
+        if state is None:
+            return
+        self._length = max(self._length, self._offset)
+        self._file.seek(state.offset)
+        self._offset, self._counts = state.offset, state.counts
+        self._chunks.extent = state.chunks
+        del self._schemas[state.schemas :], self._channels[state.channels :]
+
+    def _cut(self) -> None:
+        """Take away what is left of a tail behind the newest record."""
+        if self._length > self._offset:
+            self._file.truncate()
+        self._length = 0
+
+    def _write(self, data: bytes) -> None:
+        """All of it, or nothing: a file whose disk is full ends where it could be read so far."""
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            with suppress(OSError):
+                self._file.seek(self._offset)
+                self._file.truncate()
+            raise
+        self._offset += len(data)
+
+
+def _joined(records: Sequence[McapRecord]) -> bytes:
+    return b"".join(map(encoded, records))
+
+
+def encoded(record: McapRecord) -> bytes:
+    """A record's bytes."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()

@@ -1,0 +1,257 @@
+"""Starts the services of a scene as processes, watches them, and ends them all together."""
+
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack, suppress
+from types import MappingProxyType
+from typing import IO
+
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.processes.child_process import Child, dismiss, start
+from lapwing.cosim.processes.cpu_starvation import Starvation, waited
+from lapwing.cosim.processes.forked_process import Forked
+from lapwing.cosim.processes.restart_policy import Restarts
+from lapwing.cosim.processes.run_monitor import LONGEST, STALL, WATCHER, Watch
+from lapwing.cosim.run_errors import RunFailed
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY
+
+GRACE = 1.5  # [s] a process gets to end after SIGTERM
+LAST_NEWS = 0.05  # [s] for what the processes said at their end
+FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick, or the last news after it
+BRIEF = 0.005  # [s] between two looks at whether all have ended
+REFUSED = 2  # exit code of a service whose user can mend what is wrong
+
+
+def launch(
+    names: list[str],
+    give: Callable[[str, dict[str, str], IO[bytes]], None],
+    participants: Participants,
+    observe: Callable[[Watch], bool],
+    beside: Iterable[str] = (),
+    external: Mapping[str, str] = MappingProxyType({}),
+    restarts: Restarts | None = None,
+    started: dict[str, Child] | None = None,
+    services: Iterable[str] = (),
+) -> dict[str, str]:
+    """Run the processes `names` as children of this one until the run has ended; what those beside had to say.
+
+    Args:
+        names: the processes.
+        give: writes what a process of this name is given, with everybody's endpoints, to its standard input.
+        participants: of the run.
+        observe: called about five times a second; says whether to stop.
+        beside: processes without which the run goes on.
+        external: endpoints of those among `names` that somebody else starts; everybody connects to them.
+        restarts: who is started again where it is killed or stopped; None: nobody.
+        started: processes that are there already (`started_early`); those that are not needed are ended.
+        services: those that hand over messages.
+
+    Raises:
+        RunFailed: a service died or froze, or the run ended before its time.
+        ValueError: a service refused to start; the text says why.
+    """
+    beside = list(beside)
+    everybody = [name for name in [*beside, *names] if name not in external]  # a ground station waits for its link
+    children: dict[str, subprocess.Popen | Forked] = {}
+    restarts = restarts or Restarts({}, lambda line: None)
+    errors: dict[str, IO[bytes]] = {}
+    with private_endpoints([WATCHER, *everybody]) as own, ExitStack() as stack:
+        stack.callback(_close, children, errors)
+        endpoints = {**external, **own}
+
+        def begin(some: list[str]) -> None:
+            for name in some:
+                if started and name in started and not restarts.journal(name):
+                    children[name], errors[name] = started.pop(name)
+                else:
+                    children[name], errors[name] = start(name, restarts.journal(name), errors.get(name))
+            for name in some:
+                stream = children[name].stdin
+                assert stream is not None
+                with suppress(BrokenPipeError):  # it has ended already, and has said why
+                    give(name, endpoints, stream)
+
+        listen, connect = mesh(WATCHER, endpoints)
+        with ZenohBus(listen, connect, mark=participants.mark(WATCHER), awaits=False) as bus:
+            try:
+                watch = Watch(bus, participants, [*names, *beside, *external], services=services)
+                bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it
+                ready = [name for name in everybody if name in (started or ())]
+                begin(ready)
+                begin([name for name in everybody if name not in ready])
+                dismiss(started or {})
+                _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
+                _await({name: children[name] for name in beside if name in watch.confirmed}, FAREWELL)
+            finally:
+                early = {
+                    name: code for name in beside if name in children and (code := children[name].poll()) is not None
+                }
+                _ask_to_end(children)  # before this session closes, which takes a while
+        _end(children)
+        return {name: _farewell(early.get(name, 0), errors[name]) for name in beside}
+
+
+def _close(children: dict[str, subprocess.Popen | Forked], errors: dict[str, IO[bytes]]) -> None:
+    _end(children)
+    for file in errors.values():
+        file.close()
+
+
+def _follow(
+    watch: Watch,
+    everybody: dict,
+    needed: set[str],
+    external: set[str],
+    observe: Callable[[Watch], bool],
+    errors: dict[str, IO[bytes]],
+    restarts: Restarts,
+    begin: Callable[[list[str]], None],
+) -> None:
+    ended_at = None
+    stopped: dict[str, float] = {}  # since when
+    starvation = Starvation()
+    while any(everybody[name].poll() is None for name in needed - external):
+        children = {name: child for name, child in everybody.items() if name in needed}
+        watch.poll(LAST_NEWS if watch.ended else 0.2)
+        for name, child in everybody.items():
+            if child.poll() == REFUSED:
+                raise ValueError(f"{name}{_last_words(errors[name])}")
+        for name, child in children.items():
+            code = child.poll()
+            if code is not None and restarts.begin(name, code, watch):
+                begin([name])
+                continue
+            if code is None or (code != 0 and (watch.diverged or _diverges(watch))):
+                continue
+            if code != 0 or (not watch.ended and ended_at is None and not _grace(watch)):
+                raise RunFailed(f"{name} ended unexpectedly ({_reason(code)}) {_at(watch)}{_last_words(errors[name])}")
+        if not watch.ended and (lost := sorted(watch.gone & external)) and not _grace(watch):
+            raise RunFailed(f"{', '.join(lost)}: gone {_at(watch)}")
+        _note_stopped(children, stopped)
+        starvation.look({name: child.pid for name, child in children.items()}, time.monotonic() - watch.last_news)
+        culprit = watch.frozen(needed, starvation.of) if needed <= watch.present else None
+        if stopped and (culprit or time.monotonic() - min(stopped.values()) > STALL):
+            if not restarts.may(stopped):
+                raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")
+            for name in stopped:
+                restarts.stop(name, children[name])
+            continue
+        if culprit:
+            if not _let_go(everybody, needed):
+                raise RunFailed(culprit)
+            watch.last_news = time.monotonic()
+        if not watch.present >= needed:
+            watch.last_news, ended_at = time.monotonic(), None
+        if observe(watch):
+            return
+        late = {name for name, child in children.items() if child.poll() != 0}
+        if late < needed and late <= restarts.begun - watch.present:
+            break  # killed when it had handed over all: of the others nobody is left to join
+        if watch.ended:
+            ended_at = ended_at or time.monotonic()
+            if time.monotonic() - ended_at > STALL:
+                _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
+            silence = time.monotonic() - max(ended_at, watch.last_news)
+            if silence > LONGEST or silence - starvation.of(children) > FAREWELL:
+                if early := watch.broken_off():  # the first fault is told
+                    raise RunFailed(early)
+                left = [name for name, child in children.items() if child.poll() is None]
+                silent = [name for name in left if name not in watch.confirmed] or left
+                raise RunFailed(f"{', '.join(silent)}: did not end within {FAREWELL:g} s of the last news")
+    watch.poll(LAST_NEWS)
+    observe(watch)
+    if early := watch.broken_off():
+        raise RunFailed(early)
+
+
+def _note_stopped(children: dict[str, subprocess.Popen | Forked], since: dict[str, float]) -> None:
+    """Note in `since` who is stopped, and when it was first noticed; also where it has not yet joined."""
+    for name, child in children.items():
+        if child.returncode is None and _stopped(child):
+            since.setdefault(name, time.monotonic())
+        else:
+            since.pop(name, None)
+
+
+def _stopped(child: subprocess.Popen | Forked) -> bool:
+    """Whether it is stopped; one that has just ended is not."""
+    try:
+        return os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:
+        return False
+
+
+def _let_go(everybody: dict, needed: set[str]) -> bool:
+    """Kill those beside the run, one of whom may be frozen and hold it up; says whether there was any."""
+    beside = [child for name, child in everybody.items() if name not in needed and child.poll() is None]
+    for child in beside:
+        child.kill()
+        child.wait()
+    return bool(beside)
+
+
+def _grace(watch: Watch) -> bool:
+    """Whether the news of the end arrives now, just after a process that knew of it has ended."""
+    watch.poll(0.5)
+    return watch.ended
+
+
+def _diverges(watch: Watch) -> bool:
+    """Whether the news arrives now that a state is no longer sound."""
+    watch.poll(0.5)
+    return watch.diverged
+
+
+def _at(watch: Watch) -> str:
+    return f"at t = {watch.time_ns * 1e-9:.3f} s"
+
+
+def _reason(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _last_words(file: IO[bytes]) -> str:
+    file.seek(0)
+    lines = file.read().decode(errors="replace").strip().splitlines()
+    return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
+
+
+def _farewell(code: int, file: IO[bytes]) -> str:
+    if code:
+        return f"ended before the flight ({_reason(code)}){_last_words(file)}"
+    file.seek(0)
+    return file.read().decode(errors="replace").strip()
+
+
+def _ask_to_end(children: dict[str, subprocess.Popen | Forked]) -> None:
+    for child in children.values():
+        if child.poll() is None:
+            child.terminate()
+
+
+def _await(children: Mapping[str, subprocess.Popen | Forked], seconds: float) -> None:
+    """Wait until all have ended, `seconds` at most, in which the time that they wait for a processor does not count."""
+    began = time.monotonic()
+    before = {name: waited(child.pid) for name, child in children.items()}
+    while left := [name for name, child in children.items() if child.poll() is None]:
+        passed = time.monotonic() - began
+        starved = sum(max(0.0, waited(children[name].pid) - before[name]) for name in left)
+        if passed > LONGEST or passed - starved > seconds:
+            return
+        time.sleep(BRIEF)
+
+
+def _end(children: dict[str, subprocess.Popen | Forked]) -> None:
+    """End what still runs: first asked, then forced."""
+    _ask_to_end(children)
+    _await(children, GRACE)
+    for child in children.values():
+        if child.poll() is None:
+            child.kill()
+            child.wait()
+        if child.stdin:
+            child.stdin.close()

@@ -1,0 +1,195 @@
+"""What somebody who watches a run sees of it on the bus."""
+
+import time
+from collections.abc import Callable, Iterable
+
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.diagram.topic_encoder import Page, later
+from lapwing.cosim.executors.log_backpressure import waits_for_disk
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.bus_keys import (
+    ALIVE_KEY,
+    BATCH_KEY,
+    COMPILING_KEY,
+    DIVERGED_KEY,
+    ENDED_KEY,
+    HEARD_KEY,
+    LOGGED_KEY,
+    RECORDED_KEY,
+    REFUSED_KEY,
+    WAITING_KEY,
+)
+from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.messages.topics import Topic
+
+STALL = 2.5  # [s] without any message after which somebody is held to be frozen
+LONGEST = 60.0  # [s] the same where processes wait for a processor
+WATCHER = "mission"  # whoever watches, among the participants
+HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
+
+
+class Watch:
+    """What a launcher sees of a run: who is there, how far it is, what it waits for."""
+
+    def __init__(
+        self,
+        bus: ZenohBus,
+        participants: Participants,
+        names: Iterable[str],
+        patience: float = STALL,
+        services: Iterable[str] = (),
+    ):
+        """Follow a run; `newest` holds the newest payload of each topic.
+
+        Args:
+            bus: the session.
+            participants: of the run.
+            names: of the participants.
+            patience: time [s] without news after which one counts as frozen.
+            services: those that hand over messages; each waits until its last one is confirmed.
+        """
+        self._going = set(services)  # those of which the last message has not come
+        self.confirmed: set[str] = set()  # participants that have received the last message of every service
+        self._logged = False  # the recorder's last message has come
+        self._patience = patience
+        self._bus, self._key_prefix, names = bus, participants.key_prefix, list(names)
+        self.newest: dict[Topic, bytes] = {}
+        self.listen: Callable[[list[Page]], None] | None = None  # is given all messages
+        self.waiting: dict[str, str] = {}
+        self.compiling = False  # somebody compiles kernels
+        self.diverged = False  # a state is no longer sound: the run ends, and its log says why
+        self.slow_disk = False  # the recorder has waited for the disk
+        self.present: set[str] = set()
+        self.gone: set[str] = set()
+        self.time_ns = 0  # up to which everybody who has spoken has come
+        self._times: dict[str, int] = {}
+        self._stops: dict[str, int] = {}  # tick before which each has handed over all
+        self.began: float | None = None  # [s] of the monotonic clock, at the first batch
+        self.wall = 0.0  # [s] from the first batch to the newest
+        self.ended = False  # somebody has handed over the last tick
+        self.outcome: str | None = None  # "" when the run has come to its end, else why it ended before; None: unknown
+        self._refused: dict[str, int] = {}  # messages of strangers, by who refused them
+        self.last_news = time.monotonic()
+        senders: dict[str, bytes | None] = {}
+        for key in HEARD:
+            senders |= participants.senders(key, names)
+        self._news = bus.receive(senders)
+        bus.watch_alive(f"{self._key_prefix}/{ALIVE_KEY}/*", self._alive)
+        bus.watch_alive(f"{self._key_prefix}/{HEARD_KEY}/*", self._confirms)
+
+    def _alive(self, key: str, alive: bool) -> None:
+        name = key.rsplit("/", 1)[1]
+        if alive:
+            self.present.add(name)
+            self.gone.discard(name)
+        elif name in self.present:
+            self.gone.add(name)
+
+    def _confirms(self, key: str, alive: bool) -> None:
+        if alive:
+            self.confirmed.add(key.rsplit("/", 1)[1])
+
+    def poll(self, seconds: float) -> None:
+        """Take in what arrives during `seconds`."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            news = self._news.get_with_key(timeout=left)
+            if news is None:
+                return
+            key, time_ns, payload = news
+            head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
+            if head == BATCH_KEY:
+                self._take_batch(name, time_ns, payload)
+            elif head == COMPILING_KEY:
+                self.compiling = True
+            elif head == DIVERGED_KEY:
+                self.diverged = True
+            elif head == WAITING_KEY:
+                self.waiting[name] = payload.decode(errors="replace")
+            elif head == RECORDED_KEY:
+                self.last_news = time.monotonic()
+                self.slow_disk = self.slow_disk or waits_for_disk(payload)
+                if not payload and not self._logged:
+                    self._logged = True
+                    self._declare(LOGGED_KEY)
+            elif head == ENDED_KEY:
+                self.outcome = payload.decode(errors="replace")
+            elif head == REFUSED_KEY and payload.isdigit():
+                self._refused[name] = int(payload)
+
+    def _take_batch(self, name: str, time_ns: int, payload: bytes) -> None:
+        if not payload:
+            self._take_end(name)
+            return
+        self.last_news = time.monotonic()
+        self.waiting.clear()
+        self.began = self.began or self.last_news
+        self.wall = self.last_news - self.began
+        self._times[name] = max(time_ns, self._times.get(name, 0))
+        self.time_ns = min(self._times.values())
+        _, stop, pages = unpack_batch(payload)
+        pages = later(pages, self._stops.get(name, 0))  # who was started again may give some a second time
+        self._stops[name] = max(stop, self._stops.get(name, 0))
+        for page in pages:
+            self.newest[page.topic] = page.payloads[-1].tobytes()
+        if self.listen:
+            self.listen(pages)
+
+    def _take_end(self, name: str) -> None:
+        if name in self._going:
+            self._going.discard(name)
+            self.last_news = time.monotonic()
+            self.waiting.clear()
+            if not self._going:
+                self._declare(HEARD_KEY)
+        self.ended = True
+
+    def _declare(self, key: str) -> None:
+        """Confirm last messages, to whoever waits for that before it leaves."""
+        self._bus.declare_alive(f"{self._key_prefix}/{key}/{WATCHER}")
+
+    def forget(self, name: str) -> None:
+        """A participant is being started again: it is not there until it says so."""
+        self.present.discard(name)
+        self.gone.discard(name)
+        self.waiting.pop(name, None)
+
+    def publish(self, key: str, time_ns: int, payload: bytes) -> None:
+        """Say something to the run's viewers, on a key behind the run's prefix."""
+        self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
+
+    @property
+    def spoken(self) -> set[str]:
+        """The services that have handed over messages."""
+        return set(self._times)
+
+    @property
+    def refused(self) -> int:
+        """How many messages of strangers all participants have refused, as far as they have told."""
+        return sum(self._refused.values()) + self._bus.refused
+
+    def broken_off(self) -> str | None:
+        """A sentence about a run that ended before its time, None where it came to its end or diverged."""
+        if self.outcome == "" or self.diverged:
+            return None
+        why = f": {self.outcome}" if self.outcome else ""
+        return f"the run ended before its time, at t = {self.time_ns * 1e-9:.3f} s{why}"
+
+    def frozen(self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0) -> str | None:
+        """A sentence that names who holds up the run, None while it goes on.
+
+        Args:
+            names: of the participants without whom it does not.
+            starved: how long [s] those of some names have waited for a processor since the last news; that is not held
+                against them.
+        """
+        silence = time.monotonic() - self.last_news
+        if self.ended or silence < self._patience:
+            return None
+        silent = sorted(set(names) - set(self.waiting))
+        if silence < LONGEST and silence - starved(silent or names) < self._patience:
+            return None
+        where = f"at t = {self.time_ns * 1e-9:.3f} s"
+        if silent:
+            return f"{', '.join(silent)}: no answer for {self._patience:g} s, {where}"
+        return f"the run stands still {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())

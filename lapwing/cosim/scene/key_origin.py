@@ -1,0 +1,70 @@
+"""Who wrote a key: which line of which file, or which override."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from lapwing.cosim.scene.files import Files
+from lapwing.cosim.scene.scene_error import Source
+
+
+def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: Files) -> Source:
+    """Who gave a key its value: the one who wrote most of its path.
+
+    Args:
+        key: dotted key.
+        path: of the scene.
+        text: of the scene.
+        overrides: the keys that were overridden.
+        files: those that the scene names.
+    """
+    overrides = list(overrides)
+    around = [k for k in files.read_from if f"{key}.".startswith(f"{k}.")]
+    content = max(around, key=len, default="")  # the key under which a file's content holds this one
+    above = [k for k in overrides if f"{key}.".startswith(f"{k}.") and len(k) > len(content)]
+    if above:
+        return Source(override=max(above, key=len))
+    below = [k for k in overrides if k.startswith(f"{key}.")]
+    if below:
+        return Source(override=below[0])
+    line, matched = line_of(text, key)
+    if content and matched <= len(content):
+        inside, _ = line_of(files.texts[content], key[len(content) + 1 :])
+        return Source(files.read_from[content], inside)
+    return Source(path, line)
+
+
+def line_of(text: str, key: str) -> tuple[int | None, int]:
+    """The line of a dotted key in TOML text, or of the nearest table around it, as far as a plain search finds it.
+
+    Returns:
+        The line, None if there is none, and the length of the part of the key that was found.
+    """
+    table = ""
+    entries: dict[str, int] = {}  # how many entries of each array of tables have begun
+    best, found = 0, None
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*(\[\[?)\s*([\w.]+)\s*\]", line):
+            table = _numbered(header[2], entries, last=header[1] == "[")
+            if header[1] == "[[":
+                entries[table] = entries.get(table, -1) + 1
+                table = f"{table}.{entries[table]}"
+            full = table
+        elif entry := re.match(r"\s*([\w.]+)\s*=", line):
+            full = f"{table}.{entry[1]}" if table else entry[1]
+        else:
+            continue
+        if f"{key}.".startswith(f"{full}.") and len(full) > best:
+            best, found = len(full), number
+    return found, best
+
+
+def _numbered(table: str, entries: dict[str, int], last: bool) -> str:
+    """A table's name with the number of the newest entry behind each array of tables in it, the last only if asked."""
+    *parents, name = table.split(".")
+    full = ""
+    for parent in parents:
+        full = f"{full}.{parent}" if full else parent
+        full = f"{full}.{entries[full]}" if full in entries else full
+    full = f"{full}.{name}" if full else name
+    return f"{full}.{entries[full]}" if last and full in entries else full

@@ -1,0 +1,195 @@
+"""From a file, its overrides and the files that it names to a scene; or from a recorded tree."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from lapwing.cosim.scene import vehicle_scenes
+from lapwing.cosim.scene.files import Files, copied, parse_toml
+from lapwing.cosim.scene.key_origin import line_of, source_of
+from lapwing.cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
+from lapwing.cosim.scene.scene import Scene, Section, Vocabulary
+from lapwing.cosim.scene.scene_error import SceneError, Source
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
+
+SCENE_FILE = "scene.toml"  # the scene's own text among its sources
+
+
+def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shipped: Path) -> Scene:
+    """Read a scene and every file that it names, override, and validate.
+
+    Args:
+        scene: path of its TOML file, or the name of one that ships.
+        overrides: of any key that the scene resolves to, those of the files that it names among them.
+        vocabulary: the tables that there are.
+        shipped: folder of the scenes that ship.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+    """
+    path = _find(scene, shipped)
+    return parse(path, _read(path), overrides, vocabulary)
+
+
+def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
+    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    return _parse(path, text, parsed(overrides), vocabulary)
+
+
+def again(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
+    """A loaded scene with more overrides, of which the later ones hold; the files that it names are read again.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+        ValueError: it was not read from a file.
+    """
+    if scene.given is None or SCENE_FILE not in scene.sources:
+        raise ValueError(f"{scene.path}: not as it was read from a file; it takes no overrides")
+    return _parse(scene.path, scene.sources[SCENE_FILE].decode(), [*scene.given, *parsed(overrides)], vocabulary)
+
+
+def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary) -> Scene:
+    tree, files = parse_toml(text, path), Files(path.parent)
+    files.sources[SCENE_FILE] = text.encode()
+    locate = partial(_locate, path=path, text=text, keys=[o.key for o in given], files=files)
+    with Scene(path, {}, vocabulary, locate=locate).located():
+        vehicles = vehicle_scenes.count(tree)
+        if vehicles:
+            members = [_member(path, text, tree, i, given, vocabulary) for i in range(vehicles)]
+            common = vehicle_scenes.common_tables(members, vocabulary)
+            sources = files.sources | {name: text for scene in members for name, text in scene.sources.items()}
+            return Scene(path, common, vocabulary, sources, tuple(given), locate, members)
+    return _scene(path, tree, given, vocabulary, files, locate)
+
+
+def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+    """The key and where it was said."""
+    return key, source_of(key, path, text, keys, files)
+
+
+def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+    """`_locate` of a key of one of several vehicles, which may be its own or common to all."""
+    full = vehicle_scenes.own_key(key, vehicle)
+    said = line_of(text, full)[1] > len(f"{vehicle_scenes.VEHICLE}.{vehicle}.")
+    if said or key.partition(".")[0] == vehicle_scenes.VEHICLE or any(f"{full}.".startswith(f"{k}.") for k in keys):
+        return _locate(full, path, text, keys, files)
+    return _locate(key, path, text, keys, files)
+
+
+def _member(
+    path: Path, text: str, tree: dict[str, Any], i: int, given: list[Override], vocabulary: Vocabulary
+) -> Scene:
+    """The scene of vehicle i of several."""
+    files, keys = Files(path.parent), [o.key for o in given]
+    own = vehicle_scenes.overrides_of(given, i, vehicle_scenes.count(tree), vocabulary)
+    locate = partial(_locate_own, vehicle=i, path=path, text=text, keys=keys, files=files)
+    scene = _scene(path, vehicle_scenes.member(tree, i, vocabulary), own, vocabulary, files, locate)
+    name = scene.lookup(f"{vehicle_scenes.VEHICLE}.name")
+    scene.sources = {f"{name}.{source}": content for source, content in files.sources.items()}
+    return scene
+
+
+def _scene(
+    path: Path,
+    tree: dict[str, Any],
+    given: list[Override],
+    vocabulary: Vocabulary,
+    files: Files,
+    locate: Callable[[str], tuple[str, Source]],
+) -> Scene:
+    with Scene(path, {}, vocabulary, files.sources, tuple(given), locate).located():
+        _resolve(tree, given, vocabulary, files)
+        tables = _tables(tree, vocabulary)
+        scene = Scene(path, tables, vocabulary, files.sources, tuple(given), locate)
+        _check(scene, tables, vocabulary)
+    return scene
+
+
+def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) -> Scene:
+    """The scene whose `resolved` is `tree`. Opens no file.
+
+    Raises:
+        SceneError: it is no longer a sound scene.
+    """
+    with Scene(Path(name), {}, vocabulary).located():
+        if isinstance(entries := tree.get(vehicle_scenes.VEHICLE), list):
+            shared = {name: table for name, table in tree.items() if name != vehicle_scenes.VEHICLE}
+            members = [from_resolved({**shared, **entry}, vocabulary, name) for entry in entries]
+            return Scene(Path(name), vehicle_scenes.common_tables(members, vocabulary), vocabulary, vehicles=members)
+        tables = _tables(tree, vocabulary)
+        scene = Scene(Path(name), tables, vocabulary)
+        _check(scene, tables, vocabulary)
+    return scene
+
+
+def _find(scene: str | Path, shipped: Path) -> Path:
+    """The file of a scene; SceneError that names the nearest if there is none."""
+    path = Path(scene)
+    if path.exists() or path.suffix or len(path.parts) > 1:
+        return path
+    if not (shipped / f"{path}.toml").is_file():
+        choices = [p.stem for p in shipped.glob("*.toml")]
+        error = KeyedError.unknown("", "scene", str(path), choices)
+        raise SceneError("", error.message, f"{error.expected}, or the path of a .toml file")
+    return shipped / f"{path}.toml"
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except IsADirectoryError:
+        raise SceneError("", "is a folder", "a scene file (TOML)", Source(path)) from None
+    except UnicodeDecodeError:
+        raise SceneError("", "not valid TOML: not a UTF-8 text file", source=Source(path)) from None
+    except OSError as error:
+        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+        hint = f"did you mean {path.parent / near[0]}?" if near else "`lapwing scenes` lists those there are"
+        message = (error.strerror or "cannot be read").lower()
+        raise SceneError("", f"{message}; {hint}", source=Source(path)) from None
+
+
+def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary, files: Files) -> None:
+    """Put the content of all files into the tree, and the overrides: first those that may name a file."""
+    embedded = {name for name, section in vocabulary.sections.items() if section.FROM_FILE}
+    later = []
+    for override in given:
+        if override.key.partition(".")[0] in embedded or reaches_into_text(tree, override.key):
+            later.append(override)
+        else:
+            apply(tree, override)
+    for section in vocabulary.sections.values():
+        section.embed(tree, files)
+    for override in later:
+        apply(tree, override)
+
+
+def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[Section], Section]:
+    """Every table, validated by itself."""
+    known = vocabulary.sections
+    for name in tree:
+        if name not in known:
+            raise KeyedError.unknown(name, "table", name, known)
+    tables: dict[type[Section], Section] = {}
+    for name, section in known.items():
+        if section.OPTIONAL and name not in tree:
+            continue
+        raw = tree.get(name, {})
+        if not isinstance(raw, dict):
+            raise KeyedError(name, f"got {raw!r}", f"a table [{name}]")
+        try:
+            tables[section] = section.model_validate(copied(raw))
+        except ValidationError as error:
+            raise fault(error, section).under(name) from None
+    return tables
+
+
+def _check(scene: Scene, tables: Mapping[type[Section], Section], vocabulary: Vocabulary) -> None:
+    for check in vocabulary.checks:
+        check(scene)
+    for table in tables.values():
+        table.check(scene)

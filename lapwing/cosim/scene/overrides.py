@@ -1,0 +1,101 @@
+"""Overrides: keys of a scene that are given another value, by `--set KEY=VALUE` or by a mapping."""
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from lapwing.cosim.scene.scene_error import SceneError, Source
+
+Overrides = Iterable[str] | Mapping[str, Any]
+"""KEY=VALUE with a TOML value each (a bare word counts as a text), or values by dotted key."""
+
+
+class Override(NamedTuple):
+    """A key of a scene and the value that the user gives it: KEY=VALUE."""
+
+    key: str
+    value: Any
+    text: str  # as given
+
+
+def parsed(overrides: Overrides) -> list[Override]:
+    """Every override; SceneError for one that is not KEY=VALUE."""
+    if isinstance(overrides, str):
+        raise SceneError("", f"got {overrides!r}", 'overrides as a dictionary or a list: ["KEY=VALUE"]')
+    if isinstance(overrides, Mapping):
+        if strange := [key for key in overrides if not isinstance(key, str)]:
+            raise SceneError("", f"got {strange[0]!r}", "the keys of overrides as texts")
+        return [Override(key, _plain(value), f"{key}={value!r}") for key, value in overrides.items()]
+    return [_parsed(text) for text in overrides]
+
+
+def _parsed(text: str) -> Override:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or not value:
+        expected = "KEY=VALUE, for example solver.step=0.001"
+        raise SceneError(key, f"got {text}", expected, Source(override=text))
+    try:
+        return Override(key, value_of(value), text)
+    except ValueError as error:
+        raise SceneError(key, str(error), source=Source(override=text)) from None
+
+
+def value_of(text: str) -> Any:
+    """The value of a text in TOML; a bare word, as one types it in a shell, is a text. ValueError for anything else."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        if not re.fullmatch(r"[\w./:+-]+", text):
+            raise ValueError(f"{text} is not a TOML value; quote a text") from None
+        return text
+
+
+def _plain(value: Any) -> Any:
+    """A value of Python or numpy as TOML would have given it."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def reaches_into_text(tree: Any, key: str) -> bool:
+    """Whether a key lies below a text: the name of a file, perhaps, that has yet to be read."""
+    for part in key.split(".")[:-1]:
+        if isinstance(tree, list):
+            tree = tree[int(part)] if part.isdigit() and int(part) < len(tree) else None
+        else:
+            tree = tree.get(part) if isinstance(tree, dict) else None
+    return isinstance(tree, str)
+
+
+def apply(tree: dict[str, Any], override: Override) -> None:
+    """Put its value into a tree of tables; a table that is missing is made.
+
+    Raises:
+        SceneError: an entry that a list does not have, or a key within a value.
+    """
+    at: Any = tree
+    *parents, last = override.key.split(".")
+    for parent in parents:
+        if isinstance(at, list):
+            at = at[_index(at, parent, override)]
+        elif isinstance(at, dict):
+            at = at.setdefault(parent, {})
+    value = copy.deepcopy(override.value)
+    if isinstance(at, list):
+        at[_index(at, last, override)] = value
+    elif isinstance(at, dict):
+        at[last] = value
+    else:
+        message = f"{'.'.join(parents)} is a value, not a table"
+        raise SceneError(override.key, message, source=Source(override=override.text))
+
+
+def _index(items: list, text: str, override: Override) -> int:
+    if not text.isdigit() or int(text) >= len(items):
+        expected = f"an index from 0 to {len(items) - 1}"
+        raise SceneError(override.key, f"got {text}", expected, Source(override=override.text))
+    return int(text)

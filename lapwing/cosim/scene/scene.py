@@ -1,0 +1,214 @@
+"""A validated scene, the tables that it consists of, and the vocabulary of tables that there are."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, NamedTuple, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from lapwing.cosim.scene.files import Files
+from lapwing.cosim.scene.overrides import Override
+from lapwing.cosim.scene.scene_error import SceneError, Source
+from lapwing.dynamics.config_error import KeyedError
+
+
+class Section(BaseModel):
+    """A table of the scene. Subclasses say `TABLE`, the table's name.
+
+    Strict: TOML has types, so a number in quotes or `true` for 1.0 is a slip of the pen.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    TABLE: ClassVar[str]
+    OPTIONAL: ClassVar[bool] = False  # whether a scene may do without it; `scene.has` says if it does
+    FROM_FILE: ClassVar[bool] = False  # whether its content is that of a file which another table names
+    SHARED: ClassVar[bool] = False  # whether all vehicles of a scene have it in common
+    DISTINCT: ClassVar[str] = ""  # its key of which each of several vehicles has another value
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """Put the content of every file that this table names into the scene's data, not yet validated.
+
+        Raises:
+            KeyedError: no such file, or its content is not of the right form.
+        """
+
+    @classmethod
+    def numbered(cls, i: int) -> dict[str, Any]:
+        """What its keys are by default for vehicle i (from 0) of several, where that goes by the number."""
+        return {}
+
+    def resolved(self) -> dict[str, Any]:
+        """All its keys, also those left at their defaults, as plain data that validates to the same table."""
+        return self.model_dump(exclude_none=True)
+
+    def lookup(self, keys: list[str]) -> Any:
+        """The value of a key of this table, or of a table within it."""
+        value: Any = self
+        for key in keys:
+            value = getattr(value, key)
+        return value
+
+    def check(self, scene: "Scene") -> None:
+        """Check what only the whole scene shows.
+
+        Raises:
+            KeyedError: with the key's path in the scene.
+        """
+
+
+class Vocabulary(NamedTuple):
+    """What a scene may say: its tables by name, and checks beyond those of single tables."""
+
+    sections: Mapping[str, type[Section]]
+    checks: tuple[Callable[["Scene"], None], ...] = ()
+
+    @classmethod
+    def of(cls, modules: Iterable[ModuleType], *checks: Callable[["Scene"], None]) -> "Vocabulary":
+        """The tables that some modules declare or import."""
+        found = [value for module in modules for value in vars(module).values()]
+        sections = [v for v in found if isinstance(v, type) and issubclass(v, Section) and hasattr(v, "TABLE")]
+        return cls({section.TABLE: section for section in sections}, checks)
+
+
+S = TypeVar("S", bound=Section)
+T = TypeVar("T")
+
+
+class _Found(NamedTuple):
+    """What a function has found in a scene, and the tables that it has asked for."""
+
+    value: Any
+    read: set[type[Section] | None]
+
+
+class Scene:
+    """A validated scene. `scene[Run]` is the table that the class `Run` declares. It opens no file."""
+
+    def __init__(
+        self,
+        path: Path,
+        tables: Mapping[type[Section], Section],
+        vocabulary: Vocabulary,
+        sources: Mapping[str, bytes] | None = None,
+        given: tuple[Override, ...] | None = None,
+        locate: Callable[[str], tuple[str, Source]] | None = None,
+        vehicles: Sequence["Scene"] = (),
+    ):
+        self.path = path  # where it was read from
+        self.sources = dict(sources or {})  # every file that was read, by what it says: airframe.toml
+        self.given = given  # overrides; None where the scene is more than its file and these
+        self.vehicles = tuple(vehicles)  # a scene of each vehicle, where the file lists them; its own tables are common
+        self._locate = locate  # what a key is called in the file, and who gave it its value
+        self._tables = dict(tables)
+        self._vocabulary = vocabulary
+        self._found: dict[Callable[[Scene], Any], _Found] = {}
+        self._reading: list[set[type[Section] | None]] = []  # the tables that functions under way have asked for
+
+    def once(self, of: Callable[["Scene"], T]) -> T:
+        """What a function finds in the scene, which never changes: called once, and remembered.
+
+        It is to look at the tables alone, by `[]`, `has`, `section`, `tables` and `lookup`.
+        """
+        found = self._found.get(of)
+        if found is None:
+            self._reading.append(set())
+            try:
+                value = of(self)
+            finally:
+                read = self._reading.pop()
+            found = self._found[of] = _Found(value, read)
+        if self._reading:
+            self._reading[-1] |= found.read
+        return found.value
+
+    def __getitem__(self, section: type[S]) -> S:
+        return self._known(section)._tables[section]  # type: ignore[return-value]
+
+    def _known(self, section: type[Section] | None) -> "Scene":
+        """This scene; SceneError where that is one of several vehicles, who each have such a table of their own."""
+        if self._reading:
+            self._reading[-1].add(section)
+        if self.vehicles and section is not None and not section.SHARED:
+            expected = "a scene of one vehicle, which is all that can be used here"
+            raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, Source(self.path))
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and (self.name, self._tables, self.vehicles) == (
+            other.name,
+            other._tables,
+            other.vehicles,
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def has(self, section: type[Section] | str) -> bool:
+        """Whether there is this table, by its class or name: always, unless it is optional."""
+        known = self._vocabulary.sections.get(section) if isinstance(section, str) else section
+        return known in self._known(known)._tables
+
+    def replaced(self, section: Section) -> "Scene":
+        """The same scene with this table in the place of its own; not checked against the others."""
+        tables = {**self._tables, type(section): section}
+        vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
+        scene = Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
+        scene._found = {of: found for of, found in self._found.items() if type(section) not in found.read}
+        return scene
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """What is found wrong with a key of the scene within the context is told with who gave it its value."""
+        try:
+            yield
+        except SceneError:
+            raise
+        except KeyedError as error:
+            key, source = self._locate(error.key) if self._locate else (error.key, Source(self.path))
+            raise SceneError(key, error.message, error.expected, source) from error.__cause__
+
+    def __repr__(self) -> str:
+        return f"<Scene {self.name}{''.join(f', {override}' for override in self.overrides)}>"
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """KEY=VALUE, as given."""
+        return tuple(override.text for override in self.given or ())
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self.path.stem
+
+    @property
+    def resolved(self) -> dict[str, Any]:
+        """All that the scene says and names, as dicts, lists, texts and numbers; `from_resolved` gives it back."""
+        tables: dict[str, Any] = {section.TABLE: table.resolved() for section, table in self._tables.items()}
+        if self.vehicles:
+            tables["vehicle"] = [
+                {name: table for name, table in scene.resolved.items() if name not in tables} for scene in self.vehicles
+            ]
+        return _plain({name: tables[name] for name in sorted(tables)})
+
+    def section(self, name: str) -> Any:
+        """A table by its name; for those who do not know its class."""
+        return self[self._vocabulary.sections[name]]
+
+    def tables(self, name: str) -> Mapping[str, Any]:
+        """The tables inside a table whose keys are names, for example each sensor's of "sensors"."""
+        return self.section(name).tables
+
+    def lookup(self, dotted: str) -> Any:
+        """The value of a dotted key, for example "sensors.imu.rate"."""
+        table, *rest = dotted.split(".")
+        return self.section(table).lookup(rest)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,39 @@
+"""A fault in a scene: what is wrong with which key, and who wrote it."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from lapwing.dynamics.config_error import KeyedError
+
+
+class Source(NamedTuple):
+    """Who gave a key its value: a line of a file, or an override."""
+
+    path: Path | None = None
+    line: int | None = None
+    override: str | None = None  # its key, or all of it where it is not KEY=VALUE or reaches nothing
+    option: str = "--set"  # by which the override was given
+
+    def __str__(self) -> str:
+        if self.override is not None:
+            return f"{self.option} {self.override}"
+        return f"{self.path or ''}{f':{self.line}' if self.line else ''}"
+
+
+NOWHERE = Source()
+
+
+class SceneError(KeyedError):
+    """A scene that cannot be flown; `str` is one line for the user."""
+
+    def __init__(self, key: str, message: str, expected: str = "", source: Source = NOWHERE):
+        super().__init__(key, message, expected)
+        self.args = (key, message, expected, source)
+        self.source = source
+
+    def __str__(self) -> str:
+        override = self.source.override
+        if override is not None and f"{self.key}.".startswith(f"{override}."):
+            return f"{self.source.option} {self.key}: {self.sentence}"
+        said = self.sentence if override and override.startswith(f"{self.key}=") else super().__str__()
+        return ": ".join(filter(None, (str(self.source), said)))

@@ -1,0 +1,116 @@
+"""A scene of several vehicles: each entry of `[[vehicle]]` is a scene of its own, of the common tables and its own.
+
+What an entry says of a table is laid over the common one, key by key. A text in the place of a table's name is a key of
+the vehicle: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` changes what the file says.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from lapwing.cosim.scene.files import copied, laid_over
+from lapwing.cosim.scene.overrides import Override
+from lapwing.cosim.scene.scene import Scene, Section, Vocabulary
+from lapwing.cosim.scene.scene_error import SceneError, Source
+from lapwing.dynamics.config_error import KeyedError
+
+VEHICLE = "vehicle"
+MOST = 50  # vehicles
+
+
+def count(tree: Mapping[str, Any]) -> int:
+    """How many vehicles a scene lists; 0 where it has a table `[vehicle]`, or none.
+
+    Raises:
+        KeyedError: too many, or an entry is no table.
+    """
+    entries = tree.get(VEHICLE)
+    if not isinstance(entries, list):
+        return 0
+    if not 1 <= len(entries) <= MOST:
+        raise KeyedError(VEHICLE, f"{len(entries)} vehicles", f"1 to {MOST}")
+    for i, entry in enumerate(entries):
+        if not isinstance(entry, dict):
+            raise KeyedError(f"{VEHICLE}.{i}", f"got {entry!r}", f"a table [[{VEHICLE}]]")
+    return len(entries)
+
+
+def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str, Any]:
+    """The tables of vehicle i of a scene as of a scene of that vehicle alone, not yet validated.
+
+    Raises:
+        KeyedError: it has a table that all vehicles share.
+    """
+    common = {name: table for name, table in tree.items() if name != VEHICLE}
+    own: dict[str, Any] = {VEHICLE: {}}
+    for name, value in tree[VEHICLE][i].items():
+        if isinstance(value, dict) and name in vocabulary.sections:
+            _check_own(name, f"{VEHICLE}.{i}.{name}", vocabulary)
+            own[name] = value
+        else:
+            own[VEHICLE][name] = value
+    defaults = {name: keys for name, section in vocabulary.sections.items() if (keys := section.numbered(i))}
+    return copied(laid_over(defaults, laid_over(common, own)))
+
+
+def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:
+    """Those of the overrides that reach vehicle i: its own, with the keys of a scene of it alone, and the common ones.
+
+    Raises:
+        SceneError: a key of `vehicle` without the vehicle's number, or of a table that all share.
+    """
+    found = []
+    for override in given:
+        table, *rest = override.key.split(".")
+        if table != VEHICLE:
+            found.append(override)
+            continue
+        if len(rest) < 2 or not rest[0].isdigit() or int(rest[0]) >= vehicles:
+            known = {*vocabulary.sections, *vocabulary.sections[VEHICLE].model_fields}
+            which = len(rest) > 1 and rest[0] not in known
+            expected = f"{VEHICLE}.N.{'.'.join(rest[which:]) or 'KEY'}, N from 0 to {vehicles - 1}"
+            raise SceneError(override.key, "which vehicle?", expected, Source(override=override.text))
+        name, *inner = rest[1:]
+        if int(rest[0]) == i:
+            if inner and name in vocabulary.sections:
+                _check_own(name, override.key, vocabulary)
+            key = ".".join([name, *inner] if inner else [VEHICLE, name])
+            found.append(override._replace(key=key))
+    return found
+
+
+def own_key(key: str, i: int) -> str:
+    """The key of the whole scene for one of a scene of vehicle i alone."""
+    return f"{VEHICLE}.{i}.{key.removeprefix(f'{VEHICLE}.')}"
+
+
+def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any, Any]:
+    """The tables that all vehicles share.
+
+    Raises:
+        KeyedError: two vehicles have the same name, or another value that each has its own of.
+    """
+    members = list(members)
+    for section in vocabulary.sections.values():
+        if section.DISTINCT:
+            _check_distinct([scene[section].lookup([section.DISTINCT]) for scene in members], section)
+    found = {}
+    for section in vocabulary.sections.values():
+        if section.SHARED and (tables := [scene[section] for scene in members if scene.has(section)]):
+            merged: dict[str, Any] = {}  # what files say may be known to some of them only
+            for table in tables:
+                merged = laid_over(merged, table.resolved())
+            found[section] = section.model_validate(merged) if tables.count(tables[0]) < len(tables) else tables[0]
+    return found
+
+
+def _check_own(table: str, key: str, vocabulary: Vocabulary) -> None:
+    if vocabulary.sections[table].SHARED:
+        raise KeyedError(key, "all vehicles share it", f"a table [{table}] of the scene")
+
+
+def _check_distinct(values: list[Any], section: type[Section]) -> None:
+    for i, value in enumerate(values):
+        if value in values[:i]:
+            table = "" if section.TABLE == VEHICLE else f"{section.TABLE}."
+            message = f"{value} is also that of {VEHICLE}.{values.index(value)}"
+            raise KeyedError(f"{VEHICLE}.{i}.{table}{section.DISTINCT}", message, "another")

@@ -1,0 +1,270 @@
+"""The bus: how messages travel between services. The only file that imports zenoh.
+
+`ZenohBus` joins separate processes; the single-process mode needs no bus.
+"""
+
+import json
+import os
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from types import MappingProxyType
+from typing import Any
+
+from lapwing.cosim.run_errors import BusError
+from lapwing.cosim.transport.ring_subscription import Inbox
+from lapwing.cosim.transport.session_settings import session_settings
+from lapwing.cosim.transport.subscription import Message, Subscription
+from lapwing.messages.attachment import pack, time_and_gid
+
+# One runtime thread instead of six: the largest single gain in latency (see docs/benchmarks.md).
+_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
+os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
+
+import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
+
+INBOX = 4096  # messages; far more than come in lock step before one is taken
+WAKE = 0.05  # [s] between two looks at whether somebody has waited long enough
+
+_opened = False
+
+
+def in_use() -> bool:
+    """Whether this process has had a session: Zenoh keeps threads and files for the next one, which no fork has."""
+    return _opened
+
+
+class ZenohBus:
+    """A session with explicit endpoints, publishers by key, and subscriptions that are queues.
+
+    Attributes:
+        refused: how many messages were not taken: without a sound attachment, or not of their sender.
+    """
+
+    def __init__(
+        self,
+        listen: Iterable[str] = (),
+        connect: Iterable[str] = (),
+        mode: str = "peer",
+        mark: bytes = b"",
+        security: Mapping[str, Any] = MappingProxyType({}),
+        awaits: bool = True,
+    ):
+        """Open the session.
+
+        Args:
+            listen: endpoints that others connect to.
+            connect: endpoints of others.
+            mode: of Zenoh: "peer", "client" or "router".
+            mark: 16 bytes that every message carries; made up where there are none.
+            security: further entries of the Zenoh configuration, by key.
+            awaits: wait until a peer is there, half a second at most; else they are met as they come.
+
+        Raises:
+            BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
+        """
+        global _opened
+        _opened = True
+        listen, connect = list(listen), list(connect)
+        try:
+            self._session = zenoh.open(_configured({**session_settings(listen, connect, mode, awaits), **security}))
+        except zenoh.ZError as error:
+            tried = connect if mode == "client" else listen
+            endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
+            action = "connect to" if mode == "client" else "listen on"
+            raise BusError(f"cannot {action} {endpoints}: {str(error).partition(' at /')[0]}") from None
+        self._mark = mark or uuid.uuid4().bytes
+        self.refused = 0
+        self._publishers: dict[str, tuple[zenoh.Publisher, Callable[[bytes, int], None]]] = {}
+        self._held: list = []  # subscribers and tokens live as long as the session
+        self._inboxes: dict[str, Inbox] = {}  # by key
+        self._waker = uuid.uuid4().bytes  # the mark of what this bus says to its own inboxes
+        self._closed = threading.Event()
+
+    @property
+    def session_id(self) -> str:
+        """Zenoh's own identifier of this session, hexadecimal."""
+        return str(self._session.info.zid())
+
+    def publisher(self, key: str, mark: bytes = b"", drops: bool = False) -> Callable[[bytes, int], None]:
+        """A function `put(payload, time_ns)` that publishes on `key`; messages of one key keep their order.
+
+        Args:
+            key: Zenoh key.
+            mark: 16 bytes that its messages carry instead of the bus's.
+            drops: leave out what a slow subscriber has no room for, instead of waiting for it.
+        """
+        if key not in self._publishers:
+            control = zenoh.CongestionControl.DROP if drops else zenoh.CongestionControl.BLOCK
+            declared = self._session.declare_publisher(key, congestion_control=control)
+            sequence = 0
+            mark = mark or self._mark
+
+            def put(payload: bytes, time_ns: int) -> None:
+                nonlocal sequence
+                sequence += 1
+                declared.put(payload, attachment=pack(sequence, time_ns, mark))
+
+            self._publishers[key] = (declared, put)
+        return self._publishers[key][1]
+
+    def has_audience(self, keys: Iterable[str]) -> bool:
+        """Whether somebody subscribes to one of the keys that this bus has a publisher for."""
+        statuses = (self._publishers[key][0].matching_status for key in keys)
+        return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
+
+    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> Subscription:
+        """Receive what whoever publishes on any of the keys, in order of arrival.
+
+        `notify` is called from another thread after each arrival, for those who wait for other things besides.
+        """
+        return self._receive(key_expressions, Subscription(_message, None, self._refuse, notify))
+
+    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
+        """The same of known senders: by key the mark that a message must carry, None for that of the first."""
+        return self._receive(senders, Subscription(_message, dict(senders), self._refuse, notify))
+
+    def inbox(self, key: str, sender: bytes | None) -> Inbox:
+        """Receive what the sender with this mark publishes on `key`, where it is taken soon after it comes: a message
+        keeps the 64 kB alive into which it was read, and the oldest of too many are lost. None as of `receive`."""
+        subscriber = self._session.declare_subscriber(key, zenoh.handlers.RingChannel(INBOX))
+        self._held.append(subscriber)
+        found = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._refuse)
+        if not self._inboxes:
+            threading.Thread(target=self._wake, daemon=True).start()
+        self._inboxes[key] = found
+        return found
+
+    def _wake(self) -> None:
+        """Let those who wait at an inbox know when they have waited long enough: Zenoh's queues have no time-out."""
+        while not self._closed.wait(WAKE):
+            for key, inbox in list(self._inboxes.items()):
+                if time.monotonic() >= inbox.until:
+                    here = zenoh.Locality.SESSION_LOCAL
+                    with suppress(zenoh.ZError):  # closed meanwhile
+                        self._session.put(key, b"", attachment=pack(0, 0, self._waker), allowed_destination=here)
+
+    def _receive(self, keys: Iterable[str], subscription: Subscription) -> Subscription:
+        handler = zenoh.handlers.Callback(subscription.arrive, indirect=False)
+        self._held.extend(self._session.declare_subscriber(key, handler) for key in keys)
+        return subscription
+
+    def _refuse(self) -> None:
+        self.refused += 1
+
+    def declare_alive(self, key: str) -> Callable[[], None]:
+        """Say that this participant is there, until what is returned is called. Call it after `subscribe`: whoever sees
+        it may publish."""
+        token = self._session.liveliness().declare_token(key)
+        self._held.append(token)
+        return token.undeclare
+
+    def watch_alive(self, key_expression: str, seen: Callable[[str, bool], None]) -> None:
+        """Call `seen(key, alive)` from another thread for every participant that is there, comes or goes."""
+
+        def handle(sample: zenoh.Sample) -> None:
+            seen(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        handler = zenoh.handlers.Callback(handle, indirect=False)
+        self._held.append(self._session.liveliness().declare_subscriber(key_expression, handler, history=True))
+
+    def answer(self, key: str, answer: Callable[[str], bytes]) -> None:
+        """Give `answer(words)` to everybody who asks for `key` with these words; it is called from another thread.
+
+        Where it raises a ValueError or a KeyError, the words are a stranger's, and are counted as refused.
+        """
+
+        def reply(query: zenoh.Query) -> None:
+            try:
+                found = answer(str(query.parameters))
+            except (KeyError, ValueError):
+                self.refused += 1
+                return
+            query.reply(key, found, attachment=pack(0, 0, self._mark))
+
+        # In a thread of its own: on Zenoh's only one, a reply of several fragments would wait for itself
+        handler: Any = zenoh.handlers.Callback(reply, indirect=True)
+        self._held.append(self._session.declare_queryable(key, handler))
+
+    def ask(self, key: str, timeout: float, words: str = "", mark: bytes | None = None) -> bytes | None:
+        """What somebody answers to `key`, None after `timeout` seconds.
+
+        Args:
+            key: Zenoh key.
+            timeout: [s].
+            words: what is asked, without "=", ";" and "#".
+            mark: that the answer must carry, None for any.
+        """
+        for reply in self._session.get(f"{key}?{words}" if words else key, timeout=timeout):
+            if reply.ok is not None and mark in (None, _mark_of(reply.ok)):
+                return reply.ok.payload.to_bytes()
+        return None
+
+    def wait_alive(self, keys: Iterable[str], timeout: float, stop: Callable[[], bool] = lambda: False) -> list[str]:
+        """Wait until a participant is there for each key; the keys still missing after `timeout` seconds."""
+        missing = set(keys)
+        arrivals: queue.SimpleQueue = queue.SimpleQueue()
+        for folder in {key.rpartition("/")[0] for key in missing}:
+            self.watch_alive(f"{folder}/*", lambda key, alive: arrivals.put((key, alive)))
+        deadline = time.monotonic() + timeout
+        while missing and time.monotonic() < deadline and not stop():
+            try:
+                key, alive = arrivals.get(timeout=0.05)
+            except queue.Empty:
+                continue
+            if alive:
+                missing.discard(key)
+        return sorted(missing)
+
+    def close(self) -> None:
+        """Close the session. What was put just before may be lost (`tests/cosim/test_close.py`): whoever publishes what
+        must arrive waits until the others have confirmed it, as `lapwing.cosim.executors.participant.Process.leave` does."""
+        self._closed.set()
+        with suppress(zenoh.ZError):  # it has waited for one of these
+            self._session.close()
+
+    def __enter__(self) -> "ZenohBus":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _configured(settings: Mapping[str, Any]) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _message(sample: zenoh.Sample) -> Message | None:
+    """What a sample says; None where it has no sound attachment, or deletes a key."""
+    attachment = sample.attachment
+    if attachment is None:
+        return None
+    try:
+        time_ns, mark = time_and_gid(attachment.to_bytes())
+    except ValueError:
+        return None
+    payload = sample.payload.to_bytes()
+    if not payload and sample.kind != zenoh.SampleKind.PUT:
+        return None
+    return time_ns, mark, payload
+
+
+def _mark_of(sample: zenoh.Sample) -> bytes:
+    """The mark of a message; none where it has no sound attachment."""
+    message = _message(sample)
+    return message[1] if message else b""
+
+
+def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Where participant `name` listens and connects so that all are joined pairwise exactly once.
+
+    It does not depend on the order of `endpoints`, which need not be the same for all of them.
+    """
+    names = sorted(endpoints)
+    return [endpoints[name]], [endpoints[other] for other in names[: names.index(name)]]

@@ -1,0 +1,141 @@
+"""What services send one another: a bundle a tick, with the rows of all that a service gives at that tick; and batches
+of encoded messages for those who record.
+
+A bundle is the rows of the service's ports that are due at the tick, in the order of its set-up, one after the other:
+little-endian float64, nothing between them. One of several ticks (`lapwing.cosim.transport.packet_schedule`) has, port by port, all rows that are
+due in them. A service that gives nothing in these ticks sends none. An empty bundle says that there will be no other.
+
+A batch is the ticks [start, stop) of which it has all messages (two int64), then pages: length of the topic's
+name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
+"""
+
+import math
+import struct
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Page, due_ticks
+from lapwing.kernels.row_packing import width
+from lapwing.messages.topics import topic_named
+
+_PAGE = struct.Struct("<HII")
+_TICKS = struct.Struct("<qq")
+
+
+class BundleError(ValueError):
+    """Bytes that are no bundle or batch of this run."""
+
+
+class _Rows(NamedTuple):
+    """The rows of a port that a bundle holds."""
+
+    port: str
+    period: int
+    number: int
+    place: slice  # among the numbers of the bundle
+
+
+class Bundles:
+    """The bundles of one service: which rows they hold."""
+
+    def __init__(self, ports: Sequence[Port], ticks: int = 1):
+        """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
+        self._ports = [(port.name, port.period, width(port.like)) for port in ports]
+        self._periods = sorted({port.period for port in ports})
+        self._cycle = math.lcm(*self._periods)  # [ticks] after which bundles hold the same rows again
+        self._ticks = ticks
+        self._by_phase: dict[int, tuple[_Rows, ...]] = {}
+        self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # by the number of rows for each period
+
+    def due(self, first: int) -> bool:
+        """Whether there is a bundle from the tick `first` on."""
+        return bool(self._rows(first))
+
+    def size(self, first: int) -> int:
+        """Bytes of the bundle from the tick `first` on."""
+        rows = self._rows(first)
+        return 8 * rows[-1].place.stop if rows else 0
+
+    def pack(self, graph: Graph, first: int) -> bytes:
+        """The bundle from the tick `first` on, from the rows of a graph."""
+        if self._ticks == 1:
+            return b"".join([graph.row(rows.port, first).tobytes() for rows in self._rows(first)])
+        return b"".join([graph.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
+
+    def unpack(self, payload: bytes, graph: Graph, first: int) -> None:
+        """Put the rows of the bundle from the tick `first` on into those of a graph that uses them.
+
+        Raises:
+            BundleError: it has not the size that is due.
+        """
+        if len(payload) != self.size(first):
+            raise BundleError(f"a bundle of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
+        numbers = np.frombuffer(payload, "<f8")
+        for rows in self._rows(first):
+            if not graph.has(rows.port):
+                continue
+            if self._ticks == 1:
+                graph.put_row(rows.port, first, numbers[rows.place])
+            else:
+                graph.put_rows(rows.port, self._due(rows, first), numbers[rows.place].reshape(rows.number, -1))
+
+    def _due(self, rows: _Rows, first: int) -> np.ndarray:
+        return due_ticks(first, first + self._ticks, rows.period)
+
+    def _rows(self, first: int) -> tuple[_Rows, ...]:
+        phase = first % self._cycle
+        if (rows := self._by_phase.get(phase)) is None:
+            rows = self._by_phase[phase] = self._rows_of(phase)
+        return rows
+
+    def _rows_of(self, first: int) -> tuple[_Rows, ...]:
+        last = first + self._ticks - 1
+        numbers = tuple([last // period - (first - 1) // period for period in self._periods])
+        if numbers not in self._known:
+            by_period = dict(zip(self._periods, numbers, strict=True))
+            found, place = [], 0
+            for name, period, columns in self._ports:
+                if number := by_period[period]:
+                    found.append(_Rows(name, period, number, slice(place, place + number * columns)))
+                    place += number * columns
+            self._known[numbers] = tuple(found)
+        return self._known[numbers]
+
+
+def pack_batch(pages: Iterable[Page], start: int, stop: int) -> bytes:
+    """A batch of pages, which have all messages of the ticks [start, stop)."""
+    parts = [_TICKS.pack(start, stop)]
+    for page in pages:
+        payloads = np.ascontiguousarray(page.payloads)
+        size = payloads.nbytes // len(page.ticks)
+        name = page.topic.name.encode()
+        parts += [_PAGE.pack(len(name), len(page.ticks), size), name, page.ticks.tobytes(), payloads.tobytes()]
+    return b"".join(parts)
+
+
+def unpack_batch(payload: bytes) -> tuple[int, int, list[Page]]:
+    """The ticks [start, stop) of which it has all messages, and the pages, payloads of shape (n, size).
+
+    Raises:
+        BundleError: no batch.
+    """
+    try:
+        start, stop = _TICKS.unpack_from(payload)
+        place, pages = _TICKS.size, []
+        while place < len(payload):
+            length, n, size = _PAGE.unpack_from(payload, place)
+            place += _PAGE.size
+            topic = topic_named(payload[place : place + length].decode())
+            place += length
+            ticks = np.frombuffer(payload, "<i8", n, place)
+            place += 8 * n
+            payloads = np.frombuffer(payload, np.uint8, n * size, place).reshape(n, size)
+            place += n * size
+            pages.append(Page(topic, ticks, payloads))
+        return start, stop, pages
+    except (struct.error, ValueError, IndexError) as error:
+        raise BundleError(f"a batch of {len(payload)} bytes: {error}") from None

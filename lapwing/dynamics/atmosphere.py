@@ -1,0 +1,75 @@
+"""The International Standard Atmosphere up to 20 km, at another sea-level pressure or temperature if need be.
+
+ISO 2533:1975; theory.md, eqs. (2.3) and (3.8).
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.kernels import leaf
+
+GRAVITY = 9.80665  # [m/s^2] g_0
+EARTH_RADIUS = 6_356_766.0  # [m] by which geometric altitude becomes geopotential
+GAS_CONSTANT = 287.05287  # [J/(kg K)] of dry air
+SEA_LEVEL_TEMPERATURE = 288.15  # [K]
+LAPSE_RATE = 0.0065  # [K/m] up to the tropopause, none above it
+TROPOPAUSE = 11_000.0  # [m] geopotential
+EXPONENT = GRAVITY / (GAS_CONSTANT * LAPSE_RATE)  # 5.2559
+FREEZING = 273.15  # [K] at 0 degC
+
+
+class Atmosphere(NamedTuple):
+    """The air of a day: in hydrostatic balance, its temperature off the standard by as much at every altitude."""
+
+    sea_level_pressure: Annotated[float, Ge(85e3), Le(110e3)] = 101_325.0  # [Pa]
+    temperature_offset: Annotated[float, Ge(-60), Le(60)] = 0.0  # [K] from the standard's 15 degC at sea level
+
+
+@leaf
+def _geopotential(altitude):
+    return EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude)
+
+
+@leaf
+def temperature(a, altitude):
+    """[K] at an altitude [m] above the sea."""
+    return SEA_LEVEL_TEMPERATURE + a.temperature_offset - LAPSE_RATE * min(_geopotential(altitude), TROPOPAUSE)
+
+
+@leaf
+def pressure(a, altitude):
+    """[Pa] at an altitude [m] above the sea."""
+    height, ground = _geopotential(altitude), SEA_LEVEL_TEMPERATURE + a.temperature_offset
+    found = a.sea_level_pressure * (1.0 - LAPSE_RATE * min(height, TROPOPAUSE) / ground) ** EXPONENT
+    if height > TROPOPAUSE:
+        kelvin = ground - LAPSE_RATE * TROPOPAUSE
+        found = found * math.exp((TROPOPAUSE - height) * GRAVITY / (GAS_CONSTANT * kelvin))
+    return found
+
+
+@leaf
+def density(a, altitude):
+    """[kg/m^3] at an altitude [m] above the sea."""
+    return pressure(a, altitude) / (GAS_CONSTANT * temperature(a, altitude))
+
+
+@leaf
+def density_slope(a, altitude):
+    """Change of density with altitude [kg/m^4]."""
+    lapse = LAPSE_RATE if _geopotential(altitude) < TROPOPAUSE else 0.0
+    weaker = EARTH_RADIUS / (EARTH_RADIUS + altitude)
+    return density(a, altitude) * (lapse - GRAVITY / GAS_CONSTANT) * weaker * weaker / temperature(a, altitude)
+
+
+@leaf
+def pressure_altitude(a, pressure_now):
+    """Altitude [m] above the sea at which `pressure` gives this pressure [Pa]."""
+    ground = SEA_LEVEL_TEMPERATURE + a.temperature_offset
+    height = ground * (1.0 - (pressure_now / a.sea_level_pressure) ** (1.0 / EXPONENT)) / LAPSE_RATE
+    if height > TROPOPAUSE:
+        kelvin = ground - LAPSE_RATE * TROPOPAUSE
+        at_tropopause = a.sea_level_pressure * (kelvin / ground) ** EXPONENT
+        height = TROPOPAUSE + math.log(at_tropopause / pressure_now) * GAS_CONSTANT * kelvin / GRAVITY
+    return EARTH_RADIUS * height / (EARTH_RADIUS - height)

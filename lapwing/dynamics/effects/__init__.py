@@ -1,0 +1,90 @@
+"""The effects that a scene may call for: one file each, found by scanning this folder.
+
+The file `body_drag.py` is the effect `body_drag`; it has a parameter NamedTuple `BodyDrag` and registers hooks for it
+(see `_hooks`). Its parameters are the keys of the scene's table, checked against the annotations, unless the class has
+`from_scene(table, airframe)`. One that depends on where it flies has `in_environment(environment)`, which gives it as
+it is there. A module constant `KIND` names what only one active effect may be; a module's `check(table, tables)`
+refuses what it cannot be beside.
+
+An effect of the user's own is such a file elsewhere, which Python finds; the scene's table names it with `module`.
+"""
+
+import importlib
+from collections.abc import Mapping
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from lapwing.dynamics import discovery
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.environment import STANDARD, Environment
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+__all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
+
+
+def names() -> list[str]:
+    """Every effect's name: its file name."""
+    return discovery.names(__name__)
+
+
+def get(name: str, module: str | None = None) -> ModuleType:
+    """The module of an effect; KeyedError that lists the choices if there is none.
+
+    Args:
+        name: of the effect.
+        module: name of a module that Python finds, of an effect that is none of this folder.
+    """
+    if module is not None:
+        if name in names():
+            raise KeyedError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
+        return importlib.import_module(module)
+    if name not in names():
+        raise KeyedError.unknown(f"effects.{name}", "effect", name, names())
+    return importlib.import_module(f"{__name__}.{name}")
+
+
+def class_name(name: str) -> str:
+    """What the parameter NamedTuple of an effect is called: "BodyDrag" for "body_drag"."""
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def parameter_class(name: str, module: str | None = None) -> type:
+    """The parameter NamedTuple of an effect; arguments as of `get`."""
+    found, wanted = get(name, module), class_name(name)
+    if not hasattr(found, wanted):
+        raise KeyedError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")
+    return getattr(found, wanted)
+
+
+def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment: Environment = STANDARD) -> tuple:
+    """The active effects of a scene, sorted by name, from the table of each.
+
+    Raises:
+        KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
+            the wrong type or out of range, an effect that the vehicle cannot have, or two that exclude each other.
+    """
+    active = []
+    kinds: dict[str, str] = {}
+    for name in sorted(tables):
+        table = dict(tables[name])
+        module = table.pop("module", None)
+        kind = getattr(get(name, module), "KIND", name)
+        if kind in kinds:
+            raise KeyedError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
+        kinds[kind] = name
+        if hasattr(get(name, module), "check"):
+            try:
+                get(name, module).check(table, tables)
+            except KeyedError as error:
+                raise error.under(f"effects.{name}") from None
+        cls = parameter_class(name, module)
+        build = getattr(cls, "from_scene", None)
+        try:
+            effect = build(table, airframe) if build else checked(cls, table)
+        except KeyedError as error:
+            raise error.under(f"effects.{name}") from None
+        active.append(effect.in_environment(environment) if hasattr(effect, "in_environment") else effect)
+    return tuple(active)

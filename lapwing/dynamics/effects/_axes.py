@@ -1,0 +1,183 @@
+"""Rotors' axes: body z where the airframe names none, at no cost; otherwise a direction for each rotor.
+
+`layout.axis` is () or a unit vector in body coordinates for each rotor, along which it pushes; which of both it is, is
+part of its type, so that the choice is made when the plant is compiled.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+
+from lapwing.dynamics.effects._rotor_sums import total, total_wrench
+from lapwing.dynamics.vector import add, apply, apply_transposed, cross, dot, norm, pair, scale, subtract
+from lapwing.kernels import leaf, uncompiled
+from lapwing.kernels.codegen import each, implements
+
+
+def by_axis(along_z: Callable, tilted: Callable, axis: tuple, given: Any) -> Any:
+    """`along_z(given)` where rotors have no axes of their own, otherwise `tilted(given)`; both compiled."""
+    return uncompiled(tilted if axis else along_z)(given)
+
+
+@implements(by_axis, inline=True)
+def _by_axis(along_z, tilted, axis, given):
+    if len(axis):
+        return lambda along_z, tilted, axis, given: tilted(given)
+    return lambda along_z, tilted, axis, given: along_z(given)
+
+
+@leaf
+def _place(_, plan, height):
+    return plan[0], plan[1], height
+
+
+@leaf
+def places(layout):
+    """Position of each rotor [m], body coordinates."""
+    plan = each(pair, 0.0, layout.x_body, layout.y_body)
+    return each(_place, 0.0, plan, layout.z_body)
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@leaf
+def _thrust_along_z(given):
+    layout, loads = given
+    return total(loads.thrust), (
+        total(each(_product, 0.0, layout.y_body, loads.thrust)),
+        -total(each(_product, 0.0, layout.x_body, loads.thrust)),
+        total(each(_product, 0.0, layout.reaction_sign, loads.torque)),
+    )
+
+
+@leaf
+def _push(_, axis, load):
+    """(force [N], torque [N m]) of a rotor: r x T a + s Q a (theory.md, eq. (1.6b))."""
+    place, thrust, reaction = load
+    force = scale(thrust, axis)
+    return force, add(cross(place, force), scale(reaction, axis))
+
+
+@leaf
+def _load(_, place, both):
+    return place, both[0], both[1]
+
+
+@leaf
+def _thrust_tilted(given):
+    layout, loads = given
+    reaction = each(_product, 0.0, layout.reaction_sign, loads.torque)
+    pushes = each(_load, 0.0, places(layout), each(pair, 0.0, loads.thrust, reaction))
+    return total_wrench(each(_push, 0.0, layout.axis, pushes))
+
+
+@leaf
+def thrust_wrench(layout, loads):
+    """(thrust, torque [N m]) of all rotors in body coordinates.
+
+    The thrust [N] is a number along body z, or a vector where the rotors have axes of their own.
+    """
+    return by_axis(_thrust_along_z, _thrust_tilted, layout.axis, (layout, loads))
+
+
+def in_world(thrust: Any, R_world_body: tuple) -> tuple:
+    """The thrust of `thrust_wrench`, world coordinates [N]."""
+    if isinstance(thrust, tuple):
+        return apply(R_world_body, thrust)
+    return (thrust * R_world_body[2], thrust * R_world_body[5], thrust * R_world_body[8])
+
+
+@implements(in_world, inline=True)
+def _in_world(thrust, R_world_body):
+    if isinstance(thrust, types.BaseTuple):
+        return lambda thrust, R_world_body: apply(R_world_body, thrust)
+    # a number needs only the third column
+    return lambda thrust, R_world_body: (
+        thrust * R_world_body[2], thrust * R_world_body[5], thrust * R_world_body[8],
+    )  # fmt: skip
+
+
+def beside(thrust: Any, force: tuple) -> tuple:
+    """The thrust of `thrust_wrench` added to a force, body coordinates [N]."""
+    return add(force, thrust) if isinstance(thrust, tuple) else (force[0], force[1], force[2] + thrust)
+
+
+@implements(beside, inline=True)
+def _beside(thrust, force):
+    if isinstance(thrust, types.BaseTuple):
+        return lambda thrust, force: add(force, thrust)
+    return lambda thrust, force: (force[0], force[1], force[2] + thrust)
+
+
+@leaf
+def air_body(s):
+    """(velocity [m/s], rate [rad/s]) of the body against the air around it, body coordinates."""
+    air = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))
+    return air, subtract(s.motion.omega_body, s.air_rate_body)
+
+
+@leaf
+def _axial_along_z(c, x, y):
+    axial, omega = c
+    return axial + omega[0] * y - omega[1] * x
+
+
+@leaf
+def _axial_speeds_along_z(s):
+    air, omega = air_body(s)
+    return each(_axial_along_z, (air[2], omega), s.layout.x_body, s.layout.y_body)
+
+
+@leaf
+def _axial_tilted(c, place, axis):
+    air, omega = c
+    return dot(axis, add(air, cross(omega, place)))
+
+
+@leaf
+def _axial_speeds_tilted(s):
+    return each(_axial_tilted, air_body(s), places(s.layout), s.layout.axis)
+
+
+@leaf
+def axial_speeds(s):
+    """Air speed of each hub along its rotor's axis [m/s], the body's turning included."""
+    return by_axis(_axial_speeds_along_z, _axial_speeds_tilted, s.layout.axis, s)
+
+
+@leaf
+def _hub_along_z(c, plan, z):
+    air, omega = c
+    x, y = plan
+    ahead, aside = air[0] + omega[1] * z - omega[2] * y, air[1] + omega[2] * x - omega[0] * z
+    return air[2] + omega[0] * y - omega[1] * x, math.sqrt(ahead * ahead + aside * aside)
+
+
+@leaf
+def _hubs_along_z(s):
+    plan = each(pair, 0.0, s.layout.x_body, s.layout.y_body)
+    return each(_hub_along_z, air_body(s), plan, s.layout.z_body)
+
+
+@leaf
+def _hub_tilted(c, place, axis):
+    air, omega = c
+    speed = add(air, cross(omega, place))
+    axial = dot(axis, speed)
+    return axial, norm(subtract(speed, scale(axial, axis)))
+
+
+@leaf
+def _hubs_tilted(s):
+    return each(_hub_tilted, air_body(s), places(s.layout), s.layout.axis)
+
+
+@leaf
+def hub_speeds(s):
+    """(axial, across) air speed of each hub [m/s], the body's turning included."""
+    return by_axis(_hubs_along_z, _hubs_tilted, s.layout.axis, s)

@@ -1,0 +1,149 @@
+"""What a scene says about the contact with the ground, and the two effects that come of it."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import LEVEL, upright
+from lapwing.dynamics.vector import Vec3
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Coefficient = Annotated[float, Ge(0), Le(5)]
+Stiffness = Annotated[float, Gt(0), Le(1e9)]
+Slip = Annotated[float, Ge(1e-6), Le(10)]
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    friction: Literal["anchor", "smooth"] = "anchor"  # a spring to where the foot stands, or a function of its slip
+    stiffness: Stiffness = 1.0e6  # [N/m] of one foot
+    damping: Annotated[float, Ge(0), Le(1e6)] = 1.0e3  # [N s/m] of one foot
+    transition_width: Annotated[float, Ge(1e-7), Le(0.1)] = 1.0e-4  # [m] depth over which the normal force sets in
+    friction_static: Coefficient = 0.5  # coefficient of a foot that sticks
+    friction_dynamic: Coefficient = 0.3  # coefficient of a foot that slides
+    tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
+    stick_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
+    critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "smooth"
+
+
+class GroundContact(NamedTuple):
+    """Feet that stick where they stand until the friction cone lets go (theory.md, eq. (2.12) to (2.16)).
+
+    The friction is a spring and damper between each foot and its anchor on the ground; the anchor is dragged along
+    when the force leaves the Coulomb cone. Source: Cundall and Strack, Geotechnique 29 (1979) 47, with a static
+    coefficient for feet at rest or coming to rest and a dynamic one for feet that break away. Valid for hard ground
+    and feet that are points; the ground is that of [environment].
+    """
+
+    terrain: Any  # Level or Relief
+    feet: tuple[Vec3, ...]  # [m] body, with the hull's points
+    reach: float  # [m] beyond which no foot can be from the centre of mass, measured along world z from the slope
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    inverse_width: float  # [1/m]
+    static: float
+    dynamic: float
+    tangential_stiffness: float  # [N/m]
+    square_stick_velocity: float  # [m^2/s^2]
+    rate_bound: float  # [1/s] of the fastest mode in contact
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
+        """With the airframe's feet and mass."""
+        given = checked(Settings, table)
+        if given.friction_dynamic > given.friction_static:
+            expected = f"at most friction_static = {given.friction_static}"
+            raise KeyedError("friction_dynamic", f"got {given.friction_dynamic}", expected)
+        points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
+        feet = points.feet + points.hull
+        common = (
+            LEVEL, feet, _reach(feet), given.stiffness, given.damping, 1.0 / given.transition_width,
+            given.friction_static, given.friction_dynamic,
+        )  # fmt: skip
+        if given.friction == "smooth":
+            rate = _rate_bound(airframe, points.feet, (given.stiffness, 0.0), (given.damping, 0.0))
+            return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
+        rate = _rate_bound(
+            airframe, points.feet, (given.stiffness, given.tangential_stiffness), (given.damping, given.damping)
+        )
+        return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
+
+    def in_environment(self, environment: Environment) -> "GroundContact":
+        """On the ground that is there."""
+        return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
+
+    def initial_memory(self) -> tuple[tuple[float, float, float, float, float], ...]:
+        """No foot is on the ground."""
+        return (NOWHERE,) * len(self.feet)
+
+
+class GroundContactSmooth(NamedTuple):
+    """Feet under a friction that is a function of velocity only (theory.md, eq. (2.17)).
+
+    Source: the "smooth stick-slip" law that Pappalardo et al. 2023, section 6.1, take from Simscape Multibody. It
+    creeps on a slope, and near rest it is a damper of about 1.5 mu_s m g / v_c, so stiff that steps are split while in
+    contact.
+    """
+
+    terrain: Any  # Level or Relief
+    feet: tuple[Vec3, ...]  # [m] body
+    reach: float  # [m]
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    inverse_width: float  # [1/m]
+    static: float
+    dynamic: float
+    inverse_critical: float  # [s/m]
+    rate_bound: float  # [1/s]
+    mobility: float  # [1/kg] maximum acceleration of a foot by a unit force on all feet
+
+    def in_environment(self, environment: Environment) -> "GroundContactSmooth":
+        """On the ground that is there."""
+        return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
+
+    def initial_memory(self) -> tuple[tuple[()], ...]:
+        """Nothing to remember, foot by foot."""
+        return ((),) * len(self.feet)
+
+
+# A foot's memory: its anchor [m], one of these, and the square of its slip [m^2/s^2] after the last step.
+FREE, STICKING, SLIDING = 0.0, 1.0, 2.0
+NOWHERE = (0.0, 0.0, 0.0, FREE, 0.0)
+STABLE = 1.25  # [rad] of the fastest oscillation in one step
+SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
+STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
+STABLE_DAMPER = 2.75  # the same of the damper, whose rate is known to the digit
+
+
+def _reach(feet: tuple[Vec3, ...], terrain: Any = LEVEL) -> float:
+    return max(math.hypot(*foot) for foot in feet) * math.hypot(*upright(terrain))
+
+
+def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
+    inertia = airframe.mass.inertia
+    arm = max(point[0] ** 2 + point[1] ** 2 + point[2] ** 2 for point in points)
+    return 1.0 / airframe.mass.total + arm / min(inertia)
+
+
+def _rate_bound(
+    airframe: "Airframe", feet: tuple[Vec3, ...], stiffness: tuple[float, float], damping: tuple[float, float]
+) -> float:
+    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it; of a stronger
+    damper the frequency that asks for steps as short. Stiffness and damping: normal, tangential."""
+    mass = airframe.mass
+    xx, yy, zz = (sum(foot[i] ** 2 for foot in feet) for i in range(3))
+
+    def highest(normal: float, tangential: float) -> float:
+        heave = len(feet) * normal / mass.total
+        roll = (normal * yy + tangential * zz) / mass.inertia[0]
+        pitch = (normal * xx + tangential * zz) / mass.inertia[1]
+        return max(heave, roll, pitch)
+
+    return max(math.sqrt(highest(*stiffness)), highest(*damping) * STABLE / STABLE_DAMPER)

@@ -1,0 +1,97 @@
+"""Where each foot is, how fast it slips and how hard it presses; four feet side by side (lapwing/kernels/simd.py)."""
+
+import math
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.terrain import Level, over_plane, summit, touch, upright
+from lapwing.dynamics.vector import Mat3, Vec3, add, apply, apply_transposed, cross, dot, scale
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each, implements
+from lapwing.kernels.simd import beside, separate, spread, where
+
+NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is nowhere is under nothing
+
+
+class Stance(NamedTuple):
+    """What the feet have in common."""
+
+    over: float  # [m] of the centre of mass over the slope, less what stands on it
+    upright_body: Vec3  # whose product with a foot's place is its height over the slope
+    position_world: Vec3
+    velocity_world: Vec3
+    omega_world: Vec3
+    R_world_body: Mat3
+
+
+@leaf
+def stance_of(e, motion, R_world_body):
+    """Computed once for all feet."""
+    omega_world = apply(R_world_body, motion.omega_body)
+    return Stance(
+        over_plane(e.terrain, motion.position_world) - summit(e.terrain),
+        apply_transposed(R_world_body, upright(e.terrain)),
+        motion.position_world,
+        motion.velocity_world,
+        omega_world,
+        R_world_body,
+    )
+
+
+@leaf
+def in_reach(stance, feet_body):
+    """Above zero for feet that may touch: the cheap question that spares most of them the rest."""
+    return -(stance.over + dot(stance.upright_body, feet_body))
+
+
+class Footing(NamedTuple):
+    """Four feet on the ground or above it, in world coordinates; every number in four lanes."""
+
+    arm: Vec3  # [m] from the centre of mass
+    place: Vec3  # [m]
+    press: float  # [N] normal force, 0 in the air
+    slip: Vec3  # [m/s] tangential velocity, of no meaning in the air
+    normal: Vec3
+    depth: float  # [m] along the normal, not positive in the air
+    approach: float  # [m/s] at which it grows
+
+
+@leaf
+def _touch(terrain, place_world, _):
+    return touch(terrain, place_world)
+
+
+def _touch_four(terrain: Any, places_world: Vec3) -> tuple[float, Vec3]:
+    """`touch` of four places side by side."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_touch_four, inline=True)
+def _touch_four_on(terrain, places_world):
+    if terrain.instance_class is Level:
+
+        def level(terrain, places_world):
+            depth, normal = touch(terrain, places_world)
+            return depth, (spread(normal[0]), spread(normal[1]), spread(normal[2]))
+
+        return level
+
+    def one_by_one(terrain, places_world):
+        places = separate(places_world)
+        return beside(each(_touch, terrain, places, places))
+
+    return one_by_one
+
+
+@leaf
+def footing(e, stance, feet_body):
+    """The footing of four feet (theory.md, eq. (2.12))."""
+    arm = apply(stance.R_world_body, feet_body)
+    place = add(stance.position_world, arm)
+    depth, normal = _touch_four(e.terrain, place)
+    velocity = add(stance.velocity_world, cross(stance.omega_world, arm))
+    approach = -dot(velocity, normal)
+    onset = depth * e.inverse_width
+    onset = where(1.0 - onset, onset, 1.0)
+    press = onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach)
+    press = where(depth, where(press, press, 0.0), 0.0)
+    return Footing(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)

@@ -1,0 +1,49 @@
+"""From a scene's table to an effect's parameters."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+
+from lapwing.dynamics.config_error import KeyedError
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from pydantic import TypeAdapter
+
+T = TypeVar("T")
+
+
+@cache
+def _adapter(cls: type) -> "TypeAdapter":
+    from pydantic import ConfigDict, TypeAdapter
+
+    return TypeAdapter(cls, config=ConfigDict(strict=True, allow_inf_nan=False))
+
+
+def checked(cls: type[T], table: Mapping[str, Any]) -> T:
+    """The NamedTuple `cls` with the keys of a table.
+
+    Raises:
+        KeyedError: a key is missing, unknown, of the wrong type or out of range.
+    """
+    from pydantic import ValidationError
+
+    from lapwing.dynamics.validation import fault
+
+    try:
+        return _adapter(cls).validate_python(_tuples(table))  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise fault(error, cls) from None
+
+
+def _tuples(value: Any) -> Any:
+    """TOML's lists as tuples."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_tuples(item) for item in value)
+    return value
+
+
+def cannot(reason: str) -> NoReturn:
+    """Refuse an effect that the vehicle cannot have."""
+    raise KeyedError("", reason)

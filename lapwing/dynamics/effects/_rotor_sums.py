@@ -1,0 +1,47 @@
+"""Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
+
+from lapwing.dynamics.effects._types import PerRotor
+from lapwing.dynamics.vector import Vec3, add
+from lapwing.kernels.codegen import define, implements
+
+
+def total(a: PerRotor) -> float:
+    """Sum of a tuple, added in pairs: a shorter chain of dependent additions."""
+    return sum(a)
+
+
+@implements(total, inline=True)
+def _total(a):
+    def pairs(terms):
+        half = len(terms) // 2
+        return terms[0] if len(terms) == 1 else f"({pairs(terms[:half])} + {pairs(terms[half:])})"
+
+    return define("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
+
+
+def total_vector(a: tuple[Vec3, ...]) -> Vec3:
+    """Sum of a tuple of vectors."""
+    found = a[0]
+    for more in a[1:]:
+        found = add(found, more)
+    return found
+
+
+@implements(total_vector, inline=True)
+def _total_vector(a):
+    lines = [f"found = add(found, a[{i}])" for i in range(1, len(a))]
+    return define("total_vector(a)", {"add": add}, "found = a[0]", *lines, "return found")
+
+
+def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
+    """Sum of a tuple of (force [N], torque [N m])."""
+    force, torque = a[0]
+    for more_force, more_torque in a[1:]:
+        force, torque = add(force, more_force), add(torque, more_torque)
+    return force, torque
+
+
+@implements(total_wrench, inline=True)
+def _total_wrench(a):
+    lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
+    return define("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")

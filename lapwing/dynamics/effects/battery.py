@@ -1,0 +1,87 @@
+"""A battery that empties and sags under load."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import gauge, sample, supply
+from lapwing.dynamics.effects._rotor_sums import total
+from lapwing.kernels import leaf, uncompiled
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+KIND = "battery model"
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
+    cut_off: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop for good
+
+
+class Battery(NamedTuple):
+    """Lithium-polymer cells in series: open-circuit voltage by charge, less a resistance (theory.md, eq. (2.10)).
+
+    The motors get the voltage they ask for as long as the battery has it. Charge and voltage are brought up to date
+    once an exchange interval. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
+    curve; one ohmic resistance, the transient ones left out. Valid at room temperature, charge above a few per cent.
+    """
+
+    cells: float
+    capacity: float  # [A s]
+    resistance: float  # [ohm] of all cells
+    charge: float  # at the start
+    cut_off: float  # [V] of all cells
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
+        """From the airframe's battery."""
+        given = checked(Settings, table)
+        pack = airframe.battery or cannot("the vehicle has no [battery]")
+        resistance = pack.cells * pack.cell_resistance
+        return cls(float(pack.cells), pack.capacity, resistance, given.charge, pack.cells * given.cut_off)
+
+    def initial_memory(self) -> tuple[float, float, float]:
+        """(charge, voltage [V] under load, current [A])."""
+        return (self.charge, self.cells * uncompiled(open_circuit_voltage)(self.charge), 0.0)
+
+
+@leaf
+def open_circuit_voltage(charge):
+    """[V] of one cell at a charge between 0 and 1."""
+    return -1.031 * math.exp(-35.0 * charge) + 3.685 + charge * (0.2156 + charge * (-0.1178 + charge * 0.3201))
+
+
+@leaf
+def at_most(limit, voltage, _):
+    """A voltage, or the limit where that is lower."""
+    return min(voltage, limit)
+
+
+@sample(Battery)
+def discharge(e, memory, s, rotors, key, tick, interval):
+    """Memory after drawing the motors' power for an interval."""
+    charge, voltage, _ = memory
+    if voltage == 0.0:
+        return (charge, 0.0, 0.0)
+    current = total(rotors.power) / voltage
+    charge = max(charge - current * interval / e.capacity, 0.0)
+    voltage = e.cells * open_circuit_voltage(charge) - e.resistance * current
+    return (charge, voltage if voltage > e.cut_off else 0.0, current)
+
+
+@supply(Battery)
+def battery(e, memory, voltage):
+    """Voltage [V] that each motor gets."""
+    return each(at_most, memory[1], voltage, voltage)
+
+
+@gauge(Battery)
+def read(e, memory):
+    """What a battery monitor shows: charge, voltage [V] under load, current [A]; no temperature."""
+    return memory[0], memory[1], memory[2], math.nan

@@ -1,0 +1,126 @@
+"""A battery that also recovers slowly after a load, warms up, and is switched on again once it has recovered."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.atmosphere import temperature as air_temperature
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import gauge, sample, supply
+from lapwing.dynamics.effects._rotor_sums import total
+from lapwing.dynamics.effects.battery import KIND, at_most, open_circuit_voltage
+from lapwing.dynamics.environment import Environment
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+__all__ = ["KIND", "BatteryThevenin", "Settings"]
+
+REFERENCE = 298.15  # [K] at which resistances are stated
+NOMINAL_VOLTAGE = 3.7  # [V] of a cell
+HEAT_PER_ENERGY = 1000.0 / (150.0 * 3600.0)  # [1/K] 1000 J/(kg K) over 150 W h/kg
+
+Resistance = Annotated[float, Ge(0), Le(1)]
+Time = Annotated[float, Ge(0.1), Le(1e4)]
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
+    cut_off: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop
+    restart: Annotated[float, Ge(2.5), Le(4.2)] | None = None  # [V] above which they start again; never if left out
+    transient_resistance: tuple[Resistance, Resistance] | None = None  # [ohm] of a cell; by its ohmic one if left out
+    transient_time: tuple[Time, Time] = (32.9, 223.0)  # [s] of the two
+    temperature: Annotated[float, Ge(233.15), Le(333.15)] | None = None  # [K] at the start; the air's if left out
+    activation: Annotated[float, Ge(0), Le(1e4)] = 2400.0  # [K] resistances go with exp(activation / temperature)
+    heat_capacity: Annotated[float, Gt(0), Le(1e6)] | None = None  # [J/K] of the pack; by its energy if left out
+    cooling_time: Annotated[float, Ge(1), Le(1e6)] = 1800.0  # [s] in which it comes near the air's temperature
+
+
+class BatteryThevenin(NamedTuple):
+    """Open-circuit voltage by charge, less an ohmic resistance and two with a capacitor beside (theory.md, eq. (2.34)).
+
+    Resistances fall as the pack warms by its own losses. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
+    (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one lump of heat.
+    The activation temperature, 20 kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to
+    60 degC. Brought up to date once an exchange interval, exactly for a constant current.
+    """
+
+    cells: float
+    capacity: float  # [A s]
+    resistance: float  # [ohm] ohmic, of all cells, at REFERENCE
+    fast: float  # [ohm] of the first transient, of all cells
+    slow: float  # [ohm] of the second
+    fast_time: float  # [s]
+    slow_time: float  # [s]
+    charge: float  # at the start
+    cut_off: float  # [V] of all cells
+    restart: float  # [V] of all cells, inf: never
+    activation: float  # [K]
+    heat_capacity: float  # [J/K]
+    cooling_time: float  # [s]
+    temperature: float = REFERENCE  # [K] at the start
+    air_temperature: float = REFERENCE  # [K]
+    given_temperature: bool = False  # whether the scene says that at the start
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
+        """From the airframe's battery."""
+        given = checked(Settings, table)
+        pack = airframe.battery or cannot("the vehicle has no [battery]")
+        if given.restart is not None and given.restart <= given.cut_off:
+            raise KeyedError("restart", f"got {given.restart:g} V", f"more than cut_off = {given.cut_off:g} V")
+        n, ohmic = pack.cells, pack.cell_resistance
+        fast, slow = given.transient_resistance or (0.627 * ohmic, 0.669 * ohmic)
+        heat = given.heat_capacity or n * NOMINAL_VOLTAGE * pack.capacity * HEAT_PER_ENERGY
+        restart = math.inf if given.restart is None else n * given.restart
+        return cls(
+            float(n), pack.capacity, n * ohmic, n * fast, n * slow, *given.transient_time, given.charge,
+            n * given.cut_off, restart, given.activation, heat, given.cooling_time,
+            given.temperature or REFERENCE, given_temperature=given.temperature is not None,
+        )  # fmt: skip
+
+    def in_environment(self, environment: Environment) -> "BatteryThevenin":
+        """In the air at home."""
+        air = float(air_temperature(environment.atmosphere, environment.home.height))
+        return self._replace(air_temperature=air, temperature=self.temperature if self.given_temperature else air)
+
+    def initial_memory(self) -> tuple[float, float, float, float, float, float, float]:
+        """(charge, voltage [V], current [A], temperature [K], voltage over each transient [V], 1 while switched on)."""
+        return (self.charge, self.cells * open_circuit_voltage(self.charge), 0.0, self.temperature, 0.0, 0.0, 1.0)
+
+
+@sample(BatteryThevenin)
+def discharge(e, memory, s, rotors, key, tick, interval):
+    """Memory after drawing the motors' power for an interval."""
+    charge, voltage, _, temperature, fast, slow, on = memory
+    current = total(rotors.power) / voltage if on > 0.0 else 0.0
+    warmth = math.exp(e.activation * (1.0 / temperature - 1.0 / REFERENCE))
+    ohmic = warmth * e.resistance * current
+    fast_kept, slow_kept = math.exp(-interval / e.fast_time), math.exp(-interval / e.slow_time)
+    fast = fast_kept * fast + (1.0 - fast_kept) * warmth * e.fast * current
+    slow = slow_kept * slow + (1.0 - slow_kept) * warmth * e.slow * current
+    cooled = math.exp(-interval / e.cooling_time)
+    # the transients' heat is taken for that of the current through them: in the mean of a load it is
+    settled = e.air_temperature + (ohmic + fast + slow) * current * e.cooling_time / e.heat_capacity
+    temperature = settled + cooled * (temperature - settled)
+    charge = max(charge - current * interval / e.capacity, 0.0)
+    voltage = e.cells * open_circuit_voltage(charge) - ohmic - fast - slow
+    on = 1.0 if voltage > (e.cut_off if on > 0.0 else e.restart) else 0.0
+    return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)
+
+
+@supply(BatteryThevenin)
+def battery_thevenin(e, memory, voltage):
+    """Voltage [V] that each motor gets."""
+    return each(at_most, memory[1] * memory[6], voltage, voltage)
+
+
+@gauge(BatteryThevenin)
+def read(e, memory):
+    """What a battery monitor shows: charge, voltage [V] at its terminals, current [A], temperature [K]."""
+    return memory[0], memory[1], memory[2], memory[3]

@@ -1,0 +1,82 @@
+"""A load that vehicles of a fleet carry together, each by a cable."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le, Lt
+
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import wrench
+from lapwing.dynamics.effects._vehicle_interaction import interact
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import LEVEL
+from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
+from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Offset = Annotated[float, Ge(-100), Le(100)]
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    mass: Annotated[float, Gt(0), Le(1e4)]  # [kg] of the load, no part of any vehicle's; the same for all
+    length: Annotated[float, Gt(0), Le(1e3)]  # [m] of the vehicle's cable without tension
+    stiffness: Annotated[float, Gt(0), Le(1e7)] = 2000.0  # [N/m] of the cable
+    damping_ratio: Annotated[float, Ge(0), Lt(2)] = 0.1  # ratio, of the load on the taut cable
+    hook: tuple[Offset, Offset, Offset] = (0.0, 0.0, 0.0)  # [m] body, where it is fastened
+    drag_area: Annotated[float, Ge(0), Le(1e3)] = 0.0  # [m^2] of the load, its coefficient times area; also the same
+
+
+class CarriedLoad(NamedTuple):
+    """The pull of the cable to the one load of all vehicles that name it (theory.md, eq. (1.20), (1.23)).
+
+    Source: Newton's laws, Hooke's and a damper for a cable that can pull and not push. The load moves beside the
+    vehicles, and each looks ahead from where the other was at the beginning of the exchange interval, at its
+    acceleration then. Valid while the frequency of the cable times the exchange interval is below 0.5.
+    """
+
+    sling: Sling
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "CarriedLoad":
+        """With the damping for the airframe's mass."""
+        given = checked(Settings, table)
+        reduced = 1.0 / (1.0 / given.mass + 1.0 / airframe.mass.total)
+        damping = 2.0 * given.damping_ratio * (given.stiffness * reduced) ** 0.5
+        hook = subtract(given.hook, airframe.mass.centre)
+        return cls(Sling(given.mass, given.length, given.stiffness, damping, hook, given.drag_area, LEVEL))
+
+    def in_environment(self, environment: Environment) -> "CarriedLoad":
+        """Over the ground that is there."""
+        return CarriedLoad(self.sling._replace(terrain=environment.terrain))
+
+    def initial_memory(self) -> tuple[Vec3, Vec3, Vec3, float]:
+        """Position, velocity and acceleration of the load at a time [s]; before 0 nothing is known of it."""
+        return ZERO, ZERO, ZERO, -1.0
+
+    def presence(self) -> dict[str, Vec3]:
+        """Where its cable is fastened."""
+        return {"hook_body": self.sling.hook_body}
+
+
+@interact(CarriedLoad)
+def fastened(e, memory, own, others, interval):
+    """Where the load is and how it moves, at the beginning of the coming interval."""
+    for other in others:
+        if other.is_load:
+            return other.hook_world, other.hook_velocity, other.hook_acceleration, other.time
+    return memory
+
+
+@wrench(CarriedLoad)
+def carried_load(e, memory, s, rotors):
+    """Force [N] of the cable in world coordinates and its torque [N m] in the body."""
+    place, velocity, acceleration, time = memory
+    if time < 0.0:
+        return (0.0, 0.0, 0.0), NOTHING
+    ahead = s.t - time
+    place = add(place, scale(ahead, add(velocity, scale(0.5 * ahead, acceleration))))
+    velocity = add(velocity, scale(ahead, acceleration))
+    return cable(e.sling, s.R_world_body, SlungMotion(s.motion, place, velocity))

@@ -1,0 +1,185 @@
+"""Rotors that stand in the wake of another one above them."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.effects._axes import hub_speeds
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
+from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vehicles import inflow
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.kernels import leaf, uncompiled
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+CONTRACTED = math.sqrt(0.5)  # radius of the wake over that of the disc
+ASIDE = 1.0 - CONTRACTED  # radii that discs may be apart across their axis for the whole wake to meet the lower one
+FARTHEST = 2.0  # radii between discs that count as coaxial
+PARALLEL = 0.99  # least cosine between their axes
+NOT_BESIDE = ("rotor_quadratic", "rotor_table", "induced_velocity")
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] and [rotors] say it all."""
+
+
+class CoaxialWash(NamedTuple):
+    """What the wake of the upper rotor takes from the static loads of the lower one (theory.md, eq. (2.43), (2.44)).
+
+    Momentum theory of a lower rotor whose inner half meets twice the upper's induced velocity, for blades of one pitch.
+    Source: Leishman, Principles of Helicopter Aerodynamics, on coaxial rotors, the wake contracted at the lower disc.
+    Valid near hover; the wake of a vehicle that moves is carried away. The upper rotor is taken for one alone.
+    """
+
+    thrust_constant: float  # [m^4/rad^2]
+    pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed
+    flow: float  # [m/rad] induced velocity in hover over the rotor's speed
+    radius: float  # [m]
+    above: tuple[PerRotor, ...]  # for each rotor: 1 for the one whose wake it stands in, 0 for the others
+    distance: PerRotor  # [m] of that one along the axis
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialWash":
+        """For every rotor with another one above it."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        uppers = _uppers(airframe, radius)
+        if all(number < 0 for number, _ in uppers):
+            most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
+            cannot(f"no rotor stands under another one (by at most {most})")
+        static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
+        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
+        if flow >= pitch:
+            cannot(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        above = tuple(tuple(float(number == j) for j in range(len(uppers))) for number, _ in uppers)
+        return cls(static, pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers))
+
+    def changes(self, speed: float, axial: float = 0.0, across: float = 0.0) -> list[tuple[float, float]]:
+        """(thrust [N], torque [N m]) that each rotor gains at a density of 1, all at one speed in the same air.
+
+        Args:
+            speed: of the rotors [rad/s].
+            axial: speed of the hubs through the air along their axes [m/s].
+            across: the same across them.
+        """
+        change, wash = uncompiled(_change), self.flow * speed
+        washes = [wash * any(above) for above in self.above]
+        return [
+            change(self, (speed, w), ((axial, across), distance))
+            for w, distance in zip(washes, self.distance, strict=True)
+        ]
+
+    def slopes(self) -> WakeSlopes:
+        """Of thrusts and torques, all rotors at one speed at rest in the air (theory.md, eq. (2.45))."""
+        q, count = self.pitch, len(self.above)
+        t = uncompiled(inflow.thrust_in_wake)(q, 1.0)
+        through = q - (q - 1.0) * t
+        steep = through * (through - 2.0 * (q - 1.0) * t) - (q - 1.0) - 2.0 * (t + 1.0)
+        slope = (4.0 * (t + 1.0) - 3.0 * through) / steep  # of t over the speed of the wake
+        power, more = t * through - 1.0, slope * (through - (q - 1.0) * t)
+        thrust, torque = np.eye(count), np.zeros((count, count))
+        for lower, above in enumerate(self.above):
+            if any(above):
+                upper = above.index(1.0)
+                thrust[lower, lower], thrust[lower, upper] = t - 0.5 * slope, 0.5 * slope
+                torque[lower, lower], torque[lower, upper] = self.flow * (power - 0.5 * more), 0.5 * self.flow * more
+        return WakeSlopes(tuple(map(tuple, thrust.tolist())), tuple(map(tuple, torque.tolist())))
+
+
+def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
+    """It changes the loads of `rotor_thrust`."""
+    if "rotor_thrust" not in tables:
+        cannot("goes with effects.rotor_thrust, which the scene does not name")
+    for name in NOT_BESIDE:
+        if name in tables:
+            cannot(f"is not made to stand beside effects.{name}: keep one of them")
+
+
+def stacked(airframe: "Airframe") -> bool:
+    """Whether a rotor stands in the wake of another one."""
+    propeller = airframe.propeller
+    return propeller is not None and any(number >= 0 for number, _ in _uppers(airframe, 0.5 * propeller.diameter))
+
+
+def _uppers(airframe: "Airframe", radius: float) -> list[tuple[int, float]]:
+    return [_upper(airframe, k, radius) for k in range(len(airframe.rotors.position))]
+
+
+def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
+    """(number from 0, distance [m]) of the nearest rotor in whose wake rotor k stands; (-1, 0) without one."""
+    places = np.array(airframe.rotors.position)
+    axes = np.array(airframe.rotors.tilted_axis or [(0.0, 0.0, 1.0)] * len(places))
+    found = []
+    for j, arm in enumerate(places - places[k]):
+        height = float(arm @ axes[k])
+        aside = float(np.linalg.norm(arm - height * axes[k]))
+        if 0.0 < height <= FARTHEST * radius and aside <= ASIDE * radius and axes[j] @ axes[k] >= PARALLEL:
+            found.append((height, j))
+    distance, number = min(found, default=(0.0, -1))
+    return number, distance
+
+
+@leaf
+def _square(_, speed, factor):
+    return factor * speed * speed
+
+
+@leaf
+def _flow(c, above, _):
+    """[m/s] induced velocity of the rotor above."""
+    flow, squares = c
+    square = 0.0
+    for j in range(len(above)):
+        square += above[j] * squares[j]
+    return flow * math.sqrt(square)
+
+
+@leaf
+def _change(e, both, place):
+    """(change of thrust [N], change of torque [N m]) at a density of 1."""
+    speed, wash = both
+    (axial, across), distance = place
+    along = axial + wash  # [m/s] at which the wake comes down
+    if wash <= 0.0 or along <= 0.0 or speed <= 0.0:
+        return 0.0, 0.0
+    drift = distance * across / (along * e.radius)  # [radii] by which it is carried aside on its way
+    share = min(max((1.0 + CONTRACTED - drift) / (2.0 * CONTRACTED), 0.0), 1.0)
+    thrust = inflow.thrust_in_wake(e.pitch, share * wash / (e.flow * speed))
+    through = e.pitch - thrust * (e.pitch - 1.0)
+    static = e.thrust_constant * speed * speed
+    return static * (thrust - 1.0), static * e.flow * (thrust * through - 1.0)
+
+
+@leaf
+def _more(density, before, both):
+    factor, change = both
+    return before + density * factor * change
+
+
+@leaf
+def _first(_, change, factor):
+    return factor, change[0]
+
+
+@leaf
+def _second(_, change, factor):
+    return factor, change[1]
+
+
+@loads(CoaxialWash)
+def coaxial_wash(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`."""
+    speed = s.motion.rotor_speed
+    squares = each(_square, 0.0, speed, factors.thrust)
+    wash = each(_flow, (e.flow, squares), e.above, e.above)
+    change = each(_change, e, each(pair, 0.0, speed, wash), each(pair, 0.0, hub_speeds(s), e.distance))
+    thrust, torque = each(_first, 0.0, change, factors.thrust), each(_second, 0.0, change, factors.torque)
+    return Loads(each(_more, s.air.density, before.thrust, thrust), each(_more, s.air.density, before.torque, torque))

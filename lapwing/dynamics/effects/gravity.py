@@ -1,0 +1,54 @@
+"""Constant gravity."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import field, wrench
+from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
+from lapwing.dynamics.vector import NOTHING
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+KIND = "gravity"
+
+
+class Settings(NamedTuple):
+    """No keys: [environment] has gravity."""
+
+
+class Gravity(NamedTuple):
+    """Weight m g down (theory.md, eq. (2.1)).
+
+    Source: the scene's gravity at sea level, wherever the vehicle is. Valid to 0.03 % within 1 km of the sea level;
+    `gravity_altitude` beyond that.
+    """
+
+    acceleration: float = STANDARD_GRAVITY  # [m/s^2]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Gravity":
+        """The standard acceleration."""
+        checked(Settings, table)
+        return cls()
+
+    def in_environment(self, environment: Environment) -> "Gravity":
+        """That of the place."""
+        return Gravity(environment.gravity)
+
+    @property
+    def acceleration_at_home(self) -> float:
+        """[m/s^2] at the world frame's origin."""
+        return self.acceleration
+
+
+@field(Gravity)
+def gravity_field(e, memory):
+    """Acceleration [m/s^2] in world."""
+    return (-0.0, -0.0, -e.acceleration)
+
+
+@wrench(Gravity)
+def gravity(e, memory, s, rotors):
+    """Force [N] in world, torque [N m] in body coordinates."""
+    return (-0.0, -0.0, -e.acceleration * s.body.mass), NOTHING

@@ -1,0 +1,73 @@
+"""Gravity that weakens with altitude."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.atmosphere import EARTH_RADIUS
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import field, sample, wrench
+from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
+from lapwing.dynamics.vector import NOTHING
+from lapwing.kernels import leaf
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+KIND = "gravity"
+
+
+class Settings(NamedTuple):
+    """No keys: [environment] has gravity, and home's altitude."""
+
+
+class GravityAltitude(NamedTuple):
+    """Weight m g (R / (R + h))^2 down (theory.md, eq. (2.2)).
+
+    Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; brought up to date once an exchange
+    interval. Valid wherever there is air.
+    """
+
+    acceleration: float = STANDARD_GRAVITY  # [m/s^2] at sea level
+    home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GravityAltitude":
+        """The standard acceleration at sea level."""
+        checked(Settings, table)
+        return cls()
+
+    def in_environment(self, environment: Environment) -> "GravityAltitude":
+        """That of the place."""
+        return GravityAltitude(environment.gravity, environment.home.height)
+
+    @property
+    def acceleration_at_home(self) -> float:
+        """[m/s^2] at the world frame's origin."""
+        return _at(self, 0.0)
+
+    def initial_memory(self) -> tuple[float]:
+        """Acceleration at home [m/s^2]."""
+        return (self.acceleration_at_home,)
+
+
+@leaf
+def _at(e, height):
+    ratio = EARTH_RADIUS / (EARTH_RADIUS + e.home_altitude + height)
+    return e.acceleration * ratio * ratio
+
+
+@sample(GravityAltitude)
+def weigh(e, memory, s, rotors, key, tick, interval):
+    """The acceleration [m/s^2] for the next interval: it changes by 3e-7 of itself a metre."""
+    return (_at(e, s.motion.position_world[2]),)
+
+
+@field(GravityAltitude)
+def gravity_altitude_field(e, memory):
+    """Acceleration [m/s^2] in world."""
+    return (-0.0, -0.0, -memory[0])
+
+
+@wrench(GravityAltitude)
+def gravity_altitude(e, memory, s, rotors):
+    """Force [N] in world, torque [N m] in body coordinates."""
+    return (-0.0, -0.0, -memory[0] * s.body.mass), NOTHING

@@ -1,0 +1,84 @@
+"""More thrust close to the ground."""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import asleep, factors
+from lapwing.dynamics.effects._types import Factors
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the factor is kept
+FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.4 %, is faded out
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class GroundEffect(NamedTuple):
+    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z over the ground under it (theory.md, eq. (2.25)).
+
+    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), hovering, each rotor by itself. Valid for
+    heights above half a radius, over ground that is flat for some radii around.
+    """
+
+    inverse_radius: float  # [1/m]
+    highest: float  # [m] of the centre of mass over the slope, above which no rotor feels the ground
+    terrain: Any = LEVEL  # Level or Relief
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        radius = 0.5 * propeller.diameter
+        reach = max(math.hypot(*position) for position in airframe.rotors.position)
+        return cls(1.0 / radius, FADE_TO * radius + reach)
+
+    def in_environment(self, environment: Environment) -> "GroundEffect":
+        """Over the ground that is there."""
+        stretch = math.hypot(*upright(environment.terrain))
+        return self._replace(highest=self.highest * stretch, terrain=environment.terrain)
+
+
+@leaf
+def gain(height):
+    """Thrust over that far from the ground, at a height in radii."""
+    z = max(height, LOWEST)
+    square = 0.0625 / (z * z)
+    fade = min(max((z - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)
+    return 1.0 + square / (1.0 - square) * (1.0 - fade * fade * (3.0 - 2.0 * fade))
+
+
+@leaf
+def _height(c, x, y):
+    e, s = c
+    R, (px, py, pz) = s.R_world_body, s.motion.position_world
+    ground, _ = surface(e.terrain, px + R[0] * x + R[1] * y, py + R[3] * x + R[4] * y)
+    return e.inverse_radius * (pz + R[6] * x + R[7] * y - ground)
+
+
+@leaf
+def _gained(_, factor, height):
+    return factor * gain(height)
+
+
+@factors(GroundEffect)
+def ground_effect(e, memory, s, before):
+    """Factors on thrust; the torque stays."""
+    heights = each(_height, (e, s), s.layout.x_body, s.layout.y_body)
+    return Factors(each(_gained, 0.0, before.thrust, heights), before.torque)
+
+
+@asleep(GroundEffect)
+def high(e, memory, motion, h):
+    """Too high for any rotor to feel the ground within a step?"""
+    over, climb = over_plane(e.terrain, motion.position_world), over_plane(e.terrain, motion.velocity_world)
+    return over - summit(e.terrain) + 2.0 * h * min(climb, 0.0) > e.highest

@@ -1,0 +1,75 @@
+"""Gyroscopic torque of the spinning rotors on the turning body."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.effects._axes import by_axis
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import torque
+from lapwing.dynamics.effects._rotor_sums import total, total_vector
+from lapwing.dynamics.vector import cross, scale, subtract
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [rotors] says it all."""
+
+
+class GyroscopicTorque(NamedTuple):
+    """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
+
+    Source: Euler's equations of a body with rotors that spin about axes fixed in it; the propeller's inertia is
+    averaged over a turn. Valid while the rotors turn many times faster than the body.
+    """
+
+    inertia: float  # [kg m^2] of one rotor about its axis
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "GyroscopicTorque":
+        """From the airframe's rotors."""
+        checked(Settings, table)
+        return cls(airframe.rotors.inertia)
+
+
+@leaf
+def _signed(_, sign, value):
+    return sign * value
+
+
+@leaf
+def _along_z(given):
+    e, s, rotors = given
+    sign, omega = s.layout.reaction_sign, s.motion.omega_body
+    # a rotor that pushes the body to +z turns about -z itself
+    momentum = -e.inertia * total(each(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
+    spin_up = e.inertia * total(each(_signed, 0.0, sign, rotors.acceleration))
+    return (-omega[1] * momentum, omega[0] * momentum, spin_up)
+
+
+@leaf
+def _scaled(_, value, axis):
+    return scale(value, axis)
+
+
+@leaf
+def _sum_along(axis, sign, values):
+    """Sum of a value of each rotor along its axis, with the sign of its reaction."""
+    return total_vector(each(_scaled, 0.0, each(_signed, 0.0, sign, values), axis))
+
+
+@leaf
+def _tilted(given):
+    e, s, rotors = given
+    sign, axis = s.layout.reaction_sign, s.layout.axis
+    momentum = scale(-e.inertia, _sum_along(axis, sign, s.motion.rotor_speed))
+    spin_up = scale(e.inertia, _sum_along(axis, sign, rotors.acceleration))
+    return subtract(spin_up, cross(s.motion.omega_body, momentum))
+
+
+@torque(GyroscopicTorque)
+def gyroscopic_torque(e, memory, s, rotors):
+    """Torque [N m] in body coordinates."""
+    return by_axis(_along_z, _tilted, s.layout.axis, (e, s, rotors))

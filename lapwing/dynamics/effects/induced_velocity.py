@@ -1,0 +1,126 @@
+"""Thrust and torque of rotors whose own flow grows and fades: climb, descent, and translational lift."""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.effects._axes import hub_speeds
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import loads, sample
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.effects.rotor_inflow import KIND
+from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vehicles import inflow
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+__all__ = ["KIND", "InducedVelocity", "Settings"]
+
+APPARENT_MASS = 0.637  # of the sphere of air around the disc
+SLOWEST = 1e-3  # [m/s] least induced velocity that others are compared with
+LARGEST_SHARE = 0.9  # of the pitch speed that the induced velocity in hover may be
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class InducedVelocity(NamedTuple):
+    """What the flow through a rotor changes of the static loads of `rotor_thrust` (theory.md, eq. (2.35), (2.36)).
+
+    The blades meet the air of the rotor's own speed along its axis and of the flow that it induces: momentum theory in
+    climb and forward flight (Glauert), its fit to measurements in descent. Source: Leishman, Principles of Helicopter
+    Aerodynamics, section 2.13; the time that the flow takes to follow: Carpenter and Fridovich, NACA TN 3044 (1953).
+    Valid for blades that do not stall; brought up to date once an exchange interval. In the vortex ring state the mean
+    of a flow that is rough.
+    """
+
+    slope: float  # [m^3/rad] -dT / (density speed dV)
+    static: float  # [m^4/rad^2] thrust constant
+    pitch: float  # [m/rad] of the blades
+    hover: float  # [m/rad] induced velocity in hover over the rotor's speed
+    area: float  # [m^2] of the disc
+    mass: float  # [m^3] apparent mass over the density
+    at_rest: tuple[float, ...]  # [m/s] a zero for each rotor
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "InducedVelocity":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
+        area = math.pi * radius * radius
+        hover = math.sqrt(0.5 * static / area)
+        if hover > LARGEST_SHARE * pitch:
+            least = 2.0 * math.pi * hover / LARGEST_SHARE
+            cannot(
+                f"the propeller's pitch must be at least {least:.3g} m for its static thrust: got {propeller.pitch:g} m"
+            )
+        mass = APPARENT_MASS * 4.0 / 3.0 * math.pi * radius**3
+        return cls(static / (pitch - hover), static, pitch, hover, area, mass, (0.0,) * len(airframe.rotors.position))
+
+    def initial_memory(self) -> tuple[float, ...]:
+        """Induced velocity of each rotor [m/s]."""
+        return self.at_rest
+
+
+@leaf
+def _through(e, axial, speed, induced):
+    """[m/s] air through the disc, held to where blades neither stall nor brake hard."""
+    blades = e.pitch * speed
+    return min(max(axial + induced, -0.5 * blades), 1.5 * blades)
+
+
+@kernel
+def _followed(c, induced, both):
+    """Induced velocity an interval later: towards what momentum theory has for the thrust at present."""
+    e, interval = c
+    speed, (axial, across) = both
+    square = 0.5 * e.slope / e.area * speed * (e.pitch * speed - _through(e, axial, speed, induced))
+    hover = max(math.sqrt(max(square, 0.0)), SLOWEST)
+    steady = hover * inflow.induced_velocity(axial / hover, across / hover)
+    gain = 1.0 + 0.25 * e.slope * speed / (e.area * hover)  # the thrust falls as the flow grows
+    rate = 4.0 * e.area * hover / e.mass * gain
+    return induced + (1.0 - math.exp(-rate * interval)) / gain * (steady - induced)
+
+
+@sample(InducedVelocity)
+def follow(e, memory, s, rotors, key, tick, interval):
+    """Induced velocity of each rotor for the next interval [m/s]."""
+    return each(_followed, (e, interval), memory, each(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
+
+
+@leaf
+def _change(e, both, hub):
+    """(change of thrust [N], change of torque [N m]) at a density of 1."""
+    speed, induced = both
+    through = _through(e, hub[0], speed, induced)
+    thrust = e.slope * (e.pitch * speed - through)  # over the speed
+    torque = thrust * through - e.static * e.hover * speed * speed
+    return speed * e.slope * (e.hover * speed - through), torque
+
+
+@leaf
+def _more_thrust(density, before, both):
+    factor, change = both
+    return before + density * factor * change[0]
+
+
+@leaf
+def _more_torque(density, before, both):
+    factor, change = both
+    return before + density * factor * change[1]
+
+
+@loads(InducedVelocity)
+def induced_velocity(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`."""
+    change = each(_change, e, each(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
+    return Loads(
+        each(_more_thrust, s.air.density, before.thrust, each(pair, 0.0, factors.thrust, change)),
+        each(_more_torque, s.air.density, before.torque, each(pair, 0.0, factors.torque, change)),
+    )

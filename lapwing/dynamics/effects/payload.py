@@ -1,0 +1,89 @@
+"""A payload that is let go."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import body, sample
+from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Length = Annotated[float, Gt(0), Le(10)]
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
+    mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
+    size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m] of the box along body x, y, z
+
+
+class Payload(NamedTuple):
+    """A uniform box; once it is released the vehicle has neither its mass nor its inertia.
+
+    It is where the airframe's [payload] says, and the centre of mass moves when it goes (theory.md, eqs. (2.41) and
+    (2.42)); without that table at the centre of mass, which stays (theory.md, eq. (2.26)). Source: the payload of
+    Pappalardo et al. 2023, Table 2, size chosen; Steiner's theorem. Valid for a payload released at rest relative to
+    the vehicle.
+    """
+
+    release_time: float  # [s]
+    loaded: AnyMassProperties
+    empty: AnyMassProperties
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Payload":
+        """Mass properties with and without the box."""
+        given = checked(Settings, table)
+        release = float("inf") if given.release_time is None else given.release_time
+        if airframe.payload:
+            if twice := {"mass", "size"} & set(table):
+                raise KeyedError(min(twice), "stands beside the table airframe.payload", "one of them")
+            return cls(release, *_with_and_without(airframe))
+        mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
+        if mass >= total:
+            raise KeyedError("mass", f"got {mass}", f"less than the vehicle's {total} kg")
+        x, y, z = given.size
+        box = (mass * (y * y + z * z) / 12.0, mass * (z * z + x * x) / 12.0, mass * (x * x + y * y) / 12.0)
+        inertia, products = airframe.mass.inertia, airframe.mass.products
+        rest = (inertia[0] - box[0], inertia[1] - box[1], inertia[2] - box[2])
+        moments = principal_moments(rest, products)
+        if moments[0] <= 0.0 or moments[2] > moments[0] + moments[1]:
+            cannot("takes more inertia than the vehicle has: make its mass or size smaller")
+        return cls(release, body_of(total, inertia, products), body_of(total - mass, rest, products))
+
+    def initial_memory(self) -> tuple[float]:
+        """1 once released."""
+        return (0.0,)
+
+
+def _with_and_without(airframe: "Airframe") -> tuple[AnyMassProperties, AnyMassProperties]:
+    """The loaded vehicle, whose positions are from its centre of mass, and the vehicle once its box is gone."""
+    joint, box = airframe.mass, airframe.payload
+    assert box is not None
+    rest, place = joint.total - box.mass, np.array(box.position)
+    centre = -box.mass / rest * place
+    inertia = joint.matrix - box.inertia - steiner(box.mass, place) - steiner(rest, centre)
+    return offset_body(joint.total, joint.matrix, np.zeros(3)), offset_body(rest, inertia, centre)
+
+
+RELEASED = (1.0,)
+"""Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
+
+
+@sample(Payload)
+def release(e, memory, s, rotors, key, tick, interval):
+    """Let go when the time has come."""
+    return (1.0,) if s.t >= e.release_time else memory
+
+
+@body(Payload)
+def payload(e, memory, before):
+    """Mass properties with or without it."""
+    return e.empty if memory[0] > 0.0 else e.loaded

@@ -1,0 +1,70 @@
+"""A propeller that is damaged or lost in flight."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import factors, sample
+from lapwing.dynamics.effects._types import Factors, PerRotor
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    rotor: Annotated[int, Gt(0)]  # number of the rotor, from 1
+    time: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
+    remaining_thrust: Annotated[float, Ge(0), Le(1)] = 0.0  # fraction
+    torque_left: Annotated[float, Ge(0), Le(2)] = 0.0  # fraction; a torn blade may drag more
+
+
+class RotorDamage(NamedTuple):
+    """From a moment on one rotor has only a part of its thrust and torque (theory.md, eq. (2.27)).
+
+    Source: the definition. Valid for a torn or lost blade as far as its mean loads go: imbalance and vibration are
+    left out, and the motor goes on turning.
+    """
+
+    time: float  # [s]
+    remaining_thrust: tuple[float, ...]  # fraction of each rotor
+    torque_left: tuple[float, ...]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
+        """For one of the airframe's rotors."""
+        given = checked(Settings, table)
+        count = len(airframe.rotors.position)
+        if given.rotor > count:
+            raise KeyedError("rotor", f"got {given.rotor}", f"one of the vehicle's rotors, 1 to {count}")
+
+        def only_this(left):
+            return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))
+
+        return cls(given.time, only_this(given.remaining_thrust), only_this(given.torque_left))
+
+    def initial_memory(self) -> tuple[PerRotor, PerRotor]:
+        """Fractions of thrust and torque in force."""
+        return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.torque_left)
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@sample(RotorDamage)
+def strike(e, memory, s, rotors, key, tick, interval):
+    """The fractions for the next interval."""
+    return (e.remaining_thrust, e.torque_left) if s.t >= e.time else memory
+
+
+@factors(RotorDamage)
+def rotor_damage(e, memory, s, before):
+    """Factors on the damaged rotor's loads."""
+    return Factors(each(_product, 0.0, before.thrust, memory[0]), each(_product, 0.0, before.torque, memory[1]))

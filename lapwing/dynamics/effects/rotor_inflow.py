@@ -1,0 +1,84 @@
+"""Correction of the rotors' thrust and torque for air that comes along their axis."""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.effects._axes import axial_speeds
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+KIND = "flow through the rotors"
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class RotorInflow(NamedTuple):
+    """What climb takes from, and descent adds to, the static loads of `rotor_thrust` (theory.md, eq. (2.5)).
+
+    The blade meets the air at an angle that falls with the advance per turn over the pitch: T = T_0 (1 - w / speed) and
+    the induced part of the torque with the square, where w = 2 pi V / pitch of each hub's own speed V along the axis,
+    so that rolling and pitching are damped. Source: the paper's blade section at the pitch minus the inflow angle, both
+    small. Valid for |w| below half the rotor speed, where it is held, outside the vortex ring state.
+    """
+
+    thrust_constant: float  # [m^4/rad^2]
+    induced_torque_constant: float  # [m^5/rad^2]
+    turn_per_metre: float  # [rad/m] 2 pi over pitch
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInflow":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        if propeller.zero_lift_angle != 0.0:
+            cannot("the propeller's zero_lift_angle must be 0: the correction is derived for that")
+        profile, induced = drag_coefficients(propeller)
+        square = (2.0 * math.pi) ** 2
+        return cls(
+            thrust_coefficient(propeller) * propeller.diameter**4 / square,
+            torque_coefficient(propeller) * induced / (profile + induced) * propeller.diameter**5 / square,
+            2.0 * math.pi / propeller.pitch,
+        )
+
+
+@leaf
+def _advance(turn_per_metre, axial, speed):
+    """[rad/s] of a hub: its axial speed in turns over the pitch, held to where the model is valid."""
+    return min(max(turn_per_metre * axial, -0.5 * speed), 0.5 * speed)
+
+
+@leaf
+def _square_change(_, speed, w):
+    return w * (speed + speed - w)
+
+
+@leaf
+def _less(constant, before, both):
+    return before - (constant * both[1]) * both[0]
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@loads(RotorInflow)
+def rotor_inflow(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`."""
+    speed, density = s.motion.rotor_speed, s.air.density
+    w = each(_advance, e.turn_per_metre, axial_speeds(s), speed)
+    linear, square = each(_product, 0.0, speed, w), each(_square_change, 0.0, speed, w)
+    return Loads(
+        each(_less, e.thrust_constant * density, before.thrust, each(pair, 0.0, linear, factors.thrust)),
+        each(_less, e.induced_torque_constant * density, before.torque, each(pair, 0.0, square, factors.torque)),
+    )

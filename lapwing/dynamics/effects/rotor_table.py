@@ -1,0 +1,190 @@
+"""Rotors whose thrust and torque are measured: coefficients over the advance ratio, and over the angle of the air."""
+
+import itertools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._axes import hub_speeds
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._propeller_data import parsed
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.vector import pair
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+INSTEAD_OF = ("rotor_thrust", "rotor_quadratic", "rotor_inflow", "induced_velocity")
+WIDEST = 0.25  # of J between two rows
+LEAST_TURNS = 1e-6  # [1/s] below which the advance ratio is that of this speed
+
+Ratio = Annotated[float, Ge(-5), Le(5)]
+Coefficient = Annotated[float, Ge(-1), Le(1)]
+Curve = tuple[Coefficient, ...]
+
+
+class Settings(NamedTuple):
+    """What a scene says: a file, or what is in it."""
+
+    file: str | None = None  # path of a table with the columns J, CT, CP relative to the scene; or these:
+    advance: tuple[Ratio, ...] = ()  # J = V / (n D), growing, 0 among them
+    angle_deg: tuple[Annotated[float, Ge(0), Le(180)], ...] = (0.0,)  # [deg] of the air, 0 against the rotor's flow
+    thrust: tuple[Curve, ...] = ()  # C_T of each angle at each J
+    power: tuple[Curve, ...] = ()  # C_P of each angle at each J
+    diameter: Annotated[float, Gt(0), Le(10)] | None = None  # [m]; the airframe's propeller's if left out
+
+
+class RotorTable(NamedTuple):
+    """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients by a table (theory.md, eq. (2.37)).
+
+    Linear between its rows, held beyond. With one angle the advance ratio is that of the air along the axis, with
+    several that of all the air, and its angle counts. Source: the measurements. Valid within the table.
+    """
+
+    advance: np.ndarray  # (n,)
+    angle: np.ndarray  # (m,) [rad]
+    thrust: np.ndarray  # (m, n) of C_T D^4
+    torque: np.ndarray  # (m, n) of C_P D^5 / 2 pi
+    diameter: float  # [m]
+    thrust_constant: float  # [m^4/rad^2] at rest in the air
+    torque_constant: float  # [m^5/rad^2] at rest in the air
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorTable":
+        """From the table, with the airframe's diameter."""
+        given = checked(Settings, table)
+        diameter = given.diameter
+        if diameter is None:
+            propeller = airframe.propeller or cannot("needs the key diameter: the vehicle has no [propeller]")
+            diameter = propeller.diameter
+        _check(given)
+        thrust = np.array(given.thrust) * diameter**4
+        torque = np.array(given.power) * diameter**5 / (2.0 * math.pi)
+        at_rest, square = given.advance.index(0.0), (2.0 * math.pi) ** 2
+        return cls(
+            np.array(given.advance), np.radians(given.angle_deg), thrust, torque, diameter,
+            float(thrust[0, at_rest]) / square, float(torque[0, at_rest]) / square,
+        )  # fmt: skip
+
+
+def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
+    """The table says all of a rotor's thrust and torque."""
+    for name in INSTEAD_OF:
+        if name in tables:
+            cannot(f"stands for effects.{name}: keep one of them")
+
+
+def embed(table: dict[str, Any], folder: Path) -> None:
+    """What the file of a scene's table says becomes part of it. Raises KeyedError."""
+    if not isinstance(file := table.get("file"), str):
+        return
+    if given := {"advance", "angle_deg", "thrust", "power"} & set(table):
+        raise KeyedError(min(given), "stands beside file", "one of them")
+    path = folder / file
+    try:
+        table.update(parsed("file", path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise KeyedError("file", f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    except UnicodeDecodeError:
+        raise KeyedError("file", f"{path}: not a UTF-8 text file") from None
+
+
+def _check(given: Settings) -> None:
+    """KeyedError where the table is not one that can be interpolated."""
+    j, angles = given.advance, given.angle_deg
+    if not j:
+        raise KeyedError("advance", "missing", "the advance ratios, or file = the path of a table of test data")
+    for name, values in (("advance", j), ("angle_deg", angles)):
+        for before, after in itertools.pairwise(values):
+            if after <= before:
+                raise KeyedError(name, f"got {after:g} after {before:g}", "growing numbers")
+    for before, after in itertools.pairwise(j):
+        if after - before > WIDEST:
+            raise KeyedError(
+                "advance", f"there is nothing between J = {before:g} and {after:g}", f"gaps up to {WIDEST:g}"
+            )
+    if 0.0 not in j or len(j) < 2:
+        raise KeyedError("advance", f"got J from {j[0]:g} to {j[-1]:g}", "two rows or more, J = 0 (at rest) among them")
+    for name, curves in (("thrust", given.thrust), ("power", given.power)):
+        if [len(curve) for curve in curves] != [len(j)] * len(angles):
+            raise KeyedError(name, f"got rows of {[len(c) for c in curves]}", f"{len(angles)} of {len(j)} numbers")
+        at_rest = curves[0][j.index(0.0)]
+        if at_rest <= 0.0:
+            raise KeyedError(name, f"got {at_rest:g} at J = 0", "a number above 0 there")
+
+
+@leaf
+def _place(points, x):
+    """(index, share of the next) of a value in a growing array, held within it."""
+    i = 0
+    while i < points.shape[0] - 2 and x > points[i + 1]:
+        i += 1
+    return i, min(max((x - points[i]) / (points[i + 1] - points[i]), 0.0), 1.0)
+
+
+@leaf
+def _along(curves, k, i, a):
+    return curves[k, i] + a * (curves[k, i + 1] - curves[k, i])
+
+
+@leaf
+def _between(curves, k, i, b, a):
+    low = _along(curves, k, i, a)
+    return low + b * (_along(curves, k + 1, i, a) - low)
+
+
+@kernel
+def coefficients(e, axial, across, turns):
+    """(C_T D^4, C_Q D^5) of a rotor.
+
+    Args:
+        e: `RotorTable`.
+        axial: air speed against its flow [m/s].
+        across: air speed across its axis [m/s].
+        turns: a second [1/s].
+    """
+    way = max(turns, LEAST_TURNS) * e.diameter
+    if e.angle.shape[0] == 1:
+        i, a = _place(e.advance, axial / way)
+        return _along(e.thrust, 0, i, a), _along(e.torque, 0, i, a)
+    i, a = _place(e.advance, math.sqrt(axial * axial + across * across) / way)
+    k, b = _place(e.angle, math.atan2(across, axial))
+    return _between(e.thrust, k, i, b, a), _between(e.torque, k, i, b, a)
+
+
+@leaf
+def _loads(c, speed, hub):
+    e, density = c
+    turns = speed / (2.0 * math.pi)
+    thrust, torque = coefficients(e, hub[0], hub[1], turns)
+    return density * thrust * turns * turns, density * torque * turns * turns
+
+
+@leaf
+def _thrust(_, before, both):
+    factor, found = both
+    return before + factor * found[0]
+
+
+@leaf
+def _torque(_, before, both):
+    factor, found = both
+    return before + factor * found[1]
+
+
+@loads(RotorTable)
+def rotor_table(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`."""
+    found = each(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
+    return Loads(
+        each(_thrust, 0.0, before.thrust, each(pair, 0.0, factors.thrust, found)),
+        each(_torque, 0.0, before.torque, each(pair, 0.0, factors.torque, found)),
+    )

@@ -1,0 +1,62 @@
+"""Static thrust and torque of the rotors from the propeller's geometry."""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+KIND = "rotor thrust model"
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] says it all."""
+
+
+class RotorThrust(NamedTuple):
+    """Thrust and torque proportional to air density and speed squared (theory.md, eq. (2.28); (1.7) and (1.8)).
+
+    Source: Pappalardo et al. 2023, section 2.6. Valid at rest and for advance ratios well below pitch over diameter;
+    add `rotor_inflow` beyond that.
+    """
+
+    thrust_constant: float  # [m^4/rad^2] C_T D^4 / (4 pi^2)
+    torque_constant: float  # [m^5/rad^2] C_M D^5 / (4 pi^2)
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
+        """From the airframe's propeller."""
+        checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]; name rotor_quadratic instead")
+        square = (2.0 * math.pi) ** 2
+        return cls(
+            thrust_coefficient(propeller) * propeller.diameter**4 / square,
+            torque_coefficient(propeller) * propeller.diameter**5 / square,
+        )
+
+
+@leaf
+def _times_square(constant, speed, factor):
+    return (constant * factor) * (speed * speed)
+
+
+@loads(RotorThrust)
+def rotor_thrust(e, memory, s, factors, before):
+    """Loads of each rotor, added to `before`."""
+    speed, density = s.motion.rotor_speed, s.air.density
+    return Loads(
+        each(_sum, 0.0, before.thrust, each(_times_square, e.thrust_constant * density, speed, factors.thrust)),
+        each(_sum, 0.0, before.torque, each(_times_square, e.torque_constant * density, speed, factors.torque)),
+    )
+
+
+@leaf
+def _sum(_, a, b):
+    return a + b

@@ -1,0 +1,77 @@
+"""The air that vehicles of a fleet blow down on those below."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._hooks import air
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.effects._vehicle_interaction import interact
+from lapwing.dynamics.vector import ZERO, add, dot, norm, scale, subtract
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    spread: Annotated[float, Ge(0), Le(1)] = 0.113  # m of the jet's radius, where it is e times slower, a metre of way
+
+
+class RotorWash(NamedTuple):
+    """The jet of each other vehicle that names it, as a wind (theory.md, eq. (2.62) to (2.64)).
+
+    One jet for all rotors of a vehicle, against their thrust: twice the induced velocity of momentum theory once it
+    has developed, a Gauss profile whose width grows with the way and whose momentum is the thrust. It acts through the
+    effects that know the air's speed (body_drag, rotor_inflow, induced_velocity). Source: Leishman, Principles of
+    Helicopter Aerodynamics, on the wake in hover; Pope, Turbulent Flows, section 5.1, on the round jet, whose half
+    width grows by 0.094 m a metre. Valid near hover, below by more than the distance between rotors, where their jets
+    have joined; no wind carries the jet away, the ground does not turn it, and it is there at once.
+    """
+
+    disc_radius: float  # [m] of one disc as large as all rotors' together
+    spread: float
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorWash":
+        """With the discs of the airframe's propellers."""
+        given = checked(Settings, table)
+        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        return cls(0.5 * propeller.diameter * math.sqrt(len(airframe.rotors.position)), given.spread)
+
+    def initial_memory(self) -> tuple[float, float, float]:
+        """The wind of others [m/s], world."""
+        return ZERO
+
+    def presence(self) -> dict[str, float]:
+        """Whence its jet comes."""
+        return {"disc_radius": self.disc_radius}
+
+
+@interact(RotorWash)
+def blown(e, memory, own, others, interval):
+    """The wind of all other vehicles' jets where this one is, for the coming interval."""
+    wind = (0.0, 0.0, 0.0)
+    for other in others:
+        thrust, R = norm(other.thrust_world), other.disc_radius
+        if thrust == 0.0 or R == 0.0:
+            continue
+        down = scale(-1.0 / thrust, other.thrust_world)
+        away = subtract(own.position_world, other.position_world)
+        along = dot(away, down)
+        across = subtract(away, scale(along, down))
+        width = R + e.spread * max(along, 0.0)
+        induced = math.sqrt(thrust / (2.0 * math.pi * other.air_density)) / R
+        developed = 1.0 + along / math.sqrt(along * along + R * R)
+        speed = induced * developed * R / width * math.exp(-dot(across, across) / (width * width))
+        wind = add(wind, scale(speed, down))
+    return wind
+
+
+@air(RotorWash)
+def rotor_wash(e, memory, s, before):
+    """Air with the wind of the others added."""
+    return Air(before.density, add(before.wind_world, memory))

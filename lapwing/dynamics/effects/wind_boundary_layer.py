@@ -1,0 +1,57 @@
+"""Wind that grows with the height over the ground."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import air
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import LEVEL, surface
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    speed: Annotated[float, Gt(0), Le(60)]  # [m/s] at the reference height
+    heading: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] in which the air goes, 0 to the east
+    height: Annotated[float, Ge(1), Le(200)] = 10.0  # [m] over the ground, of reference
+    roughness: Annotated[float, Ge(1e-5), Le(3)] = 0.03  # [m] length: sea 0.0002, mown grass 0.01, crops 0.1, town 1
+
+
+class WindBoundaryLayer(NamedTuple):
+    """A steady wind with the logarithmic profile of the neutral surface layer (theory.md, eq. (2.32)).
+
+    Source: Stull, An Introduction to Boundary Layer Meteorology (1988), section 9.7. Valid to some 100 m over ground of
+    even roughness, and not between what stands on it.
+    """
+
+    along: tuple[float, float]  # [m/s] world x and y of the wind, a factor e over the roughness length
+    inverse_roughness: float  # [1/m]
+    terrain: Any = LEVEL  # Level or Relief
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindBoundaryLayer":
+        """Over level ground."""
+        given = checked(Settings, table)
+        scale = given.speed / math.log1p(given.height / given.roughness)
+        return cls((scale * math.cos(given.heading), scale * math.sin(given.heading)), 1.0 / given.roughness)
+
+    def in_environment(self, environment: Environment) -> "WindBoundaryLayer":
+        """Over the ground that is there."""
+        return self._replace(terrain=environment.terrain)
+
+
+@air(WindBoundaryLayer)
+def wind_boundary_layer(e, memory, s, before):
+    """Air with this wind added."""
+    x, y, z = s.motion.position_world
+    height = max(z - surface(e.terrain, x, y)[0], 0.0)
+    growth = math.log(1.0 + height * e.inverse_roughness)
+    wind = before.wind_world
+    return Air(before.density, (wind[0] + growth * e.along[0], wind[1] + growth * e.along[1], wind[2]))

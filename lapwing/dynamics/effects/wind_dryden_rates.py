@@ -1,0 +1,156 @@
+"""Dryden turbulence at low altitude whose air also turns: angular gusts."""
+
+import math
+import zlib
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.effects import wind_dryden
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import air, air_rate, sample
+from lapwing.dynamics.effects._turbulence import (
+    KIND,
+    LONG_AGO,
+    Conditions,
+    conditions,
+    first_order,
+    in_world,
+    intensity,
+    passing,
+    second_order,
+    surroundings,
+    transverse,
+)
+from lapwing.dynamics.effects._turbulence import Settings as Turbulence
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.noise import normal3
+from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed
+from lapwing.kernels import leaf
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+__all__ = ["KIND", "Settings", "WindDrydenRates"]
+
+LANE = zlib.crc32(b"wind_dryden_rates")
+ROOT3 = math.sqrt(3.0)
+APART = 1e-6  # least difference of the two filters' rates
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    wind_speed: Annotated[float, Gt(0), Le(30)]  # [m/s] mean wind 6 m (20 feet) above the ground
+    airspeed: Annotated[float, Gt(0), Le(60)] | None = None  # [m/s] at which gusts pass; if left out, the vehicle's
+    altitude: Annotated[float, Ge(3.048), Le(304.8)] | None = None  # [m] above the ground; if left out, the vehicle's
+    heading: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] of the mean wind, 0 to the east
+    span: Annotated[float, Ge(0.05), Le(20)] | None = None  # [m] of the vehicle, smaller gusts turn it no more
+
+
+class WindDrydenRates(NamedTuple):
+    """The gusts of `wind_dryden`, to the bit, and rates of the air with their spectra (theory.md, eq. (2.39)).
+
+    Rotors feel the air's rate at their hubs. Source: MIL-F-8785C, section 3.7.5: p by a filter of its own, q and r from
+    the gusts across as they pass. Valid as `wind_dryden`. Sampled exactly at each exchange, held over the interval.
+    """
+
+    conditions: Conditions
+    span: float  # [m]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDrydenRates":
+        """Over level ground, the span from tip to tip of the outer rotors unless the table has one."""
+        span = checked(Settings, table).span
+        if span is None:
+            reach = max(math.hypot(x, y) for x, y, _ in airframe.rotors.position)
+            span = 2.0 * reach + (airframe.propeller.diameter if airframe.propeller else 0.0)
+        return cls(conditions({key: value for key, value in table.items() if key in Turbulence._fields}), span)
+
+    def in_environment(self, environment: Environment) -> "WindDrydenRates":
+        """Over the ground that is there."""
+        return self._replace(conditions=self.conditions._replace(terrain=environment.terrain))
+
+    def initial_memory(self) -> tuple[tuple[float, ...], Vec3, tuple[float, float, float], Vec3]:
+        """Memory of `wind_dryden`, states of roll, pitch and yaw, and the air's rate [rad/s, world]."""
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 0.0), ZERO
+
+
+@leaf
+def passed(x1, x2, z, beta, theta, n1, n2, n3):
+    """The low-passed transverse gust z, `theta` of its correlation times later (theory.md, eq. (2.40)).
+
+    Args:
+        x1: first state of the gust's filter, before.
+        x2: its second state.
+        z: before.
+        beta: correlation time of the gust over that of the low-pass.
+        theta: time over the correlation time of the gust.
+        n1: draw of the gust's first state.
+        n2: draw of its second state.
+        n3: draw of its own.
+    """
+    k = beta - 1.0
+    k = k if abs(k) > APART else APART
+    kept, low = math.exp(-theta), math.exp(-beta * theta)
+    i0 = (kept - low) / k
+    i1 = (theta * kept - i0) / k
+    a, b = beta * (ROOT3 * i0 + (1.0 - ROOT3) * i1), beta * (1.0 - ROOT3) * i0  # of x1, of x2
+    # covariances when all is stationary, and what of them is new after that time
+    p13 = beta * (0.5 * ROOT3 + 0.25 * (1.0 - ROOT3)) / (1.0 + beta)
+    p23 = (p13 + 0.25 * beta) / (1.0 + beta)
+    p33 = ROOT3 * p13 + (1.0 - ROOT3) * p23
+    mean1, mean2, mean3 = 0.5 * a + 0.25 * b + p13 * low, 0.25 * (a + b) + p23 * low, a * p13 + b * p23 + p33 * low
+    q13 = p13 - kept * mean1
+    q23 = p23 - kept * (mean2 + theta * mean1)
+    q33 = p33 - (a * mean1 + b * mean2 + low * mean3)
+    q11 = 0.5 * (1.0 - kept * kept)
+    q12 = 0.25 * (1.0 - kept * kept * (1.0 + 2.0 * theta))
+    q22 = 0.25 * (1.0 - kept * kept * (1.0 + 2.0 * theta * (1.0 + theta)))
+    root = math.sqrt(q11)
+    cross = q12 / root
+    rest = math.sqrt(max(q22 - cross * cross, 0.0))
+    c1 = q13 / root
+    c2 = (q23 - cross * c1) / rest if rest > 0.0 else 0.0
+    c3 = math.sqrt(max(q33 - c1 * c1 - c2 * c2, 0.0))
+    return a * x1 + b * x2 + low * z + c1 * n1 + c2 * n2 + c3 * n3
+
+
+@sample(WindDrydenRates)
+def draw(e, memory, s, rotors, key, tick, interval):
+    """States of the filters, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
+    along, across1, across2, up1, up2, started = memory[0]
+    roll, pitch, yaw = memory[2]
+    sigma, rate = passing(e.conditions, s)
+    time = interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
+    first, second = normal3(key, tick, wind_dryden.LANE_FIRST), normal3(key, tick, wind_dryden.LANE_SECOND)
+    third = normal3(key, tick, LANE)
+    altitude, airspeed = surroundings(e.conditions, s)
+    _, scale = intensity(e.conditions.wind_speed, altitude)
+    per_span = math.pi / (4.0 * e.span)  # [1/m] of roll and pitch; four thirds of it of yaw
+    beta_up, beta_across = per_span * scale[2], 4.0 / 3.0 * per_span * scale[1]
+    roll = first_order(roll, per_span * airspeed * time, third[0])
+    pitch = passed(up1, up2, pitch, beta_up, rate[2] * time, first[2], second[1], third[1])
+    yaw = passed(across1, across2, yaw, beta_across, rate[1] * time, first[1], second[0], third[2])
+    along = first_order(along, rate[0] * time, first[0])
+    across1, across2 = second_order(across1, across2, rate[1] * time, first[1], second[0])
+    up1, up2 = second_order(up1, up2, rate[2] * time, first[2], second[1])
+    v, w = transverse(across1, across2), transverse(up1, up2)
+    wind = in_world(e.conditions, sigma[0] * along, sigma[1] * v, sigma[2] * w)
+    p = sigma[2] * math.pi * math.sqrt(0.1 * (per_span * scale[2]) ** (1.0 / 3.0) / (e.span * scale[2])) * roll
+    q, r = per_span * sigma[2] * (w - pitch), -4.0 / 3.0 * per_span * sigma[1] * (v - yaw)
+    turning = in_world(e.conditions, p, q, r)
+    return (along, across1, across2, up1, up2, 1.0), wind, (roll, pitch, yaw), turning
+
+
+@air(WindDrydenRates)
+def wind_dryden_rates(e, memory, s, before):
+    """Air with the turbulence added."""
+    return Air(before.density, add(before.wind_world, memory[1]))
+
+
+@air_rate(WindDrydenRates)
+def turning(e, memory, s, before):
+    """Rate [rad/s] of the air with the turbulence's added, body coordinates."""
+    return add(before, apply_transposed(s.R_world_body, memory[3]))

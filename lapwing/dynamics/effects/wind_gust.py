@@ -1,0 +1,34 @@
+"""One discrete gust."""
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.effects._hooks import air
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.vector import add, scale
+
+Speed = Annotated[float, Ge(-60), Le(60)]
+
+
+class WindGust(NamedTuple):
+    """A gust that rises to its peak and falls again as one minus a cosine (theory.md, eq. (2.19)).
+
+    Source: the discrete gust of CS-25.341, in time instead of distance; its first half is that of MIL-F-8785C. Valid
+    for vehicles much smaller than the gust.
+    """
+
+    peak: tuple[Speed, Speed, Speed]  # [m/s] world
+    start: Annotated[float, Ge(0)]  # [s] simulation time
+    duration: Annotated[float, Gt(0)]  # [s] from nothing to nothing
+
+
+@air(WindGust)
+def wind_gust(e, memory, s, before):
+    """Air with the gust added."""
+    since = s.t - e.start
+    if since <= 0.0 or since >= e.duration:
+        return before
+    part = 0.5 * (1.0 - math.cos(2.0 * math.pi * since / e.duration))
+    return Air(before.density, add(before.wind_world, scale(part, e.peak)))

@@ -1,0 +1,104 @@
+"""Random force: the paper's wind, as a force of random size instead of a motion of the air."""
+
+import math
+import zlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import sample, wind, wrench
+from lapwing.dynamics.noise import normal3
+from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
+from lapwing.kernels import leaf
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Speed = Annotated[float, Ge(-60), Le(60)]
+
+LANE = zlib.crc32(b"wind_random")
+ROUNDING = 1e-6  # of an interval
+
+
+class Settings(NamedTuple):
+    """What a scene says."""
+
+    mean: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)  # [m/s] world
+    sigma: Annotated[float, Ge(0), Le(30)] = 1.0  # [m/s] of each axis
+    area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2] S
+    density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
+    shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
+    interval: Annotated[float, Ge(1e-4), Le(10)] = 0.004  # [s] between two draws, whatever the exchange interval
+    beside_drag: bool = False  # whether body_drag may act as well, though both are drag in this wind
+
+
+class WindRandom(NamedTuple):
+    """A random force 1/2 C_s S rho |v| v at the centre of mass, of a wind's speed v past the vehicle (theory.md, eq.
+    (2.8)); the air that other effects feel stands still.
+
+    The wind is the mean plus one normal draw for each axis and interval; over an exchange interval the force is held at
+    its mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
+    the draws are independent, so that the wind's spectrum is flat, sigma^2 times the interval, up to the interval's
+    frequency. As it is drag already, it is refused beside `body_drag`.
+    """
+
+    mean: Vec3  # [m/s] world
+    sigma: float  # [m/s] of each axis
+    factor: float  # [N s^2/m^2] 1/2 C_s S rho
+    interval: float  # [s] between two draws
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindRandom":
+        """What a scene says."""
+        given = checked(Settings, table)
+        return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
+
+    def initial_memory(self) -> tuple[Vec3, Vec3]:
+        """The force and the wind: none before the first exchange."""
+        return ZERO, ZERO
+
+
+def check(table: Mapping, tables: Mapping) -> None:
+    """KeyedError beside `body_drag`, unless the table insists."""
+    if "body_drag" in tables and not table.get("beside_drag"):
+        message = "is drag already, and counts it twice beside effects.body_drag"
+        expected = "wind_constant or wind_dryden with body_drag, or beside_drag = true"
+        raise KeyedError("", message, expected)
+
+
+@leaf
+def _blow(e, key, number, velocity_world):
+    """(force [N], wind [m/s]) of one draw, world."""
+    drawn = add(e.mean, scale(e.sigma, normal3(key, number, LANE)))
+    v = subtract(drawn, velocity_world)
+    return scale(e.factor * norm(v), v), drawn
+
+
+@sample(WindRandom)
+def draw(e, memory, s, rotors, key, tick, interval):
+    """Mean force [N] and wind [m/s] of the next exchange interval, in world coordinates."""
+    start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws
+    first, last = math.floor(start + ROUNDING), math.ceil(end - ROUNDING) - 1
+    if first >= last:
+        return _blow(e, key, first, s.motion.velocity_world)
+    force, drawn = ZERO, ZERO
+    for number in range(first, last + 1):
+        part = (min(end, number + 1.0) - max(start, 1.0 * number)) / (end - start)
+        one = _blow(e, key, number, s.motion.velocity_world)
+        force, drawn = add(force, scale(part, one[0])), add(drawn, scale(part, one[1]))
+    return force, drawn
+
+
+@wrench(WindRandom)
+def wind_random(e, memory, s, rotors):
+    """Force [N] in world, torque [N m] in body coordinates."""
+    return memory[0], NOTHING
+
+
+@wind(WindRandom)
+def told(e, memory, before):
+    """The wind [m/s] that the force is made of, added."""
+    return add(before, memory[1])

@@ -1,0 +1,43 @@
+"""Where and when a vehicle flies: the place on the Earth, the air, gravity, the magnetic field and the ground."""
+
+import datetime
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.terrain import LEVEL
+from lapwing.dynamics.vector import Vec3
+
+STANDARD_GRAVITY = 9.80665  # [m/s^2] ISO 80000-3
+FIRST_YEAR, LAST_YEAR = 2010, 2029  # of the World Magnetic Models that are known
+TESLA = 1e-9  # in a nanotesla
+DIGITS = 10  # of a field in tesla: a tenth of a nanotesla, as the model's tables have it
+
+
+class Environment(NamedTuple):
+    """What all services of a run agree on; the defaults are those of a scene that says nothing."""
+
+    home: Home = Home()
+    atmosphere: Atmosphere = Atmosphere()
+    gravity: float = STANDARD_GRAVITY  # [m/s^2] at sea level
+    magnetic_field_world: Vec3 = (1.8611e-6, 25.1776e-6, -39.2545e-6)  # [T] world; at that home on 1 July 2025
+    terrain: Any = LEVEL  # Level or Relief
+
+
+def magnetic_field(home: Home, date: datetime.date) -> Vec3:
+    """The Earth's field at home [T], east, north, up, by the World Magnetic Model of that time.
+
+    Args:
+        home: a place on the Earth.
+        date: from FIRST_YEAR to LAST_YEAR.
+    """
+    from pygeomag import GeoMag
+
+    first = datetime.date(date.year, 1, 1)
+    year = date.year + (date - first).days / (datetime.date(date.year + 1, 1, 1) - first).days
+    model = GeoMag(base_year=date.year)
+    found = model.calculate(home.latitude_deg, home.longitude_deg, home.height / 1000.0, year)
+    return round(found.y * TESLA, DIGITS), round(found.x * TESLA, DIGITS), round(-found.z * TESLA, DIGITS)
+
+
+STANDARD = Environment()

@@ -1,0 +1,88 @@
+"""Where home is on the Earth: ENU about a home point to and from WGS 84.
+
+WGS 84: NIMA TR8350.2. Conversions: theory.md, eqs. (3.4) to (3.7).
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.kernels import kernel, leaf
+
+SEMI_MAJOR = 6378137.0  # [m]
+FLATTENING = 1.0 / 298.257223563
+_E2 = FLATTENING * (2.0 - FLATTENING)  # first eccentricity squared
+_SEMI_MINOR = SEMI_MAJOR * (1.0 - FLATTENING)
+_EP2 = _E2 / (1.0 - _E2)  # second eccentricity squared
+
+
+class Home(NamedTuple):
+    """Origin of the world frame on the WGS 84 ellipsoid."""
+
+    latitude_deg: Annotated[float, Ge(-90.0), Le(90.0)] = 40.7686  # [deg] north; Fisciano, the home of the drone paper
+    longitude_deg: Annotated[float, Ge(-180.0), Le(180.0)] = 14.7907  # [deg] east
+    height: Annotated[float, Gt(-500.0), Le(9000.0)] = 280.0  # [m], over the ellipsoid; also taken as the altitude
+
+
+@leaf
+def geodetic_to_ecef(latitude_deg, longitude_deg, height):
+    """Earth-centred, Earth-fixed coordinates [m] of a point (theory.md, eq. (3.4))."""
+    latitude, longitude = math.radians(latitude_deg), math.radians(longitude_deg)
+    s, c = math.sin(latitude), math.cos(latitude)
+    n = SEMI_MAJOR / math.sqrt(1.0 - _E2 * s * s)
+    return (
+        (n + height) * c * math.cos(longitude),
+        (n + height) * c * math.sin(longitude),
+        (n * (1.0 - _E2) + height) * s,
+    )
+
+
+@leaf
+def ecef_to_geodetic(r):
+    """Latitude [deg], longitude [deg], height [m] of a point near the Earth's surface (theory.md, eq. (3.5))."""
+    rho = math.hypot(r[0], r[1])
+    # Bowring's iteration on the reduced latitude: the second pass is already below one rounding up to 20 km height.
+    tangent_s, tangent_c = r[2] * SEMI_MAJOR, rho * _SEMI_MINOR
+    latitude = 0.0
+    for _ in range(3):
+        length = math.hypot(tangent_s, tangent_c)
+        s, c = tangent_s / length, tangent_c / length
+        latitude = math.atan2(r[2] + _EP2 * _SEMI_MINOR * s * s * s, rho - _E2 * SEMI_MAJOR * c * c * c)
+        tangent_s, tangent_c = (1.0 - FLATTENING) * math.sin(latitude), math.cos(latitude)
+    s, c = math.sin(latitude), math.cos(latitude)
+    height = rho * c + r[2] * s - SEMI_MAJOR * math.sqrt(1.0 - _E2 * s * s)
+    return math.degrees(latitude), math.degrees(math.atan2(r[1], r[0])), height
+
+
+@leaf
+def _axes(home):
+    latitude, longitude = math.radians(home.latitude_deg), math.radians(home.longitude_deg)
+    return math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
+
+
+@kernel
+def enu_to_geodetic(home, position_world):
+    """Latitude [deg], longitude [deg], height [m] of a point of the world frame (theory.md, eq. (3.6))."""
+    sp, cp, sl, cl = _axes(home)
+    e, n, u = position_world
+    o = geodetic_to_ecef(home.latitude_deg, home.longitude_deg, home.height)
+    outward = cp * u - sp * n  # away from the Earth's axis
+    return ecef_to_geodetic((o[0] - sl * e + cl * outward, o[1] + cl * e + sl * outward, o[2] + cp * n + sp * u))
+
+
+@kernel
+def geodetic_to_enu(home, latitude_deg, longitude_deg, height):
+    """World-frame position [m] of a point given by latitude [deg], longitude [deg], height [m] (eq. (3.7))."""
+    sp, cp, sl, cl = _axes(home)
+    o = geodetic_to_ecef(home.latitude_deg, home.longitude_deg, home.height)
+    r = geodetic_to_ecef(latitude_deg, longitude_deg, height)
+    dx, dy, dz = r[0] - o[0], r[1] - o[1], r[2] - o[2]
+    outward = cl * dx + sl * dy
+    return -sl * dx + cl * dy, cp * dz - sp * outward, sp * dz + cp * outward
+
+
+def normal_gravity(latitude_deg: float) -> float:
+    """Gravity [m/s^2] on the ellipsoid (theory.md, eq. (2.29)); NIMA TR8350.2, eq. (4-1)."""
+    square = math.sin(math.radians(latitude_deg)) ** 2
+    return 9.7803253359 * (1.0 + 0.00193185265241 * square) / math.sqrt(1.0 - _E2 * square)

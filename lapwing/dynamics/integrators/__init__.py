@@ -1,0 +1,59 @@
+"""The integrators: one file per method, found by scanning this folder; adding a method is adding a file.
+
+A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on the manifold to round-off?), a class
+`Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h, where
+`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three more if they apply:
+`EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
+higher, and `unfit(p, x)` of a method that is not for every system.
+"""
+
+from types import ModuleType
+from typing import Any
+
+from lapwing.dynamics import discovery
+from lapwing.dynamics.integrators._adaptive import adapt
+from lapwing.dynamics.integrators._fixed_step import RATES, march, rate, record, step
+from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
+from lapwing.dynamics.integrators._step_doubling import SHORTEST, Controlled, march_controlled, shorter
+
+__all__ = [
+    "RATES",
+    "SHORTEST",
+    "Controlled",
+    "adapt",
+    "check_start",
+    "fitting",
+    "get",
+    "march",
+    "march_controlled",
+    "names",
+    "not_finite",
+    "rate",
+    "record",
+    "shorter",
+    "simulate",
+    "solve",
+    "step",
+    "unfit",
+]
+
+
+def names() -> list[str]:
+    """Every method's name: its file name."""
+    return discovery.names(__name__)
+
+
+def get(name: str) -> ModuleType:
+    """The module of a method; ValueError that lists the choices if there is none."""
+    return discovery.get(__name__, name, "integrator")
+
+
+def unfit(name: str, p: Any, x: Any) -> str:
+    """Why a method is not for the system with parameters p and states like x, "" if it is."""
+    module = get(name)
+    return module.unfit(p, x) if hasattr(module, "unfit") else ""
+
+
+def fitting(p: Any, x: Any) -> list[str]:
+    """Names of the methods for the system with parameters p and states like x."""
+    return [name for name in names() if not unfit(name, p, x)]

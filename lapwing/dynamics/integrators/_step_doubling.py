@@ -1,0 +1,56 @@
+"""Any method with its error controlled, for systems whose forces jump: each part of a step whole, and in halves."""
+
+import math
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.integrators._fixed_step import step
+from lapwing.kernels import apart as never_inlined
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import apart, finite
+
+SHORTEST = 0.01  # [s] times the tolerance: a part no longer than this is not split
+
+
+class Controlled(NamedTuple):
+    """A method, and how far a part of a step may be off."""
+
+    method: Any  # `Method()` of an integrator
+    tolerance: float  # relative to 1 + size
+
+
+@leaf
+def shorter(part, error, tolerance):
+    """What to try instead of a part that was too long (theory.md, eq. (2.33))."""
+    return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
+
+
+@never_inlined
+def _once(method, p, t, x, h):
+    # called, not inlined three times, and optimised once, not again in every function above
+    return step(method, p, t, x, h)
+
+
+@never_inlined
+def march_controlled(how, p, t, x, h, end):
+    """The state at time `end`, by parts of steps whose error is controlled; halves are kept, none longer than h."""
+    allowed, part = how.tolerance, 2.0 * h
+    smallest = SHORTEST * allowed
+    while True:
+        left = end - t
+        part = min(part, 2.0 * h)
+        last = part > (1.0 - 1e-9) * left
+        taken = left if last else part
+        half = 0.5 * taken
+        whole = _once(how.method, p, t, x, taken)
+        y = _once(how.method, p, t + half, _once(how.method, p, t, x, half), half)
+        sound = finite(y)
+        error = apart(y, whole) if sound else math.inf
+        if error > allowed and taken > smallest:
+            part = shorter(taken, error, allowed)
+            continue
+        x = y
+        if last or not sound:
+            return x
+        t += taken
+        if error < allowed / 32.0:
+            part = 2.0 * taken

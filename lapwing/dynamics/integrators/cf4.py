@@ -1,0 +1,28 @@
+"""Commutator-free method of order 4: two exponentials in the last stage instead of brackets.
+
+Celledoni, Marthinsen, Owren, Future Gener. Comput. Syst. 19 (2003) 341.
+"""
+
+from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import axpy, retract, scale
+
+ORDER = 4
+EVALUATIONS = 4
+ON_MANIFOLD = True
+Method = token(__name__)
+
+
+@leaf
+def step(rate, p, t, x, h):
+    """Four stages and five exponentials, of which x exp(k1/2) is used twice (theory.md, eq. (6.10))."""
+    half = 0.5 * h
+    k1 = scale(h, rate(p, t, x))
+    x2 = retract(x, scale(0.5, k1))
+    k2 = scale(h, rate(p, t + half, x2))
+    k3 = scale(h, rate(p, t + half, retract(x, scale(0.5, k2))))
+    k4 = scale(h, rate(p, t + h, retract(x2, axpy(-0.5, k1, k3))))
+    middle = scale(1.0 / 6.0, axpy(1.0, k2, k3))
+    first = axpy(0.25, k1, axpy(-1.0 / 12.0, k4, middle))
+    second = axpy(-1.0 / 12.0, k1, axpy(0.25, k4, middle))
+    return retract(retract(x, first), second)

@@ -1,0 +1,17 @@
+"""The classical Runge-Kutta method in the embedding, brought back onto the manifold after every step."""
+
+from lapwing.dynamics.integrators import rk4
+from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import normalise
+
+ORDER = 4
+EVALUATIONS = 4
+ON_MANIFOLD = True
+Method = token(__name__)
+
+
+@leaf
+def step(rate, p, t, x, h):
+    """Step of `rk4`, then the nearest point of the manifold; the projection keeps the order (theory.md, eq. (6.4))."""
+    return normalise(rk4.step(rate, p, t, x, h))

@@ -1,0 +1,19 @@
+"""Runge-Kutta-Munthe-Kaas of order 3: Heun's tableau in the Lie algebra, with one bracket a step."""
+
+from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import axpy, bracket, retract, scale
+
+ORDER = 3
+EVALUATIONS = 3
+ON_MANIFOLD = True
+Method = token(__name__)
+
+
+@leaf
+def step(rate, p, t, x, h):
+    """Three stages; of the corrections only the last reaches the order (theory.md, eq. (6.8))."""
+    k1 = scale(h, rate(p, t, x))
+    k2 = scale(h, rate(p, t + h / 3.0, retract(x, scale(1.0 / 3.0, k1))))
+    k3 = scale(h, rate(p, t + 2.0 * h / 3.0, retract(x, scale(2.0 / 3.0, k2))))
+    return retract(x, scale(0.25, axpy(-1.0, bracket(x, k2, k3), axpy(3.0, k3, k1))))

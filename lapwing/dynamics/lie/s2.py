@@ -1,0 +1,60 @@
+"""Directions: unit vectors, on which rotations act from the left.
+
+The tangent at a direction q is an angular velocity omega [rad/s] in the frame of q, orthogonal to q, so that
+q' = omega x q (theory.md, eq. (5.14)).
+"""
+
+import math
+from typing import NamedTuple
+
+from lapwing.dynamics.lie.so3 import turn
+from lapwing.dynamics.vector import cross, dot, norm, scale
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import MANIFOLDS, Manifold
+
+
+class Direction(NamedTuple):
+    """Unit vector; as a state leaf, a point of S^2."""
+
+    x: float
+    y: float
+    z: float
+
+
+@leaf
+def retract(q, v):
+    """exp(hat(v)) q: the direction turned by the rotation vector v [rad] (theory.md, eq. (5.15))."""
+    r = turn(v, q)
+    # first-order normalisation, else the rounding of many equal steps adds up in the length
+    return Direction(*scale(1.5 - 0.5 * dot(r, r), r))
+
+
+@leaf
+def log(q, r):
+    """Rotation vector orthogonal to q and r that takes q to r; zero for r = -q, where no axis stands out."""
+    axis = cross(q, r)
+    sine = norm(axis)
+    k = 1.0 if sine < 1e-150 else math.atan2(sine, dot(q, r)) / sine
+    return scale(k, axis)
+
+
+@leaf
+def normalise(q):
+    """q / |q|."""
+    return Direction(*scale(1.0 / norm(q), q))
+
+
+@leaf
+def embed(q, omega):
+    """Derivative of the three numbers: omega x q."""
+    return cross(omega, q)
+
+
+@leaf
+def transport(u, v):
+    """From exp(u) q back to q, u orthogonal to q: turned back by u (theory.md, eq. (5.21))."""
+    return turn(scale(-1.0, u), v)
+
+
+# rotations act on directions from the left: [u, v] = u x v
+MANIFOLDS[Direction] = Manifold(retract, embed, normalise, cross, transport)

@@ -1,0 +1,122 @@
+"""Rotations as matrices (nine floats in row order) and rotation vectors [rad]: the closed forms on SO(3)."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio, sine_ratio
+from lapwing.dynamics.vector import add, apply, cross, dot, matmul, scale, transpose
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import MANIFOLDS, Manifold
+
+
+class Rotation(NamedTuple):
+    """Rotation matrix in row order; as a state leaf, an attitude on SO(3) with tangent omega_body [rad/s]."""
+
+    m00: float
+    m01: float
+    m02: float
+    m10: float
+    m11: float
+    m12: float
+    m20: float
+    m21: float
+    m22: float
+
+
+@leaf
+def hat(v):
+    """The skew matrix with hat(v) a = v x a."""
+    return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
+
+
+@leaf
+def vee(m):
+    """Inverse of `hat` on the skew part of m."""
+    return (0.5 * (m[7] - m[5]), 0.5 * (m[2] - m[6]), 0.5 * (m[3] - m[1]))
+
+
+@leaf
+def exp(v):
+    """Rotation matrix of the rotation vector v (theory.md, eq. (5.6))."""
+    square = dot(v, v)
+    s, c = sine_ratio(square), cosine_ratio(square)
+    sx, sy, sz = s * v[0], s * v[1], s * v[2]
+    cx, cy, cz = c * v[0], c * v[1], c * v[2]
+    xx, yy, zz, xy, xz, yz = cx * v[0], cy * v[1], cz * v[2], cx * v[1], cx * v[2], cy * v[2]
+    return Rotation(
+        1.0 - (yy + zz), xy - sz, xz + sy, xy + sz, 1.0 - (xx + zz), yz - sx, xz - sy, yz + sx, 1.0 - (xx + yy)
+    )
+
+
+@leaf
+def turn(v, a):
+    """exp(hat(v)) a without the matrix."""
+    square = dot(v, v)
+    across = cross(v, a)
+    return add(a, add(scale(sine_ratio(square), across), scale(cosine_ratio(square), cross(v, across))))
+
+
+@leaf
+def log(m):
+    """Rotation vector, at most pi long, of a rotation matrix: by the quaternion, accurate near zero and near pi."""
+    return quaternion.log(quaternion.from_matrix(m))
+
+
+@leaf
+def dexp(u, v):
+    """Derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory.md, eq. (5.7))."""
+    square = dot(u, u)
+    across = cross(u, v)
+    return add(v, add(scale(cosine_ratio(square), across), scale(cubic_ratio(square), cross(u, across))))
+
+
+@leaf
+def dexpinv(u, v):
+    """Inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory.md, eq. (5.8))."""
+    across = cross(u, v)
+    return add(v, add(scale(-0.5, across), scale(cotangent_ratio(u), cross(u, across))))
+
+
+@leaf
+def determinant(m):
+    """Determinant of a 3x3 matrix: +1 for a rotation, -1 for a reflection."""
+    return dot((m[0], m[1], m[2]), cross((m[3], m[4], m[5]), (m[6], m[7], m[8])))
+
+
+@leaf
+def _polish(m):
+    """One Newton step towards the polar factor: m (3 I - transpose(m) m) / 2; squares the defect."""
+    g = matmul(transpose(m), m)
+    return matmul(m, (
+        1.5 - 0.5 * g[0], -0.5 * g[1], -0.5 * g[2],
+        -0.5 * g[3], 1.5 - 0.5 * g[4], -0.5 * g[5],
+        -0.5 * g[6], -0.5 * g[7], 1.5 - 0.5 * g[8],
+    ))  # fmt: skip
+
+
+@leaf
+def normalise(m):
+    """The rotation matrix nearest to m, for m within 0.1 of one."""
+    return Rotation(*_polish(_polish(_polish(_polish(m)))))
+
+
+@leaf
+def adjoint(m, v):
+    """Ad of a rotation matrix on so(3): the rotated vector."""
+    return apply(m, v)
+
+
+@leaf
+def retract(m, v):
+    """m exp(hat(v)): turned by v in body coordinates."""
+    # polished, else the rounding of many equal steps adds up
+    return Rotation(*_polish(matmul(m, exp(v))))
+
+
+@leaf
+def embed(m, omega_body):
+    """Derivative of the nine numbers: m hat(omega_body)."""
+    return matmul(m, hat(omega_body))
+
+
+MANIFOLDS[Rotation] = Manifold(retract, embed, normalise, quaternion.bracket, quaternion.transport)

@@ -1,0 +1,149 @@
+"""The fast path: one core body and four leaves hinged to it at their centres of mass, nothing assembled.
+
+The leaves are eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)), all four at once: every number of a
+`Leaf` is `lanes`, a lane a leaf. What remains is one symmetric 3x3 system. All vectors are in the same axes, whichever
+they are. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
+"""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.vector import Vec3, add, cross, dot, scale, subtract
+from lapwing.kernels import leaf
+from lapwing.kernels.simd import total
+
+Sym3 = tuple[float, float, float, float, float, float]
+
+
+class Core(NamedTuple):
+    """The core body and what acts on it."""
+
+    mass: float  # [kg]
+    inertia: Sym3  # [kg m^2]
+    force: Vec3  # [N]
+    torque: Vec3  # [N m], gyroscopic part included
+
+
+class Leaf(NamedTuple):
+    """The leaves, the motion their hinges leave them, a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn +
+    s axis, and what acts on them. One that is gone has no mass, no inertia, and nothing acts on it."""
+
+    mass: float  # [kg]
+    inertia: Sym3  # about its centre of mass [kg m^2]; without the axial moment if it spins freely, eq. (8.42)
+    offset: Vec3  # hinge point from the core's centre of mass [m]
+    axis: Vec3  # unit vector, a principal axis of the inertia
+    axial: float  # moment of inertia about the axis [kg m^2], never zero
+    spins: float  # 1: s follows from `drive_torque`; 0: s = 0, the whole turn is imposed
+    drive_torque: float  # about the axis, from the core on the leaf [N m]; not read if s = 0
+    drift: Vec3  # [m/s^2]
+    turn: Vec3  # [rad/s^2]
+    force: Vec3  # [N]
+    torque: Vec3  # [N m], gyroscopic part included
+
+
+class Result(NamedTuple):
+    """Accelerations of the core (linear of its centre of mass, angular), and what the leaves do."""
+
+    acceleration: Vec3  # [m/s^2]
+    angular_acceleration: Vec3  # [rad/s^2]
+    relative: Vec3  # acceleration of the leaves less that of the core [m/s^2]
+    turned: Vec3  # angular acceleration of the leaves [rad/s^2]
+    spin: float  # s [rad/s^2]
+    reaction_force: Vec3  # from the core on the leaves [N]
+    reaction_torque: Vec3  # the same about the hinge point [N m]; along the axis: the drive torque
+
+
+@leaf
+def times(m, a):
+    """m a for a symmetric matrix of six floats."""
+    return (
+        m[0] * a[0] + m[3] * a[1] + m[4] * a[2],
+        m[3] * a[0] + m[1] * a[1] + m[5] * a[2],
+        m[4] * a[0] + m[5] * a[1] + m[2] * a[2],
+    )
+
+
+@leaf
+def plus(m, n):
+    """m + n."""
+    return (m[0] + n[0], m[1] + n[1], m[2] + n[2], m[3] + n[3], m[4] + n[4], m[5] + n[5])
+
+
+@leaf
+def outer(s, a):
+    """s a a^T for a scalar s."""
+    x, y, z = s * a[0], s * a[1], s * a[2]
+    return (x * a[0], y * a[1], z * a[2], x * a[1], x * a[2], y * a[2])
+
+
+@leaf
+def point_inertia(mass, a):
+    """mass (|a|^2 1 - a a^T): the inertia of a point at a."""
+    xx, yy, zz = mass * a[0] * a[0], mass * a[1] * a[1], mass * a[2] * a[2]
+    return (yy + zz, xx + zz, xx + yy, -mass * a[0] * a[1], -mass * a[0] * a[2], -mass * a[1] * a[2])
+
+
+@leaf
+def felt(C, moments, spins):
+    """The inertia of a leaf as its core feels it: C diag(moments) C^T for a rotation matrix C, without the moment about
+    the leaf's z axis if it spins freely."""
+    # C diag(1, 1, 1) C^T = 1 saves a column
+    along = outer(moments[0] - moments[1], (C[0], C[3], C[6]))
+    about = outer((1.0 - spins) * moments[2] - moments[1], (C[2], C[5], C[8]))
+    x, y, z, xy, xz, yz = plus(along, about)
+    return (x + moments[1], y + moments[1], z + moments[1], xy, xz, yz)
+
+
+@leaf
+def solve_symmetric(m, b):
+    """m^-1 b by cofactors."""
+    c00 = m[1] * m[2] - m[5] * m[5]
+    c01 = m[4] * m[5] - m[3] * m[2]
+    c02 = m[3] * m[5] - m[4] * m[1]
+    k = 1.0 / (m[0] * c00 + m[3] * c01 + m[4] * c02)
+    c11 = m[0] * m[2] - m[4] * m[4]
+    c12 = m[3] * m[4] - m[0] * m[5]
+    c22 = m[0] * m[1] - m[3] * m[3]
+    return scale(k, times((c00, c11, c22, c01, c02, c12), b))
+
+
+@leaf
+def _all(a):
+    """Sum over the four lanes of each of the three components of a vector."""
+    return (total(a[0]), total(a[1]), total(a[2]))
+
+
+@leaf
+def _sum(m):
+    """Sum over the four lanes of each of the six entries of a symmetric matrix."""
+    return (total(m[0]), total(m[1]), total(m[2]), total(m[3]), total(m[4]), total(m[5]))
+
+
+@leaf
+def eliminate(core, leaf):
+    """Accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
+    given = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
+    force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
+    torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(given, leaf.axis)))
+    mass, moment = core.mass + total(leaf.mass), _all(scale(leaf.mass, leaf.offset))
+    inverse = 1.0 / mass
+    points = point_inertia(leaf.mass, leaf.offset)
+    fixed = plus(core.inertia, plus(point_inertia(-inverse, moment), _sum(points)))
+    whole_force = add(core.force, _all(force))
+    whole_torque = add(core.torque, _all(add(torque, cross(leaf.offset, force))))
+    alpha = solve_symmetric(
+        plus(fixed, _sum(leaf.inertia)), subtract(whole_torque, scale(inverse, cross(moment, whole_force)))
+    )
+    a = scale(inverse, add(whole_force, cross(moment, alpha)))
+    # back to the leaves, eqs. (8.40), (8.41)
+    turned = add(alpha, leaf.turn)
+    relative = add(cross(alpha, leaf.offset), leaf.drift)
+    spin = given * (1.0 / leaf.axial) - leaf.spins * dot(leaf.axis, turned)
+    return Result(
+        a,
+        alpha,
+        relative,
+        add(turned, scale(spin, leaf.axis)),
+        spin,
+        subtract(scale(leaf.mass, add(a, relative)), leaf.force),
+        subtract(add(times(leaf.inertia, turned), scale(given, leaf.axis)), leaf.torque),
+    )

@@ -1,0 +1,74 @@
+"""XYZ Euler (Cardan) angles, exactly as in the paper's section 4.2: A = Ax(roll) Ay(pitch) Az(yaw).
+
+Angles are (roll, pitch, yaw) [rad]; A takes body coordinates to world; matrices are nine floats in row order.
+"""
+
+import math
+
+from lapwing.dynamics.vector import add, apply, apply_transposed, cross, matmul, transpose
+from lapwing.kernels import leaf
+
+SINGULAR = 1e-6  # |cos(pitch)| below which the angles are called singular: their rates lose six of sixteen digits
+
+
+@leaf
+def rotation(angles):
+    """A of shape (3, 3), body to world (theory.md, eq. (8.1))."""
+    cx, sx = math.cos(angles[0]), math.sin(angles[0])
+    cy, sy = math.cos(angles[1]), math.sin(angles[1])
+    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    return (
+        cy * cz, -cy * sz, sy,
+        cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy,
+        sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy,
+    )  # fmt: skip
+
+
+@leaf
+def rate_matrix(angles):
+    """G-bar: omega_body = G-bar d(angles)/dt (theory.md, eq. (8.2)); its determinant is cos(pitch)."""
+    cy, sy = math.cos(angles[1]), math.sin(angles[1])
+    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    return (cy * cz, sz, 0.0, -cy * sz, cz, 0.0, sy, 0.0, 1.0)
+
+
+@leaf
+def rate_matrix_derivative(angles, rates):
+    """d(G-bar)/dt for angle rates [rad/s] (theory.md, eq. (8.3))."""
+    cy, sy = math.cos(angles[1]), math.sin(angles[1])
+    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    dy, dz = rates[1], rates[2]
+    return (
+        -sy * cz * dy - cy * sz * dz, cz * dz, 0.0,
+        sy * sz * dy - cy * cz * dz, -sz * dz, 0.0,
+        cy * dy, 0.0, 0.0,
+    )  # fmt: skip
+
+
+@leaf
+def rotational_mass(G, inertia):
+    """G-bar^T I G-bar, the rotational block of the mass matrix (theory.md, eq. (8.5))."""
+    return matmul(transpose(G), matmul(inertia, G))
+
+
+@leaf
+def quadratic_velocity(G, inertia, omega_body, bias):
+    """-G-bar^T (omega x I omega + I bias) with bias = d(G-bar)/dt d(angles)/dt (theory.md, eq. (8.6))."""
+    gyroscopic = cross(omega_body, apply(inertia, omega_body))
+    total = add(gyroscopic, apply(inertia, bias))
+    return apply_transposed(G, (-total[0], -total[1], -total[2]))
+
+
+@leaf
+def angles_of(R):
+    """(roll, pitch, yaw) of a rotation matrix, pitch in [-pi/2, pi/2] (theory.md, eq. (8.4))."""
+    return (math.atan2(-R[5], R[8]), math.atan2(R[2], math.hypot(R[0], R[1])), math.atan2(-R[1], R[0]))
+
+
+@leaf
+def rates_of(angles, omega_body):
+    """d(angles)/dt [rad/s] of an angular velocity; divides by cos(pitch) (theory.md, eq. (8.4))."""
+    cy, sy = math.cos(angles[1]), math.sin(angles[1])
+    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    roll = (cz * omega_body[0] - sz * omega_body[1]) / cy
+    return (roll, sz * omega_body[0] + cz * omega_body[1], omega_body[2] - sy * roll)

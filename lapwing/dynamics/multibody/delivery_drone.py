@@ -1,0 +1,202 @@
+"""The five-body delivery drone in least coordinates, for the plant: chassis pose and four propeller angles.
+
+No constraint can drift; the multibody system is solved on the fast path at every call. Built from numbers passed in.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.multibody.arrowhead_solver import Core, Leaf, eliminate
+from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.simd import apart, beside, separate
+
+Four = tuple[float, ...]
+
+
+class Drone(NamedTuple):
+    """Mass properties; the chassis carries the payload. Propeller k turns about z, its centre of mass at hubs[k]."""
+
+    mass: float  # chassis [kg]
+    inertia: Vec3  # chassis about its centre of mass, principal moments along the body axes [kg m^2]
+    hubs: tuple[Vec3, ...]  # [m], chassis axes
+    propeller_mass: Four  # [kg]
+    propeller_inertia: tuple[Vec3, ...]  # principal moments, x along the blade, z the spin axis [kg m^2]
+    spins: Four  # 1: torque-driven, 0: imposed speed
+    held: Four = (1.0, 1.0, 1.0, 1.0)  # 0: torn off
+
+
+class DroneState(NamedTuple):
+    """A state tree for `lapwing.dynamics.integrators`."""
+
+    position_world: Vec3  # of the chassis' centre of mass [m]
+    attitude: Quaternion
+    velocity_world: Vec3  # [m/s]
+    omega_body: Vec3  # [rad/s]
+    angles: Four  # of the propellers about z relative to the chassis [rad]
+    speeds: Four  # [rad/s]
+
+
+class Loads(NamedTuple):
+    """What acts from outside and what the motors do; thrust and aerodynamic torque act on the propellers."""
+
+    force_world: Vec3  # at the chassis' centre of mass, gravity not included [N]
+    torque_body: Vec3  # on the chassis [N m]
+    thrust: Four  # along body z at each hub [N]
+    aerodynamic_torque: Four  # about body z on each propeller, against its turning [N m]
+    drive: Four  # motor torque chassis -> propeller about z [N m] if it spins; imposed acceleration [rad/s^2] if not
+    gravity_world: Vec3  # [m/s^2]
+
+
+class Accelerations(NamedTuple):
+    """Accelerations, and the reactions between chassis and propellers."""
+
+    acceleration_world: Vec3  # of the chassis' centre of mass [m/s^2]
+    angular_acceleration_body: Vec3  # [rad/s^2]
+    spin_acceleration: Four  # of the propellers relative to the chassis [rad/s^2]
+    drive_torque: Four  # chassis -> propeller about z [N m]
+    reaction_force_body: tuple[Vec3, ...]  # chassis -> propeller [N]
+    reaction_torque_body: tuple[Vec3, ...]  # the same about the hub [N m], its z the drive torque
+
+
+class Flight(NamedTuple):
+    """Parameters of `rate`: a drone and its loads, constant over a step."""
+
+    drone: Drone
+    loads: Loads
+
+
+def delivery_drone(
+    *,
+    central_frame: float,
+    payload: float,
+    frame_inertia: Sequence[float],
+    propeller: float,
+    propeller_inertia: Sequence[float],
+    arm_length: float,
+    rotor_sign_x: Sequence[float],
+    rotor_sign_y: Sequence[float],
+    driven: str = "torque",
+) -> Drone:
+    """The paper's five bodies (Tables 2, 3) from SI numbers under the names of facts/delivery_drone.toml.
+
+    Args:
+        central_frame, payload, propeller: masses [kg].
+        frame_inertia, propeller_inertia: principal moments [kg m^2], shape (3,).
+        arm_length: hub distance from the chassis' centre of mass [m]; the signs place hub k at 45 degrees.
+        driven: "torque" (10 degrees of freedom) or "speed" (6).
+
+    Raises:
+        ValueError: a mass or moment that is not positive, signs that are not +1 or -1, an unknown drive.
+    """
+    positive = {
+        "central_frame": (central_frame,), "propeller": (propeller,), "arm_length": (arm_length,),
+        "frame_inertia": frame_inertia, "propeller_inertia": propeller_inertia,
+    }  # fmt: skip
+    for key, values in positive.items():
+        if not all(math.isfinite(v) and v > 0.0 for v in values):
+            raise ValueError(f"{key} must be positive, not {values}")
+    if not payload >= 0.0:
+        raise ValueError(f"payload must not be negative, not {payload}")
+    if driven not in ("torque", "speed"):
+        raise ValueError(f"unknown drive {driven!r}: choose one of torque, speed")
+    signs = list(zip(rotor_sign_x, rotor_sign_y, strict=True))
+    if len(signs) != 4 or any(abs(s) != 1 for pair in signs for s in pair):
+        raise ValueError(f"rotor_sign_x and rotor_sign_y must hold +1 or -1 for four rotors, not {signs}")
+    side = arm_length / math.sqrt(2.0)
+    ix, iy, iz = (float(v) for v in frame_inertia)
+    bx, by, bz = (float(v) for v in propeller_inertia)
+    spins = 1.0 if driven == "torque" else 0.0
+    return Drone(
+        float(central_frame + payload),
+        (ix, iy, iz),
+        tuple((sx * side, sy * side, 0.0) for sx, sy in signs),
+        (float(propeller),) * 4,
+        ((bx, by, bz),) * 4,
+        (spins,) * 4,
+    )
+
+
+@leaf
+def _double(angles):
+    """Cosines and sines of twice the angles."""
+    c, s = math.cos, math.sin
+    a, b, d, e = 2.0 * angles[0], 2.0 * angles[1], 2.0 * angles[2], 2.0 * angles[3]
+    return beside((c(a), c(b), c(d), c(e))), beside((s(a), s(b), s(d), s(e)))
+
+
+@leaf
+def _propellers(d, x, loads, g):
+    """The propellers as leaves in chassis axes; their inertia turns with them at twice the speed (theory.md, eq.
+    (8.50))."""
+    w, speed, spins, held = x.omega_body, beside(x.speeds), beside(d.spins), beside(d.held)
+    offset, drive = beside(d.hubs), beside(loads.drive)
+    mass, inertia = held * beside(d.propeller_mass), beside(d.propeller_inertia)
+    moments = scale(held, inertia)
+    cosine, sine = _double(x.angles)
+    mean, half = 0.5 * (moments[0] + moments[1]), 0.5 * (moments[0] - moments[1])
+    c, s = half * cosine, half * sine
+    own = (w[0], w[1], w[2] + speed)
+    momentum = ((mean + c) * w[0] + s * w[1], s * w[0] + (mean - c) * w[1], moments[2] * own[2])
+    gyroscopic = cross(own, momentum)
+    weight, zero = scale(mass, g), 0.0 * mass
+    return Leaf(
+        mass,
+        (mean + c, mean - c, (1.0 - spins) * moments[2], s, zero, zero),
+        offset,
+        (zero, zero, 1.0 + zero),
+        inertia[2],
+        spins,
+        held * drive,
+        cross(w, cross(w, offset)),
+        (w[1] * speed, -w[0] * speed, drive * (1.0 - spins)),
+        (weight[0], weight[1], weight[2] + held * beside(loads.thrust)),
+        (-gyroscopic[0], -gyroscopic[1], held * beside(loads.aerodynamic_torque) - gyroscopic[2]),
+    )
+
+
+@leaf
+def motion(d, loads, x):
+    """Accelerations and reactions of a drone under loads in a state (theory.md, eqs. (8.40)-(8.45), (8.50))."""
+    R = quaternion.rotation_matrix(x.attitude)
+    g = apply_transposed(R, loads.gravity_world)
+    w = x.omega_body
+    core = Core(
+        d.mass,
+        (d.inertia[0], d.inertia[1], d.inertia[2], 0.0, 0.0, 0.0),
+        add(scale(d.mass, g), apply_transposed(R, loads.force_world)),
+        subtract(loads.torque_body, cross(w, multiply(d.inertia, w))),
+    )
+    s = eliminate(core, _propellers(d, x, loads, g))
+    held, spins = beside(d.held), beside(d.spins)
+    spin = held * (s.spin + (1.0 - spins) * beside(loads.drive))
+    return Accelerations(
+        apply(R, s.acceleration),
+        s.angular_acceleration,
+        apart(spin),
+        apart(s.reaction_torque[2]),
+        separate(s.reaction_force),
+        separate(s.reaction_torque),
+    )
+
+
+@kernel
+def rate(p, t, x):
+    """Tangent of a `DroneState` for parameters `Flight`."""
+    m = motion(p.drone, p.loads, x)
+    return DroneState(
+        x.velocity_world, x.omega_body, m.acceleration_world, m.angular_acceleration_body, x.speeds, m.spin_acceleration
+    )
+
+
+RATES[Flight] = rate
+
+
+@kernel
+def solve(drone, loads, x):
+    """`motion` as a function of its own, for callers outside compiled code."""
+    return motion(drone, loads, x)

@@ -1,0 +1,126 @@
+"""Bringing a state back onto its constraints, on position and on velocity level (theory.md, section 8.6).
+
+`project` moves every body by the shortest way in the metric of the masses. `partition` keeps the independent
+coordinates and velocities that the integration produced and solves for the dependent ones: the paper's
+generalised coordinate partitioning. Baumgarte's feedback is `augmented.stabilised`.
+"""
+
+import numpy as np
+
+from lapwing.dynamics.multibody import pivoted_qr
+from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, divide_root_transposed, factor_rows
+from lapwing.dynamics.multibody.body_kinematics import displaced, place
+from lapwing.dynamics.multibody.constraints import equations, in_coordinates, velocity_defect
+from lapwing.kernels import apart, kernel
+
+NONE, PARTITION, PROJECTION, BAUMGARTE = 0, 1, 2, 3
+NAMES = {"none": NONE, "partitioning": PARTITION, "projection": PROJECTION, "baumgarte": BAUMGARTE}
+
+ENOUGH = 1e-13  # position defect at which Newton's iteration stops: round-off of coordinates of a few metres
+ITERATIONS = 8
+
+
+@kernel
+def largest(x):
+    """Largest absolute value, NaN if there is one, 0 of nothing."""
+    out = 0.0
+    for value in x:
+        if not abs(value) <= out:
+            out = abs(value)
+    return out
+
+
+@kernel
+def rows(a, configuration, velocity, drive):
+    """(placement, equations) at a state, in its own coordinates."""
+    p = place(configuration, velocity)
+    return p, in_coordinates(equations(a, p, drive), p)
+
+
+@kernel
+def defects(a, configuration, velocity, drive):
+    """Largest defect of all constraints: (position level [m, -], velocity level [m/s, rad/s])."""
+    _, e = rows(a, configuration, velocity, drive)
+    return largest(e.residual), largest(velocity_defect(e, velocity))
+
+
+@kernel
+def ranks(a, configuration, velocity, drive):
+    """(rank of the holonomic rows, rank of all rows) at a consistent state."""
+    p, e = rows(a, configuration, velocity, drive)
+    _, _, held = factor_rows(a, p, e, len(e.residual), RANK_TOLERANCE, ANY)
+    _, _, every = factor_rows(a, p, e, len(e.target), RANK_TOLERANCE, ANY)
+    return held.rank, every.rank
+
+
+@kernel
+def _tolerance(e):
+    """Rank tolerance off the constraints: a dependent row then has an independent part of the order of the defect."""
+    return max(RANK_TOLERANCE, min(10.0 * largest(e.residual), 1e-3))
+
+
+@apart
+def project(a, configuration, velocity, drive, ranks):
+    """Nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
+
+    `ranks`: upper bounds of the rank of the holonomic rows and of all rows.
+    """
+    held = 5 * len(a.joint_bodies)
+    p, e = rows(a, configuration, velocity, drive)
+    for _ in range(ITERATIONS):
+        if largest(e.residual) < ENOUGH:
+            break
+        root, rotational, f = factor_rows(a, p, e, held, _tolerance(e), ranks[0])
+        y, _, _ = pivoted_qr.shortest(f, -e.residual)
+        divide_root_transposed(root, rotational, y)
+        configuration = displaced(configuration, y.reshape(-1, 6))
+        p, e = rows(a, configuration, velocity, drive)
+    if len(e.target) > 0:
+        root, rotational, f = factor_rows(a, p, e, len(e.target), _tolerance(e), ranks[1])
+        y, _, _ = pivoted_qr.shortest(f, -velocity_defect(e, velocity))
+        divide_root_transposed(root, rotational, y)
+        velocity = velocity + y.reshape(-1, 6)
+    return configuration, velocity
+
+
+@kernel
+def _dependent(f, width):
+    """Mask of the columns that a factorisation of J found independent of each other: the dependent coordinates."""
+    mask = np.zeros(width, np.bool_)
+    for k in range(f.rank):
+        mask[f.order[k]] = True
+    return mask
+
+
+@kernel
+def _correction(jacobian, mask, defect, tolerance, most):
+    """Increment of the masked coordinates alone that takes the defect away, shape (6 n,)."""
+    reduced = jacobian.copy()
+    for c in range(reduced.shape[1]):
+        if not mask[c]:
+            reduced[:, c] = 0.0
+    return pivoted_qr.basic(pivoted_qr.factor(reduced, tolerance, most), -defect)
+
+
+@apart
+def partition(a, configuration, velocity, drive, ranks):
+    """Generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)): column pivoting of the Jacobian picks the
+    dependent coordinates, Newton's iteration corrects those alone; the same for the velocities. `ranks` as above."""
+    held, width = 5 * len(a.joint_bodies), 6 * len(a.mass)
+    _, e = rows(a, configuration, velocity, drive)
+    if held > 0:
+        jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
+        mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[0]), width)
+        for _ in range(ITERATIONS):
+            if largest(e.residual) < ENOUGH:
+                break
+            change = _correction(jacobian, mask, e.residual, _tolerance(e), ranks[0])
+            configuration = displaced(configuration, change.reshape(-1, 6))
+            _, e = rows(a, configuration, velocity, drive)
+            jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
+    if len(e.target) > 0:
+        jacobian = np.ascontiguousarray(e.jacobian_t.T)
+        mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[1]), width)
+        change = _correction(jacobian, mask, velocity_defect(e, velocity), _tolerance(e), ranks[1])
+        velocity = velocity + change.reshape(-1, 6)
+    return configuration, velocity

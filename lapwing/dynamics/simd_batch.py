@@ -1,0 +1,181 @@
+"""Many multirotors stepped side by side: blocks of 16 members, a column of 16 numbers for each number of a member.
+
+LLVM vectorises the loop over the members of a block, because the columns of one array are a constant distance of 16
+numbers apart. What cannot be vectorised, random draws and contact, goes member by member. The operations on the numbers
+of a member are those of `multirotor.advance`, in the same order, and so are the bits.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.core.typing.templates import signature
+from numba.extending import intrinsic
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
+from lapwing.dynamics.vehicles import multirotor_stepper
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
+from lapwing.kernels import kernel, leaf, vectorised
+from lapwing.kernels.codegen import define, each_index, implements
+from lapwing.kernels.row_packing import construction, leaves, to_row, width
+
+WIDTH = 16  # members in a block
+
+
+class Member(NamedTuple):
+    """All numbers of a member; those that a step changes stand in front."""
+
+    motion: Any
+    memory: tuple
+    body: AnyMassProperties  # of this exchange interval
+    voltage: PerRotor  # [V]
+    start: float  # [s] of this exchange interval
+    parameters: MultirotorParameters
+
+
+def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
+    """A member before its first step."""
+    off = (0.0,) * len(parameters.layout.x_body)
+    return Member(state.motion, state.memory, parameters.body, off, 0.0, parameters)
+
+
+def blocks(members: int, like: Member) -> np.ndarray:
+    """Memory for so many members, shape (blocks, columns, WIDTH)."""
+    return np.zeros((-(-members // WIDTH), width(like), WIDTH))
+
+
+def put(memory: np.ndarray, index: int, value: Member) -> None:
+    """Give a member its numbers."""
+    memory[index // WIDTH, :, index % WIDTH] = to_row(value)
+
+
+@vectorised
+def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count):
+    """Advance the members of the blocks `first` to before `last` by `count` exchange intervals.
+
+    Args:
+        method: `Method()` of an integrator's module.
+        like: a Member.
+        memory: of `blocks`, flat.
+        columns: of a block.
+        keys: of the members' random numbers, shape (members, 2); members are a multiple of WIDTH.
+        ticks: of each member's exchange, shape (members,); advanced.
+        commands: [V] of each motor, shape (members, rotors).
+        h: [s] step.
+        n: steps in an exchange interval.
+        first: block.
+        last: block after the last.
+        count: exchange intervals.
+    """
+    for block in range(first, last):
+        base = block * columns * WIDTH
+        for _ in range(count):
+            for lane in range(WIDTH):
+                m = block * WIDTH + lane
+                _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
+                ticks[m] += 1
+            split, alike = _parts(like, memory, base, h), True
+            for lane in range(1, WIDTH):
+                alike = alike and _parts(like, memory, base + lane, h) == split
+            part, i = h / split, 0
+            while alike and i < n * split and _all_asleep(like, memory, base, part):
+                for lane in range(WIDTH):
+                    _airborne_step(method, like, memory, base + lane, i, part)
+                i += 1
+            for lane in range(WIDTH if i < n * split else 0):
+                split = _parts(like, memory, base + lane, h)
+                _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
+
+
+@leaf
+def _parts(like, memory, at, h):
+    return multirotor_stepper.parts(take(like, memory, at).parameters.layout, h)
+
+
+@leaf
+def _command(commands, member, i):
+    return commands[member, i]
+
+
+@leaf
+def _begin(like, memory, at, key, tick, commands, member, interval):
+    m = take(like, memory, at)
+    asked = each_index(_command, m.voltage, commands, member)
+    drive = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), asked, interval)
+    give((m.motion, drive.memory, drive.body, drive.voltage, tick * interval), memory, at)
+
+
+@leaf
+def _all_asleep(like, memory, base, h):
+    """Can no member of a block be reached by an effect that sleeps?"""
+    awake = 0
+    for lane in range(WIDTH):
+        m = take(like, memory, base + lane)
+        if not hooks.all_asleep(m.parameters.effects, m.memory, seen(m.parameters.layout, m.motion), h):
+            awake += 1
+    return awake == 0
+
+
+@leaf
+def _airborne_step(method, like, memory, at, i, h):
+    m = take(like, memory, at)
+    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+    give((multirotor_stepper.airborne_step(method, drive, m.start + i * h, m.motion, h),), memory, at)
+
+
+@kernel
+def _finish(method, like, memory, at, interval, h, first, n):
+    """The rest of an exchange interval of one member, by itself."""
+    m = take(like, memory, at)
+    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+    give(multirotor_stepper.steps(method, drive, m.motion, m.start, m.start + interval, h, first, n), memory, at)
+
+
+@intrinsic
+def _peek(context, array, index):
+    """array[index] without a look whether the index is negative."""
+
+    def loaded(context, builder, sig, args):
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        return builder.load(builder.gep(data, [args[1]]))
+
+    return signature(types.float64, array, types.intp), loaded
+
+
+@intrinsic
+def _poke(context, array, index, value):
+    def stored(context, builder, sig, args):
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        number = args[2] if args[2].type == ir.DoubleType() else builder.sitofp(args[2], ir.DoubleType())
+        builder.store(number, builder.gep(data, [args[1]]))
+        return context.get_dummy_value()
+
+    return signature(types.none, array, types.intp, value), stored
+
+
+def take(like: Any, memory: np.ndarray, at: int) -> Any:
+    """The tree of the type of `like` whose numbers stand `WIDTH` apart from `at` on."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(take, inline=True)
+def _take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
+    result, names = construction(like, lambda column: f"peek(memory, at + {column * WIDTH})")
+    return define("take(like, memory, at)", {"peek": _peek, **names}, f"return {result}")
+
+
+def give(tree: Any, memory: np.ndarray, at: int) -> None:
+    """Put a tree where `take` would take it from."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(give, inline=True)
+def _give(tree: types.Type, memory: types.Type, at: types.Type) -> Callable:
+    lines = [f"poke(memory, at + {k * WIDTH}, {path})" for k, path in enumerate(leaves(tree, "tree"))]
+    return define("give(tree, memory, at)", {"poke": _poke}, *lines, "return None")

@@ -1,0 +1,152 @@
+"""A relief: a height over each point of the horizontal plane, and bodies with level tops that stand on it."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.kernels import kernel
+
+UP = (-0.0, -0.0, 1.0)  # normal of level ground
+
+
+class Relief(NamedTuple):
+    """Ground that is not level."""
+
+    slope: tuple[float, float]  # rise of the plane along world x and y
+    bump_height: float  # [m] A of bumps A sin(k x) sin(k y)
+    bump_wavenumber: float  # [rad/m] k
+    base: float  # [m] height at home without bumps and grid
+    grid: np.ndarray  # (rows along y, columns along x) heights [m]; (0, 0): none
+    corner: tuple[float, float]  # [m] world x and y of grid[0, 0]
+    spacing: float  # [m] of the grid
+    boxes: np.ndarray  # (n, 7) x, y of the centre, cosine and sine of the heading, half length and width, z of the top
+    cylinders: np.ndarray  # (n, 4) x, y of the axis, radius, z of the top
+    summit: float  # [m] nothing of the ground is higher over the plane through the origin with that slope
+
+
+@kernel
+def _between(t, x, y):
+    """(height, rise along x, rise along y) of the grid, bilinear; beyond its edge as at the edge."""
+    rows, columns = t.grid.shape
+    u, v = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
+    inside_x, inside_y = 0.0 <= u <= columns - 1.0, 0.0 <= v <= rows - 1.0
+    u, v = min(max(0.0, u), columns - 1.0), min(max(0.0, v), rows - 1.0)  # in this order NaN becomes 0
+    i, j = min(int(v), rows - 2), min(int(u), columns - 2)
+    q, p = v - i, u - j
+    a, b, c, d = t.grid[i, j], t.grid[i, j + 1], t.grid[i + 1, j], t.grid[i + 1, j + 1]
+    height = (1.0 - q) * ((1.0 - p) * a + p * b) + q * ((1.0 - p) * c + p * d)
+    rise_x = ((1.0 - q) * (b - a) + q * (d - c)) / t.spacing if inside_x else 0.0
+    rise_y = ((1.0 - p) * (c - a) + p * (d - b)) / t.spacing if inside_y else 0.0
+    return height, rise_x, rise_y
+
+
+@kernel
+def field(t, x, y):
+    """(height [m], rise along x, rise along y) of the ground without what stands on it."""
+    a, b = t.slope
+    height = t.base + a * x + b * y
+    if t.bump_height != 0.0:
+        h, k = t.bump_height, t.bump_wavenumber
+        sx, cx, sy, cy = math.sin(k * x), math.cos(k * x), math.sin(k * y), math.cos(k * y)
+        height, a, b = height + h * sx * sy, a + h * k * cx * sy, b + h * k * sx * cy
+    if t.grid.size > 0:
+        more, rise_x, rise_y = _between(t, x, y)
+        height, a, b = height + more, a + rise_x, b + rise_y
+    return height, a, b
+
+
+@kernel
+def _normal(a, b):
+    steep = 1.0 / math.sqrt(1.0 + a * a + b * b)
+    return (-a * steep, -b * steep, steep)
+
+
+@kernel
+def _in_box(box, x, y):
+    """(distance [m] to the nearest of its four sides, negative outside, and the x and y of that side's normal)."""
+    dx, dy, c, s = x - box[0], y - box[1], box[2], box[3]
+    u, v = c * dx + s * dy, c * dy - s * dx
+    along, across = box[4] - abs(u), box[5] - abs(v)
+    if along < across:
+        sign = math.copysign(1.0, u)
+        return along, sign * c, sign * s
+    sign = math.copysign(1.0, v)
+    return across, -sign * s, sign * c
+
+
+@kernel
+def _in_cylinder(cylinder, x, y):
+    """The same of a cylinder's wall."""
+    dx, dy = x - cylinder[0], y - cylinder[1]
+    radius = math.hypot(dx, dy)
+    if radius == 0.0:
+        return cylinder[2], 1.0, 0.0
+    return cylinder[2] - radius, dx / radius, dy / radius
+
+
+@kernel
+def top(t, x, y):
+    """(height [m], normal) of what a plumb line meets first."""
+    height, a, b = field(t, x, y)
+    normal = _normal(a, b)
+    for i in range(t.boxes.shape[0]):
+        if t.boxes[i, 6] > height and _in_box(t.boxes[i], x, y)[0] >= 0.0:
+            height, normal = t.boxes[i, 6], UP
+    for i in range(t.cylinders.shape[0]):
+        if t.cylinders[i, 3] > height and _in_cylinder(t.cylinders[i], x, y)[0] >= 0.0:
+            height, normal = t.cylinders[i, 3], UP
+    return height, normal
+
+
+@kernel
+def _deeper(found, place, top_z, wall):
+    """The deeper of what is found and of being within a body: as deep as its nearest face is near."""
+    under = top_z - place[2]
+    inside, x, y = wall
+    if under <= 0.0 or inside <= 0.0:
+        return found
+    depth = min(under, inside)
+    if depth <= found[0]:
+        return found
+    return (depth, UP) if under <= inside else (depth, (x, y, 0.0))
+
+
+@kernel
+def depth(t, place):
+    """(depth [m] of a point in the ground or in a body on it, not positive outside; normal of the nearest face)."""
+    height, a, b = field(t, place[0], place[1])
+    normal = _normal(a, b)
+    found = ((height - place[2]) * normal[2], normal)
+    for i in range(t.boxes.shape[0]):
+        found = _deeper(found, place, t.boxes[i, 6], _in_box(t.boxes[i], place[0], place[1]))
+    for i in range(t.cylinders.shape[0]):
+        found = _deeper(found, place, t.cylinders[i, 3], _in_cylinder(t.cylinders[i], place[0], place[1]))
+    return found
+
+
+@kernel
+def ray(t, origin, direction, longest):
+    """Distance [m] along a unit vector to the ground, inf where it is farther than `longest`; 0 from within it."""
+    before, after = 0.0, 0.0
+    while True:
+        x, y = origin[0] + after * direction[0], origin[1] + after * direction[1]
+        gap = origin[2] + after * direction[2] - top(t, x, y)[0]
+        if gap <= 0.0:
+            break
+        if after > longest:
+            return math.inf
+        before, after = after, after + max(FINEST, CAUTION * gap)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (before + after)
+        x, y = origin[0] + middle * direction[0], origin[1] + middle * direction[1]
+        if origin[2] + middle * direction[2] > top(t, x, y)[0]:
+            before = middle
+        else:
+            after = middle
+    return after if after <= longest else math.inf
+
+
+FINEST = 0.02  # [m] a ray may pass over what is narrower
+CAUTION = 0.25  # of the gap under a ray that it goes on by
+HALVINGS = 50

@@ -1,0 +1,117 @@
+"""From a description of the ground to what kernels are given."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.terrain.heightfield import Relief, field
+from lapwing.dynamics.terrain.terrain_queries import LEVEL, Level
+
+FAR = 1e5  # [m] how far a step goes on where nothing ends it
+STEEPEST = 1.0  # tangent of 45 degrees
+
+Box = tuple[float, float, float, float, float, float]  # x, y of the centre, length, width, heading [rad], z of the top
+Cylinder = tuple[float, float, float, float]  # x, y of the axis, radius, z of the top
+
+
+def relief(
+    slope: tuple[float, float] = (0.0, 0.0),
+    bump_height: float = 0.0,
+    bump_length: float = 1.0,
+    steps: Sequence[tuple[float, float]] = (),
+    step_heading: float = 0.0,
+    boxes: Sequence[Box] = (),
+    cylinders: Sequence[Cylinder] = (),
+    grid: np.ndarray | None = None,
+    corner: tuple[float, float] = (0.0, 0.0),
+    spacing: float = 1.0,
+) -> Level | Relief:
+    """The ground that these make together; level ground where they make none (theory.md, eq. (2.30)). Lengths in m.
+
+    Args:
+        slope: rise along world x and y.
+        bump_height: A of bumps A sin(k x) sin(k y).
+        bump_length: their wavelength 2 pi / k.
+        steps: (distance from home, rise), with growing distances above 0.
+        step_heading: direction in which they follow one another [rad], 0 along x.
+        boxes: that stand on the ground.
+        cylinders: that stand on it, upright.
+        grid: heights, rows along world y and columns along x; they count from that at home.
+        corner: world x and y of grid[0, 0].
+        spacing: of the grid.
+
+    Raises:
+        KeyedError: ground steeper than 45 degrees, a grid that does not hold home, steps out of order.
+    """
+    heights = np.zeros((0, 0)) if grid is None else _checked(grid, corner, spacing)
+    steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
+    if steep > STEEPEST:
+        key = "bump_height" if bump_height else "slope"
+        raise KeyedError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
+    base, treads = _treads(steps, step_heading)
+    rows = [_row(box) for box in boxes] + treads
+    plane = [[corner @ np.array(slope) for corner in _corners(row)] for row in rows]
+    over = [row[6] - min(z) for row, z in zip(rows, plane, strict=True)]
+    over += [z - slope[0] * x - slope[1] * y + radius * math.hypot(*slope) for x, y, radius, z in cylinders]
+    summit = max([base + bump_height + (float(heights.max()) if heights.size else 0.0), *over])
+    found = Relief(
+        (float(slope[0]), float(slope[1])), float(bump_height), 2.0 * math.pi / bump_length, base, heights,
+        (float(corner[0]), float(corner[1])), float(spacing),
+        np.array(rows, dtype=float).reshape(-1, 7), np.array(cylinders, dtype=float).reshape(-1, 4), float(summit),
+    )  # fmt: skip
+    if tuple(slope) == (0.0, 0.0) and bump_height == 0.0 and not (heights.size or rows or len(cylinders)):
+        return LEVEL
+    if heights.size:  # z counts from the ground at home
+        found = found._replace(grid=heights - field(found, 0.0, 0.0)[0])
+        found = found._replace(summit=summit + float(found.grid.max() - heights.max()))
+    return found
+
+
+def _checked(grid: np.ndarray, corner: tuple[float, float], spacing: float) -> np.ndarray:
+    heights = np.ascontiguousarray(grid, dtype=float)
+    if heights.ndim != 2 or min(heights.shape) < 2:
+        raise KeyedError("grid.heights", f"got an array of shape {heights.shape}", "at least 2 rows and 2 columns")
+    rows, columns = heights.shape
+    if not (0.0 <= -corner[0] <= (columns - 1) * spacing and 0.0 <= -corner[1] <= (rows - 1) * spacing):
+        x, y = corner[0] + (columns - 1) * spacing, corner[1] + (rows - 1) * spacing
+        reach = f"it reaches from ({corner[0]:g}, {corner[1]:g}) to ({x:g}, {y:g}) m"
+        raise KeyedError("grid.corner", f"the grid does not hold home: {reach}", "(0, 0) within it")
+    rise = max(abs(np.diff(heights, axis=axis)).max() for axis in (0, 1)) / spacing
+    if rise > STEEPEST:
+        message = f"ground steeper than 45 degrees, tangent {rise:.2f}"
+        raise KeyedError(
+            "grid.heights", message, "a tangent of at most 1 between neighbours; steps and boxes are walls"
+        )
+    return heights
+
+
+def _row(box: Box) -> list[float]:
+    x, y, length, width, heading, z = box
+    return [x, y, math.cos(heading), math.sin(heading), 0.5 * length, 0.5 * width, z]
+
+
+def _corners(row: Sequence[float]) -> list[np.ndarray]:
+    x, y, c, s, half_length, half_width, _ = row
+    ends = [(u, v) for u in (-half_length, half_length) for v in (-half_width, half_width)]
+    return [np.array((x + c * u - s * v, y + s * u + c * v)) for u, v in ends]
+
+
+def _treads(steps: Sequence[tuple[float, float]], heading: float) -> tuple[float, list[list[float]]]:
+    """(height of the lowest level, a box for each that is higher, under all that is higher still beside it)."""
+    at = [distance for distance, _ in steps]
+    if any(later <= earlier for earlier, later in zip([0.0, *at], at, strict=False)):
+        raise KeyedError("steps.distance", f"got {at}", "growing distances above 0 m")
+    level = [0.0, *np.cumsum([rise for _, rise in steps]).tolist()]
+    edge = [-FAR, *at, FAR]
+    base, rows = min(level), []
+    for i, height in enumerate(level):
+        if height <= base:
+            continue
+        first = next((j + 1 for j in range(i - 1, -1, -1) if level[j] < height), 0)
+        last = next((j for j in range(i + 1, len(level)) if level[j] < height), len(level))
+        start, stop = edge[first], edge[last]
+        c, s, middle = math.cos(heading), math.sin(heading), 0.5 * (start + stop)
+        rows.append([c * middle, s * middle, c, s, 0.5 * (stop - start), FAR, height])
+    return base, rows

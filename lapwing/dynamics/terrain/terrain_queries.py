@@ -1,0 +1,72 @@
+"""What is asked of the ground, whichever it is; in Python as in compiled code."""
+
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.terrain.heightfield import UP, depth, top
+from lapwing.dynamics.vector import Vec3, dot
+from lapwing.kernels.codegen import implements
+
+
+class Level(NamedTuple):
+    """Level ground at world z = 0."""
+
+
+LEVEL = Level()
+
+
+def upright(terrain: Any) -> Vec3:
+    """The vector whose product with a position [m] is the height over the plane of the slope, along world z."""
+    return UP if isinstance(terrain, Level) else (-terrain.slope[0], -terrain.slope[1], 1.0)
+
+
+@implements(upright, inline=True)
+def _upright(terrain):
+    if terrain.instance_class is Level:
+        return lambda terrain: UP
+    return lambda terrain: (-terrain.slope[0], -terrain.slope[1], 1.0)
+
+
+def over_plane(terrain: Any, vector_world: Vec3) -> float:
+    """World z of a point [m], or of a velocity [m/s], over the plane of the slope."""
+    return vector_world[2] if isinstance(terrain, Level) else dot(upright(terrain), vector_world)
+
+
+@implements(over_plane, inline=True)
+def _over_plane(terrain, vector_world):
+    if terrain.instance_class is Level:
+        return lambda terrain, vector_world: vector_world[2]
+    return lambda terrain, vector_world: dot(upright(terrain), vector_world)
+
+
+def summit(terrain: Any) -> float:
+    """[m] over that plane, above which there is no ground."""
+    return 0.0 if isinstance(terrain, Level) else terrain.summit
+
+
+@implements(summit, inline=True)
+def _summit(terrain):
+    return (lambda terrain: 0.0) if terrain.instance_class is Level else (lambda terrain: terrain.summit)
+
+
+def surface(terrain: Any, x: float, y: float) -> tuple[float, Vec3]:
+    """(height [m], normal) of what a plumb line meets first at world x and y [m]."""
+    return (0.0, UP) if isinstance(terrain, Level) else top(terrain, x, y)
+
+
+@implements(surface, inline=True)
+def _surface(terrain, x, y):
+    if terrain.instance_class is Level:
+        return lambda terrain, x, y: (0.0, UP)
+    return lambda terrain, x, y: top(terrain, x, y)
+
+
+def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3]:
+    """(depth [m] of a point below the nearest face of the ground, not positive in the air; normal of that face)."""
+    return (-place_world[2], UP) if isinstance(terrain, Level) else depth(terrain, place_world)
+
+
+@implements(touch, inline=True)
+def _touch(terrain, place_world):
+    if terrain.instance_class is Level:
+        return lambda terrain, place_world: (-place_world[2], UP)
+    return lambda terrain, place_world: depth(terrain, place_world)

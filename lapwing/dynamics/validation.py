@@ -1,0 +1,167 @@
+"""What pydantic finds wrong with a table, as a `KeyedError` in the words of a user."""
+
+import types
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.field_comments import comments, split
+
+BOUNDS = {Gt: ("gt", "above"), Ge: ("ge", "at least"), Lt: ("lt", "below"), Le: ("le", "at most")}
+NAMES = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", dict: "a table"}
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+OF_NUMBERS = ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing", *(
+    "greater_than", "greater_than_equal", "less_than", "less_than_equal"))  # fmt: skip
+LONGEST = 60  # characters of a wrong value that are shown
+
+
+def fault(error: ValidationError, model: type) -> KeyedError:
+    """The most telling of the faults that pydantic found.
+
+    Args:
+        error: of validating a table as `model`.
+        model: a pydantic model, or a NamedTuple.
+
+    Returns:
+        The fault, its key relative to the table.
+    """
+    # A misspelt key also leaves another one missing: name the misspelling.
+    first: Any = min(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
+    kind, value, context = first["type"], first["input"], first.get("ctx", {})
+    location = [part for part in first["loc"] if part != "[key]"]  # [key]: the key itself is at fault
+    key = ".".join(map(str, location))
+    if kind in UNKNOWN_KEY:
+        return KeyedError.unknown(key, "key", location[-1], keys(follow(model, location[:-1])))
+    hint = follow(model, location)
+    if kind in ("missing", "missing_argument"):
+        return KeyedError(key, "missing", describe(hint) + _unit(model, location))
+    if kind == "value_error":
+        cause = context["error"]
+        return cause.under(key) if isinstance(cause, KeyedError) else KeyedError(key, str(cause))
+    unit = _unit(model, location) if kind in OF_NUMBERS else ""
+    return KeyedError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
+
+
+def _unit(model: type, location: Sequence[str | int]) -> str:
+    """ " [m/s]" where the class that declares the key at a location states its unit; "" where it does not."""
+    path = list(location)
+    while path and isinstance(path[-1], int):  # of a list the unit is that of all its numbers
+        path.pop()
+    if not path:
+        return ""
+    for table in _members(follow(model, path[:-1])):
+        if keys(table) and (unit := split(comments(table).get(str(path[-1]), ""))[0]):
+            return f" [{unit}]"
+    return ""
+
+
+def _expected(kind: str, message: str, context: dict[str, Any], hint: Any) -> str:
+    if kind in OF_NUMBERS and hint is not None:
+        return describe(hint)
+    if kind == "tuple_type":
+        return "a list"
+    if kind == "too_short":
+        return f"at least {context['min_length']} of them"
+    if kind == "string_pattern_mismatch":
+        return f"a text of the form {context['pattern']}"
+    if kind in ("string_type", "bool_type"):
+        return NAMES[str if kind == "string_type" else bool]
+    if keys(hint):
+        return f"a table of {', '.join(keys(hint))}"
+    return message.removeprefix("Input should be ").removeprefix("a valid ")
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
+
+
+def keys(hint: Any) -> list[str]:
+    """The keys of the table that an annotation stands for, as far as it is one."""
+    for member in _members(hint):
+        if isinstance(member, type) and issubclass(member, BaseModel):
+            return list(member.model_fields)
+        if hasattr(member, "_fields"):
+            return list(member._fields)
+    return []
+
+
+def follow(hint: Any, location: Sequence[str | int]) -> Any:
+    """The annotation at a location within what `hint` stands for, None where it cannot be followed."""
+    if not location:
+        return hint
+    part, *rest = location
+    members = _members(hint)
+    for member in members:
+        inner = _inner(member, part)
+        if inner is not None:
+            return follow(inner, rest)
+    return follow(hint, rest) if len(members) > 1 else None  # pydantic also names the member of a union
+
+
+def _inner(hint: Any, part: str | int) -> Any:
+    origin, arguments = get_origin(hint), get_args(hint)
+    if isinstance(part, int):
+        if origin is tuple and arguments and arguments[-1] is not Ellipsis:
+            return arguments[part] if part < len(arguments) else None
+        return arguments[0] if origin in (tuple, list) and arguments else None
+    if origin is dict:
+        return arguments[1]
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return _annotation(hint.model_fields.get(part))
+    if hasattr(hint, "_fields"):
+        return get_type_hints(hint, include_extras=True).get(part)
+    return None
+
+
+def _annotation(field: FieldInfo | None) -> Any:
+    """A field's annotation with its bounds."""
+    if field is None or not field.metadata:
+        return field and field.annotation
+    return Annotated[(field.annotation, *field.metadata)]  # type: ignore[return-value]
+
+
+def _members(hint: Any) -> list[Any]:
+    """What a value may be: the members of a union, or the annotation itself; without bounds and None."""
+    if get_origin(hint) is Annotated:
+        return _members(get_args(hint)[0])
+    if get_origin(hint) in (Union, types.UnionType):
+        return [member for part in get_args(hint) if part is not type(None) for member in _members(part)]
+    return [hint]
+
+
+def describe(hint: Any) -> str:
+    """What an annotation asks for, in words, for example "a number above 0 and at most 1"."""
+    bounds: list[str] = []
+    if get_origin(hint) is Annotated:
+        hint, *metadata = get_args(hint)
+        flat = [part for m in metadata for part in (m.metadata if isinstance(m, FieldInfo) else [m])]
+        bounds = [
+            f"{word} {getattr(m, name):g}" for m in flat for kind, (name, word) in BOUNDS.items() if type(m) is kind
+        ]
+    if get_origin(hint) in (Union, types.UnionType):
+        words = " or ".join(dict.fromkeys(describe(part) for part in get_args(hint) if part is not type(None)))
+    else:
+        words = _words(hint)
+    return f"{words} {' and '.join(bounds)}" if bounds else words
+
+
+def _words(hint: Any) -> str:
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return describe(hint)
+    if origin is Literal:
+        return " or ".join(map(repr, arguments))
+    if origin in (tuple, list) and arguments:
+        single = origin is list or arguments[-1] is Ellipsis
+        tables = bool(keys(arguments[0]))
+        if single:
+            return "a list of tables" if tables else "a list"
+        return f"{len(arguments)} numbers"
+    if keys(hint):
+        return "a table"
+    return NAMES.get(hint, "a value")

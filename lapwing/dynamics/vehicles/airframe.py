@@ -1,0 +1,109 @@
+"""An airframe as its TOML file describes it: the numbers that belong to the vehicle whatever the scene."""
+
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError, model_validator
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._types import steiner
+from lapwing.dynamics.validation import fault
+from lapwing.dynamics.vehicles.airframe_tables import (
+    Battery,
+    CarriedBox,
+    Contact,
+    Drag,
+    Mass,
+    Motor,
+    Propeller,
+    Published,
+    RotorPlacement,
+    Section,
+    Triple,
+)
+
+
+class Airframe(Section):
+    """A multirotor; the parts that it does not have are None, and so are closed to the effects that need them."""
+
+    mesh: str | None = None  # an STL or OBJ file beside this one, in metres and its axes: how the vehicle is shown
+    mass: Mass
+    rotors: RotorPlacement
+    motor: Motor
+    propeller: Propeller | None = None
+    battery: Battery | None = None
+    contact: Contact | None = None
+    drag: Drag | None = None
+    payload: CarriedBox | None = None
+    published: Published | None = None
+
+    @model_validator(mode="after")
+    def _one_payload(self) -> "Airframe":
+        if self.payload and self.mass.payload:
+            message = f"got {self.mass.payload:g} beside a table [payload], of which [mass] has nothing"
+            raise KeyedError("mass.payload", message, "0")
+        return self
+
+    @property
+    def motor_current_limit(self) -> float:
+        """[A] of one motor: what its controller keeps, or its share of what the battery's C rating allows."""
+        pack = self.battery.current_limit if self.battery else math.inf
+        return min(self.motor.current_limit, pack / len(self.rotors.position))
+
+    @property
+    def loaded(self) -> "Airframe":
+        """The same with the box of [payload] as a part of its mass (theory.md, eq. (2.41))."""
+        box, own = self.payload, self.mass
+        if box is None or own.payload:
+            return self
+        total = own.total + box.mass
+        centre = (own.total * np.array(own.centre) + box.mass * np.array(box.position)) / total
+        inertia = own.matrix + steiner(own.total, own.centre - centre)
+        inertia += box.inertia + steiner(box.mass, box.position - centre)
+        joint = own.model_copy(
+            update={
+                "total": total,
+                "payload": box.mass,
+                "inertia": tuple(np.diag(inertia).tolist()),
+                "products": (float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
+                "centre": tuple(centre.tolist()),
+            }
+        )
+        return self.model_copy(update={"mass": joint})
+
+    @property
+    def about_centre(self) -> "Airframe":
+        """The same with every position measured from the centre of mass."""
+        if not any(self.mass.centre):
+            return self
+        x, y, z = self.mass.centre
+
+        def moved(places: tuple[Triple, ...]) -> tuple[Triple, ...]:
+            return tuple((a - x, b - y, c - z) for a, b, c in places)
+
+        mass = self.mass.model_copy(update={"centre": (0.0, 0.0, 0.0)})
+        rotors = self.rotors.model_copy(update={"position": moved(self.rotors.position)})
+        contact = self.contact and self.contact.model_copy(
+            update={"feet": moved(self.contact.feet), "hull": moved(self.contact.hull)}
+        )
+        payload = self.payload and self.payload.model_copy(update={"position": moved((self.payload.position,))[0]})
+        return self.model_copy(update={"mass": mass, "rotors": rotors, "contact": contact, "payload": payload})
+
+
+def load_airframe(path: str | Path) -> Airframe:
+    """Read an airframe from a TOML file.
+
+    Raises:
+        ValueError: one line that names the file, the key and what was expected.
+    """
+    path = Path(path)
+    try:
+        return Airframe.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        raise ValueError(f"{path}: {fault(error, Airframe)}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not valid TOML: {error}") from None

@@ -1,0 +1,209 @@
+"""The tables of an airframe's file: mass, rotors, propeller, motor, battery, contact, drag, published figures."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, Len
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.effects._types import principal_moments
+
+Positive = Annotated[float, Gt(0)]
+NotNegative = Annotated[float, Ge(0)]
+Triple = tuple[float, float, float]
+PositiveTriple = tuple[Positive, Positive, Positive]
+
+SHORTEST_AXIS = 1e-6  # below which a direction is none
+
+
+class Section(BaseModel):
+    """A table of the file: no unknown keys, numbers finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Mass(Section):
+    """Mass properties with payload, about the centre of mass and along the body axes (theory.md, eq. (1.6a)).
+
+    Where the payload has a table of its own, these are the vehicle's without it.
+    """
+
+    total: Positive  # [kg]
+    payload: NotNegative  # [kg] part of the total
+    inertia: PositiveTriple  # [kg m^2] diagonal of the inertia matrix
+    products: Triple = (0.0, 0.0, 0.0)  # [kg m^2] its elements xy, xz and yz, as in URDF; minus the integrals of xy dm
+    centre: Triple = (0.0, 0.0, 0.0)  # [m] centre of mass, from where the positions of the airframe are measured
+
+    @model_validator(mode="after")
+    def _physical(self) -> "Mass":
+        a, b, c = principal_moments(self.inertia, self.products)
+        if a <= 0.0:
+            raise KeyedError(
+                "products", f"got {list(self.products)}", "smaller ones: a principal moment is not above 0"
+            )
+        if a + b < c:
+            raise KeyedError(
+                "inertia", f"got {list(self.inertia)}", "none above the sum of the others (triangle inequality)"
+            )
+        if self.payload >= self.total:
+            raise KeyedError("payload", f"got {self.payload:g}", f"less than total = {self.total:g} kg")
+        return self
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Inertia [kg m^2] about the centre of mass, shape (3, 3)."""
+        xy, xz, yz = self.products
+        return np.diag(self.inertia) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+
+
+class CarriedBox(Section):
+    """A payload with a place: a uniform box, beside the mass properties of the vehicle without it."""
+
+    mass: Positive  # [kg]
+    position: Triple  # [m] of its centre, body
+    size: PositiveTriple  # [m] along body x, y, z
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """[kg m^2] about its centre, shape (3, 3)."""
+        square = np.square(self.size)
+        return self.mass / 12.0 * np.diag(square.sum() - square)
+
+
+class RotorPlacement(Section):
+    """Where the rotors are and which way they turn."""
+
+    position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
+    spin_direction: tuple[Literal["cw", "ccw"], ...]  # of each rotor seen from above: clockwise or counter-clockwise
+    axis: tuple[Triple, ...] = ()  # direction of each rotor's thrust in the body, of any length; body z if left out
+    inertia: Positive  # [kg m^2] of one rotor about its axis
+    mass: Positive | None = None  # [kg] of one rotor, part of the total; for models that give it a body of its own
+    blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
+
+    @model_validator(mode="after")
+    def _one_direction_each(self) -> "RotorPlacement":
+        if len(self.spin_direction) != len(self.position):
+            expected = f'"cw" or "ccw" for each of the {len(self.position)} rotors'
+            raise KeyedError("spin_direction", f"got {len(self.spin_direction)} of them", expected)
+        return self
+
+    @model_validator(mode="after")
+    def _upward(self) -> "RotorPlacement":
+        if len(self.axis) not in (0, len(self.position)):
+            expected = f"a direction for each of the {len(self.position)} rotors"
+            raise KeyedError("axis", f"got {len(self.axis)} of them", expected)
+        for k, (x, y, z) in enumerate(self.axis):
+            if math.hypot(x, y, z) < SHORTEST_AXIS or z <= 0.0:
+                expected = "a direction that points up, with z above 0: rotors push upwards"
+                raise KeyedError(f"axis.{k}", f"got {[x, y, z]}", expected)
+        return self
+
+    @property
+    def reaction_sign(self) -> tuple[float, ...]:
+        """Sign of each rotor's reaction torque on the body about its axis, opposite to the rotor's own turning."""
+        return tuple(1.0 if spin == "cw" else -1.0 for spin in self.spin_direction)
+
+    @property
+    def tilted_axis(self) -> tuple[Triple, ...]:
+        """Unit vector in the body along which each rotor pushes; () where that is body z for all of them."""
+        if not any(x or y for x, y, _ in self.axis):
+            return ()
+        lengths = (math.hypot(*axis) for axis in self.axis)
+        return tuple((x / n, y / n, z / n) for (x, y, z), n in zip(self.axis, lengths, strict=True))
+
+
+class Propeller(Section):
+    """Geometry and blade-element constants of theory.md, eq. (1.9) to (1.11)."""
+
+    diameter: Annotated[float, Ge(1e-3), Le(100)]  # [m] D
+    pitch: Annotated[float, Ge(1e-6), Le(100)]  # [m] way of a turn without slip
+    blades: Annotated[int, Gt(0)]  # how many
+    aspect_ratio: Annotated[float, Ge(1e-3), Le(1e3)]  # A, of the blades
+    downwash_factor: Annotated[float, Gt(0), Le(1)]  # epsilon
+    lift_correction: Annotated[float, Gt(0), Le(1)]  # lambda
+    radius_weight: Annotated[float, Gt(0), Le(1)]  # zeta, of the section taken for the blade, over the radius
+    oswald_factor: Annotated[float, Gt(0), Le(1)]  # e
+    zero_lift_drag: NotNegative  # C_fD
+    zero_lift_angle: float  # [rad] alpha_0
+    lift_curve_slope: Annotated[float, Ge(1e-3), Le(1e3)]  # [1/rad] K_0
+
+
+class Motor(Section):
+    """Brushless motor, belt and speed controller."""
+
+    speed_constant: Positive  # [rpm/V] KV of the motor shaft (deliberately not SI: how motors are sold)
+    gear_ratio: Positive  # propeller speed over motor speed
+    no_load_current: NotNegative  # [A] I_0, without load
+    resistance: Positive  # [ohm] of the winding
+    time_constant: Annotated[float, Ge(1e-6)]  # [s] of rotor speed after a step of voltage
+    max_voltage: Positive  # [V] that the controller can ask for
+    esc_current: Positive  # [A] limit of the speed controller
+    esc_resistance: NotNegative = 0.0  # [ohm] of the speed controller and its leads
+    esc_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # power of the motor and resistances over that of the battery
+    peak_current: Positive | None = None  # [A] of the motor, which the controller keeps; none if left out
+    peak_power: Positive | None = None  # [W] taken by the motor, which the controller keeps; none if left out
+    belt_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # torque that reaches the rotor over that of belt and motor
+    inertia: NotNegative = 0.0  # [kg m^2] of the motor's own rotor about its axis
+
+    @property
+    def current_limit(self) -> float:
+        """[A] that neither controller nor motor exceeds."""
+        return min(self.esc_current, self.peak_current or math.inf)
+
+    @property
+    def power_limit(self) -> float:
+        """[W] that the motor takes at the most."""
+        return self.peak_power or math.inf
+
+    @property
+    def rotor_constant(self) -> float:
+        """[N m/A] = [V s/rad] of motor and belt, at the rotor (theory.md, eq. (1.12))."""
+        return 30.0 / (math.pi * self.speed_constant * self.gear_ratio)
+
+
+class Battery(Section):
+    """Lithium-polymer battery."""
+
+    cells: Annotated[int, Gt(0)]  # in series
+    capacity: Positive  # [A s]
+    c_rating: Positive  # [1/h] maximum current over capacity in A h
+    cell_resistance: NotNegative  # [ohm] of one cell
+
+    @property
+    def current_limit(self) -> float:
+        """[A] that its C rating allows."""
+        return self.c_rating * self.capacity / 3600.0
+
+
+class Contact(Section):
+    """Points that may touch the ground."""
+
+    feet: Annotated[tuple[Triple, ...], Len(1)]  # [m] body
+    hull: tuple[Triple, ...] = ()  # [m] body: what touches if the vehicle falls over
+
+
+class Drag(Section):
+    """Drag area of the fuselage."""
+
+    area: PositiveTriple  # [m^2] drag coefficient times area, along body x, y, z
+
+
+class PublishedFigure(Section):
+    """A figure from the literature, and why the one computed here may differ."""
+
+    value: Positive  # in SI units
+    reason: str = ""  # why the one computed here may differ
+
+
+class Published(Section):
+    """What others state of this vehicle; nothing computes with it."""
+
+    source: str  # where the figures are from
+    hover_time: PublishedFigure | None = None  # [s]
+    maximum_payload: PublishedFigure | None = None  # [kg]
+    maximum_range: PublishedFigure | None = None  # [m]
+    ceiling: PublishedFigure | None = None  # [m]
+    maximum_tilt: PublishedFigure | None = None  # [rad]
+    maximum_speed: PublishedFigure | None = None  # [m/s]

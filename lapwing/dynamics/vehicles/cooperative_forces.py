@@ -1,0 +1,150 @@
+"""What each quadrotor of a formation should do: its force for load and link, and the moment that turns it there.
+
+Lee, Sreenath, Kumar (CDC 2013); theory.md, eqs. (7.22) to (7.27). `p.drive` is a FormationControl.
+"""
+
+import math
+
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.lie.so3 import vee
+from lapwing.dynamics.vector import (
+    add,
+    apply_transposed,
+    cross,
+    dot,
+    matmul,
+    multiply,
+    norm,
+    scale,
+    subtract,
+    transpose,
+)
+from lapwing.dynamics.vehicles.cooperative_load import add_outer, link_acceleration, solve_symmetric
+from lapwing.kernels import kernel, leaf
+
+UPRIGHT_SHARE = 0.3  # of its weight that a quadrotor's attitude always aims to carry
+NOTHING = (0.0, 0.0, 0.0)
+FORWARD = (1.0, 0.0, 0.0)  # heading of all quadrotors
+SHARE_DAMPING = 0.03  # keeps the shares bounded where the links do not span space (theory.md, eq. (7.23))
+
+
+@leaf
+def desired_load(path, t):
+    """(position, velocity, acceleration) of the desired path at time t."""
+    velocity = add(path[1], scale(2.0 * t, path[2]))
+    return add(path[0], add(scale(t, path[1]), scale(t * t, path[2]))), velocity, scale(2.0, path[2])
+
+
+@leaf
+def wanted_specific(p, t, x, acceleration):
+    """Wanted v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (theory.md, eq. (7.22))."""
+    c = p.drive
+    position, velocity, wanted_acceleration = desired_load(c.path, t)
+    e_y, e_v = subtract(x.load_position, position), subtract(x.load_velocity, velocity)
+    feedback = add(scale(-c.load_position_gain, e_y), scale(-c.load_velocity_gain, e_v))
+    change = subtract(wanted_acceleration, acceleration)
+    slope = add(scale(-c.load_position_gain, e_v), scale(c.load_velocity_gain, change))
+    return add(add(feedback, wanted_acceleration), (0.0, 0.0, p.gravity)), slope
+
+
+@leaf
+def _shared(matrix, x, b, b_rate):
+    """Solution of (sum of q q^T + damping) s = b and its derivative."""
+    s = solve_symmetric(matrix, b)
+    for i in range(len(x.link)):
+        q = x.link[i].direction
+        q_rate = cross(x.link[i].omega, q)
+        b_rate = subtract(b_rate, add(scale(dot(q, s), q_rate), scale(dot(q_rate, s), q)))
+    return s, solve_symmetric(matrix, b_rate)
+
+
+@kernel
+def shares(p, x, wanted, slope):
+    """Vector s whose parts along the links carry F_d together, and its derivative (theory.md, eq. (7.23))."""
+    matrix = (SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING)
+    for i in range(len(x.link)):
+        matrix = add_outer(matrix, 1.0, x.link[i].direction)
+    s, s_rate = _shared(matrix, x, scale(p.load_mass, wanted), scale(p.load_mass, slope))
+    # once more on what the damping left out: its effect falls to second order
+    rest, rest_rate = _shared(matrix, x, scale(SHARE_DAMPING, s), scale(SHARE_DAMPING, s_rate))
+    return add(s, rest), add(s_rate, rest_rate)
+
+
+@kernel
+def wanted_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
+    """Force [N] that quadrotor i should give in the world, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
+    c = p.drive
+    q, omega = x.link[i].direction, x.link[i].omega
+    m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
+    parallel = dot(q, s) + inertia * dot(omega, omega) + m * dot(q, wanted)
+    swing = add(scale(-c.link_direction_gain, cross(c.direction[i], q)), scale(-c.link_rate_gain, omega))
+    # the part normal to the link turns it as wanted: omega' = q x (v' - a_g) / L - q x u / (m L)
+    lever = subtract(scale(m, cross(q, wanted)), scale(inertia, swing))
+    force = add(scale(parallel, q), cross(lever, q))
+    # the same, differentiated
+    q_rate = cross(omega, q)
+    parallel_rate = dot(q_rate, s) + dot(q, s_rate) + 2.0 * inertia * dot(omega, omega_rate)
+    parallel_rate += m * (dot(q_rate, wanted) + dot(q, slope))
+    swing_rate = add(scale(-c.link_direction_gain, cross(c.direction[i], q_rate)), scale(-c.link_rate_gain, omega_rate))
+    lever_rate = subtract(scale(m, add(cross(q_rate, wanted), cross(q, slope))), scale(inertia, swing_rate))
+    along = add(scale(parallel_rate, q), scale(parallel, q_rate))
+    return force, add(along, add(cross(lever_rate, q), cross(lever, q_rate)))
+
+
+@leaf
+def _unit(a, a_rate):
+    """a / |a| and its derivative."""
+    k = 1.0 / norm(a)
+    unit = scale(k, a)
+    return unit, scale(k, subtract(a_rate, scale(dot(unit, a_rate), unit)))
+
+
+@leaf
+def upright(force, force_rate, floor):
+    """The force with its vertical part kept above `floor` [N], smoothly, and its derivative: no quadrotor tips over."""
+    over = force[2] - floor
+    root = math.sqrt(over * over + 0.04 * floor * floor)
+    slope = 0.5 * (1.0 + over / root)
+    kept = (force[0], force[1], floor + 0.5 * (over + root))
+    return kept, (force_rate[0], force_rate[1], slope * force_rate[2])
+
+
+@leaf
+def wanted_attitude(force, force_rate):
+    """R_world_wanted: z along the force, x towards world x; and its rate in that frame (theory.md, eq. (7.26))."""
+    z, z_rate = _unit(force, force_rate)
+    y, y_rate = _unit(cross(z, FORWARD), cross(z_rate, FORWARD))
+    x, x_rate = cross(y, z), add(cross(y_rate, z), cross(y, z_rate))
+    matrix = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+    return matrix, (dot(z, y_rate), dot(x, z_rate), dot(y, x_rate))
+
+
+@kernel
+def moment(p, x, force, force_rate, i):
+    """Moment [N m] that turns body z to the wanted force and follows it (theory.md, eq. (7.27))."""
+    c = p.drive
+    kept, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
+    wanted, omega_wanted = wanted_attitude(kept, kept_rate)
+    difference = matmul(transpose(wanted), rotation_matrix(x.attitude[i]))
+    o = x.omega_body[i]
+    rate_error = subtract(o, apply_transposed(difference, omega_wanted))
+    damped = scale(-c.attitude_rate_gain / c.epsilon, rate_error)
+    turned = scale(-c.attitude_gain / (c.epsilon * c.epsilon), vee(difference))
+    return add(add(turned, damped), cross(o, multiply(p.quad_inertia[i], o)))
+
+
+@leaf
+def quad_thrust(p, x, wanted, slope, s, s_rate, i):
+    """Thrust [N] of quadrotor i: the part of its wanted force along its axis."""
+    # a force does not depend on the accelerations, only its derivative does
+    force, _ = wanted_force(p, x, wanted, slope, s, s_rate, NOTHING, i)
+    m = rotation_matrix(x.attitude[i])
+    return dot(force, (m[2], m[5], m[8]))
+
+
+@leaf
+def quad_moment(p, x, wanted, slope, s, s_rate, force, specific, i):
+    """Moment [N m] of quadrotor i when all give `force` [N] and the load has `specific` acceleration [m/s^2]."""
+    omega_rate = link_acceleration(p, x, force, specific, i)
+    wanted_thrust, thrust_rate = wanted_force(p, x, wanted, slope, s, s_rate, omega_rate, i)
+    return moment(p, x, wanted_thrust, thrust_rate, i)

@@ -1,0 +1,178 @@
+"""N quadrotors carrying a point mass by rigid massless links, on R^6 x (TSO(3))^N x (TS^2)^N, N >= 2.
+
+The model of Lee, Sreenath and Kumar (CDC 2013) in ENU: a link's direction points from its quadrotor to the load. The
+equations are theory.md, eqs. (7.17) to (7.21); the constraints are part of the state space and cannot be broken.
+"""
+
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
+from lapwing.dynamics.lie.ts2 import Swing, tangent
+from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, divide, dot, multiply, scale, subtract
+from lapwing.kernels import ByClass, kernel, leaf
+from lapwing.kernels.codegen import each_index, implements
+
+
+class LiftCommand(NamedTuple):
+    """What each quadrotor's rotors do; held by the plant between two messages."""
+
+    thrust: tuple[float, ...]  # [N] along body z
+    moment_body: tuple[Vec3, ...]  # [N m]
+
+
+class CooperativeLoadParameters(NamedTuple):
+    """Tuples have one entry for each quadrotor."""
+
+    quad_mass: tuple[float, ...]  # [kg]
+    quad_inertia: tuple[Vec3, ...]  # [kg m^2] principal moments
+    link_length: tuple[float, ...]  # [m]
+    load_mass: float  # [kg]
+    gravity: float  # [m/s^2]
+    drive: Any  # a LiftCommand, or the parameters of a control law registered in COMMANDS
+
+    def check(self, x0: Any) -> None:
+        """ValueError for fewer than two quadrotors, tuples of different lengths, or a mass or link that is nothing."""
+        n = len(x0.link)
+        counts = {len(t) for t in (self.quad_mass, self.quad_inertia, self.link_length, x0.attitude, x0.omega_body)}
+        if n < 2 or counts != {n}:
+            raise ValueError(
+                f"CooperativeLoad: {n} links for tuples of {sorted(counts)} entries: two or more, all alike"
+            )
+        for name in ("quad_mass", "link_length"):
+            for i, value in enumerate(getattr(self, name)):
+                if not value > 0.0:
+                    raise ValueError(f"CooperativeLoad: {name}[{i}] = {value:g}: must be positive")
+        if not self.load_mass > 0.0:
+            raise ValueError(f"CooperativeLoad: load_mass = {self.load_mass:g}: must be positive")
+
+
+class CooperativeLoadState(NamedTuple):
+    """World frame ENU."""
+
+    load_position: Vec3  # [m]
+    load_velocity: Vec3  # [m/s]
+    attitude: tuple[Quaternion, ...]
+    omega_body: tuple[Vec3, ...]  # [rad/s]
+    link: tuple[Swing, ...]  # direction from quadrotor to load, angular velocity [rad/s]
+
+
+COMMANDS = ByClass()
+"""The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
+
+
+def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> LiftCommand:
+    """The LiftCommand at time t: given, or by the control law that `p.drive` belongs to."""
+    return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
+
+
+@implements(command)
+def _command(p, t, x):
+    drive = p.types[p.fields.index("drive")].instance_class
+    if drive is LiftCommand:
+        return lambda p, t, x: p.drive
+    law = COMMANDS[drive]
+    return lambda p, t, x: law(p, t, x)
+
+
+@leaf
+def solve_symmetric(m: Mat3, b: Vec3) -> Vec3:
+    """Solution of m x = b for a symmetric 3x3 matrix, by cofactors."""
+    c0 = m[4] * m[8] - m[5] * m[5]
+    c1 = m[5] * m[2] - m[1] * m[8]
+    c2 = m[1] * m[5] - m[4] * m[2]
+    c4 = m[0] * m[8] - m[2] * m[2]
+    c5 = m[1] * m[2] - m[0] * m[5]
+    c8 = m[0] * m[4] - m[1] * m[1]
+    k = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
+    return scale(k, apply((c0, c1, c2, c1, c4, c5, c2, c5, c8), b))
+
+
+@leaf
+def add_outer(m: Mat3, weight: float, q: Vec3) -> Mat3:
+    """m + weight q q^T."""
+    x, y, z = weight * q[0], weight * q[1], weight * q[2]
+    return (
+        m[0] + x * q[0], m[1] + x * q[1], m[2] + x * q[2],
+        m[3] + y * q[0], m[4] + y * q[1], m[5] + y * q[2],
+        m[6] + z * q[0], m[7] + z * q[1], m[8] + z * q[2],
+    )  # fmt: skip
+
+
+@leaf
+def thrust_world(x, thrust, i):
+    """Thrust of quadrotor i in the world [N]."""
+    m = rotation_matrix(x.attitude[i])
+    return scale(thrust[i], (m[2], m[5], m[8]))
+
+
+@kernel
+def load_acceleration(p, x, force):
+    """v' - a_g of the load: M_q (v' - a_g) = sum of (q . u - m L |omega|^2) q (theory.md, eq. (7.19))."""
+    matrix = (p.load_mass, 0.0, 0.0, 0.0, p.load_mass, 0.0, 0.0, 0.0, p.load_mass)
+    pull = (0.0, 0.0, 0.0)
+    for i in range(len(force)):
+        q, omega = x.link[i].direction, x.link[i].omega
+        matrix = add_outer(matrix, p.quad_mass[i], q)
+        along = dot(q, force[i]) - p.quad_mass[i] * p.link_length[i] * dot(omega, omega)
+        pull = add(pull, scale(along, q))
+    return solve_symmetric(matrix, pull)
+
+
+@leaf
+def link_acceleration(p, x, force, specific, i):
+    """omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory.md, eq. (7.20))."""
+    relative = subtract(specific, scale(1.0 / p.quad_mass[i], force[i]))
+    return scale(1.0 / p.link_length[i], cross(x.link[i].direction, relative))
+
+
+@leaf
+def _link_rate(p, x, force, specific, i):
+    return tangent(x.link[i], link_acceleration(p, x, force, specific, i))
+
+
+@leaf
+def _body_rate(p, x, given, i):
+    inertia, o = p.quad_inertia[i], x.omega_body[i]
+    return divide(add(given.moment_body[i], cross(multiply(inertia, o), o)), inertia)
+
+
+@kernel
+def rate(p, t, x):
+    """Tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
+    given = command(p, t, x)
+    force = each_index(thrust_world, x.link, x, given.thrust)
+    specific = load_acceleration(p, x, force)
+    return CooperativeLoadState(
+        x.load_velocity,
+        add(specific, (0.0, 0.0, -p.gravity)),
+        x.omega_body,
+        each_index(_body_rate, x.link, p, x, given),
+        each_index(_link_rate, x.link, p, x, force, specific),
+    )
+
+
+RATES[CooperativeLoadParameters] = rate
+
+
+@leaf
+def quad_position(p, x, i):
+    """Position [m] of quadrotor i: the load's, less the link."""
+    return subtract(x.load_position, scale(p.link_length[i], x.link[i].direction))
+
+
+@leaf
+def quad_velocity(p, x, i):
+    """Velocity [m/s] of quadrotor i."""
+    return subtract(x.load_velocity, scale(p.link_length[i], cross(x.link[i].omega, x.link[i].direction)))
+
+
+@kernel
+def energy(p, x):
+    """Kinetic and potential energy [J] (theory.md, eq. (7.17))."""
+    total = 0.5 * p.load_mass * dot(x.load_velocity, x.load_velocity) + p.load_mass * p.gravity * x.load_position[2]
+    for i in range(len(x.link)):
+        v, o = quad_velocity(p, x, i), x.omega_body[i]
+        total += 0.5 * (p.quad_mass[i] * dot(v, v) + dot(o, multiply(p.quad_inertia[i], o)))
+        total += p.quad_mass[i] * p.gravity * quad_position(p, x, i)[2]
+    return total

@@ -1,0 +1,130 @@
+"""The plant: one rigid body with rotors, driven by motor voltages, under the effects that its scene names.
+
+All functions are pure. The equations are in `multirotor_equations`, their steps in `multirotor_steps`;
+`multirotor_multibody` has five bodies in the place of one, under the same effects, `advance` and `observe`.
+"""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._rotor_sums import total
+from lapwing.dynamics.effects._types import AnyMassProperties, Motion, PerRotor, body_of, offset_body
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    MultirotorDrive,
+    MultirotorParameters,
+    MultirotorState,
+    RotorLayout,
+    accelerations_of_form,
+    evaluate,
+    seen,
+)
+from lapwing.dynamics.vehicles.multirotor_stepper import begin, parts, steps, within
+from lapwing.kernels import kernel
+from lapwing.kernels.codegen import each
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+CONTACT_TOLERANCE = 1e-5  # error of a part of a step in contact where nobody says otherwise
+
+
+class MultirotorObservation(NamedTuple):
+    """What can be said about a state beyond the state itself."""
+
+    acceleration_world: Vec3  # [m/s^2] of the motion's position
+    angular_acceleration_body: Vec3  # [rad/s^2]
+    thrust: PerRotor  # [N]
+    torque: PerRotor  # [N m] of the air against each rotor
+    rotor_acceleration: PerRotor  # [rad/s^2]
+    motor_voltage: PerRotor  # [V]
+    motor_current: PerRotor  # [A]
+    motor_power: PerRotor  # [W] taken by each motor and its controller
+    air_density: float  # [kg/m^3]
+    wind_world: Vec3  # [m/s] of the air and of winds that are forces only
+    mass: float  # [kg]
+    in_contact: bool
+    battery: tuple[float, float, float, float]  # charge, voltage [V], current [A], temperature [K]; NaN: not modelled
+
+
+@kernel
+def advance(method, p, key, tick, state, command, h, n):
+    """The state one exchange interval later: n steps of length h [s] under constant voltages.
+
+    Steps are split where the motors' lag is too fast for them.
+
+    Args:
+        method: `Method()` of an integrator's module.
+        p: MultirotorParameters.
+        key: of the vehicle's random numbers (lapwing/dynamics/noise.py); effects draw at `tick`.
+        tick: number of the exchange; it starts at tick n h seconds.
+        state: MultirotorState.
+        command: voltage [V] of each motor, held within 0 and the highest.
+        h: [s] step.
+        n: steps in the interval.
+    """
+    interval = n * h
+    start = tick * interval
+    drive = begin(p, key, tick, state, command, interval)
+    split = parts(p.layout, h)
+    x, memory = steps(method, drive, state.motion, start, start + interval, h / split, 0, n * split)
+    return MultirotorState(x, memory)
+
+
+@kernel
+def observe(p, tick, interval, state, command):
+    """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
+    layout = p.layout
+    voltage = each(within, layout.max_voltage, command, command)
+    body = hooks.all_body(p.effects, state.memory, p.body)
+    drive = MultirotorDrive(p, body, state.memory, voltage)
+    s, rotors, _, _ = evaluate(drive, tick * interval, seen(layout, state.motion))
+    linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
+    return MultirotorObservation(
+        linear,
+        angular,
+        rotors.thrust,
+        rotors.torque,
+        rotors.acceleration,
+        rotors.voltage,
+        rotors.current,
+        rotors.power,
+        s.air.density,
+        hooks.all_winds(p.effects, state.memory, s.air.wind_world),
+        s.body.mass,
+        hooks.all_contacts(p.effects, state.memory, s),
+        hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current), math.nan)),
+    )
+
+
+def parameters(airframe: "Airframe", effects: tuple = ()) -> MultirotorParameters:
+    """The compiled plant's numbers for an airframe under effects (from `lapwing.dynamics.effects.from_scene`)."""
+    mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
+    x_body, y_body, z_body = zip(*rotors.position, strict=True)
+    layout = RotorLayout(
+        x_body, y_body, z_body, rotors.reaction_sign, rotors.inertia,
+        engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
+        engine.max_voltage, engine.no_load_current, axis=rotors.tilted_axis,
+    )  # fmt: skip
+    if airframe.payload:  # of the class of the mass properties once it is released, which has more numbers
+        body: AnyMassProperties = offset_body(mass.total, mass.matrix, np.zeros(3))
+    else:
+        body = body_of(mass.total, mass.inertia, mass.products)
+    return MultirotorParameters(body, layout, effects, CONTACT_TOLERANCE)
+
+
+def initial_state(
+    p: MultirotorParameters,
+    position_world: Vec3 = (0.0, 0.0, 0.0),
+    attitude: Quaternion = NO_ROTATION,
+    rotor_speed: float = 0.0,
+    velocity_world: Vec3 = ZERO,
+    omega_body: Vec3 = ZERO,
+) -> MultirotorState:
+    """All rotors at the same speed [rad/s], the effects' memory fresh; without more at rest in the world."""
+    motion = Motion(position_world, attitude, velocity_world, omega_body, (rotor_speed,) * len(p.layout.x_body))
+    return MultirotorState(motion, tuple(hooks.initial_memory(e) for e in p.effects))

@@ -1,0 +1,165 @@
+"""The equations of motion of a multirotor under the effects that its scene names.
+
+Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
+every force is an effect (lapwing/dynamics/effects). All functions are pure. What stands for the motion in the state is a form
+(`FORMS`): here one rigid body; other modules add theirs, under the same effects and with the same steps.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._axes import thrust_wrench
+from lapwing.dynamics.effects._types import Air, AnyMassProperties, Factors, Loads, Motion, PerRotor, Rotors, Situation
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vehicles.newton_euler import newton_euler
+from lapwing.kernels import ByClass, leaf
+from lapwing.kernels.codegen import each, implements
+
+STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
+
+
+class RotorLayout(NamedTuple):
+    """The rotors and their motors, as far as the bare plant needs them."""
+
+    x_body: PerRotor  # [m]
+    y_body: PerRotor  # [m]
+    z_body: PerRotor  # [m]
+    reaction_sign: PerRotor  # sign of the torque on the body about the rotor's axis
+    inertia: float  # [kg m^2] of one rotor about its axis
+    volt_per_speed: float  # [V s/rad] at the rotor = [N m/A]: motor constant over belt ratio
+    speed_per_volt: float  # [rad/(s V)]
+    lag_rate: float  # [1/s]
+    max_voltage: float  # [V]
+    no_load_current: float  # [A]
+    bodies: Any = ()  # what a form with several bodies needs to know of them
+    axis: tuple[Vec3, ...] = ()  # unit vector of each rotor in the body, along which it pushes; () where that is body z
+
+
+class MultirotorParameters(NamedTuple):
+    """A vehicle in a scene."""
+
+    body: AnyMassProperties
+    layout: RotorLayout
+    effects: tuple  # parameter NamedTuples of the active effects, sorted by name
+    tolerance: float  # error of a part of a step while the vehicle is in contact, relative to 1 + size
+
+
+class MultirotorState(NamedTuple):
+    """All that the plant remembers from one exchange to the next."""
+
+    motion: Any  # of a class in FORMS: Motion, or several bodies
+    memory: tuple  # one tuple for each effect
+
+
+class Form(NamedTuple):
+    """The compiled functions of a class that stands for the motion in the state."""
+
+    seen: Callable  # (layout, x) -> Motion that effects look at
+    rate: Callable  # (drive, t, x) -> tangent of x
+    held: Callable  # (drive, x) -> x after a step, brought back onto its constraints
+    accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
+
+
+FORMS = ByClass()
+
+
+class MultirotorDrive(NamedTuple):
+    """What the rate of change depends on and stays fixed over a step."""
+
+    parameters: MultirotorParameters
+    body: AnyMassProperties
+    memory: tuple
+    voltage: PerRotor  # [V]
+
+
+@leaf
+def _lag(s, speed, voltage):
+    return s.layout.lag_rate * (s.layout.speed_per_volt * voltage - speed)
+
+
+@leaf
+def _static_current(s, torque, voltage):
+    """Current that holds the air's torque (theory.md, eq. (1.14)); none when the controller is off."""
+    return torque / s.layout.volt_per_speed + s.layout.no_load_current if voltage > 0.0 else 0.0
+
+
+@leaf
+def _product(c, a, b):
+    return a * b
+
+
+@leaf
+def _constant(c, a, b):
+    return c
+
+
+@leaf
+def evaluate(drive, t, motion):
+    """One evaluation of all effects: (situation, rotors, force_world [N], torque_body [N m])."""
+    p, memory = drive.parameters, drive.memory
+    layout, speed = p.layout, motion.rotor_speed
+    body = drive.body
+    R_world_body = rotation_matrix(motion.attitude)
+    still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
+    s = Situation(t, motion, R_world_body, body, layout, still, ZERO)
+    air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
+    s = Situation(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
+    # adding to -0.0 changes no number, so the compiler drops it
+    one, zero = each(_constant, 1.0, speed, speed), each(_constant, -0.0, speed, speed)
+    factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
+    loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
+    voltage = hooks.all_supply(p.effects, memory, drive.voltage)
+    current = each(_static_current, s, loads.torque, voltage)
+    lag = (each(_lag, s, speed, voltage), current, each(_product, 0.0, voltage, current))
+    acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
+    rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
+    thrust, torque = thrust_wrench(layout, loads)
+    torque = hooks.all_torques(p.effects, memory, s, rotors, torque)
+    force, torque = hooks.all_body_wrenches(p.effects, memory, s, rotors, thrust, torque)
+    force, torque = hooks.all_wrenches(p.effects, memory, s, rotors, force, torque)
+    return s, rotors, force, torque
+
+
+@leaf
+def rate(drive, t, motion):
+    """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
+    s, rotors, force, torque = evaluate(drive, t, motion)
+    linear, angular = newton_euler(s.body, drive, s, force, torque)
+    return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)
+
+
+@leaf
+def _itself(_, motion):
+    return motion
+
+
+@leaf
+def accelerations(drive, t, motion):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
+    s, _, force, torque = evaluate(drive, t, motion)
+    return newton_euler(s.body, drive, s, force, torque)
+
+
+FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
+
+
+def seen(layout: RotorLayout, x: Any) -> Motion:
+    """The vehicle's Motion, whatever form its state has; in compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(seen, inline=True)
+def _seen(layout, x):
+    return FORMS[x.instance_class].seen
+
+
+def accelerations_of_form(drive, t, x):
+    """As `accelerations`, whatever form the state has; in compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(accelerations_of_form, inline=True)
+def _accelerations_of_form(drive, t, x):
+    return FORMS[x.instance_class].accelerations

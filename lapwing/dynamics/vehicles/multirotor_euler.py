@@ -1,0 +1,245 @@
+"""The multirotor's five bodies in XYZ Euler angles on the general engine, which factorises every constraint row.
+
+A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a body that
+pitches through 90 degrees: there its pitch becomes infinite, which `singular` finds.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.multibody import cardan_angles, five_body_stabilisation, stabilisation
+from lapwing.dynamics.multibody.augmented import RANK_TOLERANCE, solve
+from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies
+from lapwing.dynamics.multibody.mechanisms import drone_system
+from lapwing.dynamics.multibody.system import Arrays
+from lapwing.dynamics.vector import ZERO, Vec3, apply
+from lapwing.dynamics.vehicles import multirotor_multibody
+from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
+from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState
+from lapwing.kernels import apart, kernel, leaf
+
+NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
+
+
+class EulerBody(NamedTuple):
+    """One body: its coordinates and their rates."""
+
+    position_world: Vec3  # [m] of the centre of mass
+    angles: Vec3  # roll, pitch, yaw [rad]
+    velocity_world: Vec3  # [m/s]
+    angle_rates: Vec3  # [rad/s]
+
+
+class FiveEulerBodies(NamedTuple):
+    """Chassis and propellers."""
+
+    body: tuple[EulerBody, EulerBody, EulerBody, EulerBody, EulerBody]
+
+
+@kernel
+def _body(b):
+    omega = apply(cardan_angles.rate_matrix(b.angles), b.angle_rates)
+    attitude = quaternion.from_matrix(cardan_angles.rotation(b.angles))
+    return BodyState(b.position_world, attitude, b.velocity_world, omega)
+
+
+@kernel
+def five(x):
+    """The same state on SE(3)."""
+    b = x.body
+    return FiveBodies(_body(b[0]), (_body(b[1]), _body(b[2]), _body(b[3]), _body(b[4])))
+
+
+@kernel
+def _euler_body(b):
+    angles = cardan_angles.angles_of(quaternion.rotation_matrix(b.attitude))
+    return EulerBody(b.position_world, angles, b.velocity_world, cardan_angles.rates_of(angles, b.omega_body))
+
+
+@kernel
+def of_five(x):
+    """The same state in Euler angles."""
+    p = x.propellers
+    return FiveEulerBodies(
+        (_euler_body(x.chassis), _euler_body(p[0]), _euler_body(p[1]), _euler_body(p[2]), _euler_body(p[3]))
+    )
+
+
+@kernel
+def _arrays(x):
+    """Configuration and velocity for the general engine, shapes (5, 6)."""
+    q, v = np.empty((5, 6)), np.empty((5, 6))
+    for i in range(5):
+        b = x.body[i]
+        for k in range(3):
+            q[i, k], q[i, 3 + k] = b.position_world[k], b.angles[k]
+            v[i, k], v[i, 3 + k] = b.velocity_world[k], b.angle_rates[k]
+    return q, v
+
+
+@kernel
+def _one(q, v, i):
+    return EulerBody(
+        (q[i, 0], q[i, 1], q[i, 2]),
+        (q[i, 3], q[i, 4], q[i, 5]),
+        (v[i, 0], v[i, 1], v[i, 2]),
+        (v[i, 3], v[i, 4], v[i, 5]),
+    )
+
+
+@kernel
+def _tree(q, v):
+    return FiveEulerBodies((_one(q, v, 0), _one(q, v, 1), _one(q, v, 2), _one(q, v, 3), _one(q, v, 4)))
+
+
+@kernel
+def _system(a, p):
+    """The arrays with what the effects can change in them."""
+    mass, inertia, gravity = a.mass.copy(), a.inertia.copy(), a.gravity.copy()
+    mass[0] = p.mass
+    for k in range(3):
+        inertia[0, k, k] = p.inertia[k]
+        gravity[k] = p.gravity[k]
+    return Arrays(mass, inertia, a.joint_bodies, a.joint_points, a.joint_triads, a.drive_bodies, a.drive_axes, gravity)
+
+
+@kernel
+def _imposed(a, p):
+    """Speed and acceleration of each drive, shape (4 or 0, 2)."""
+    out = np.empty((len(a.drive_bodies), 2))
+    for k in range(len(out)):
+        r = p.rotors[max(a.drive_bodies[k, 0], a.drive_bodies[k, 1]) - 1]  # the chassis is body 0
+        out[k, 0], out[k, 1] = r.speed, r.drive
+    return out
+
+
+@kernel
+def _wrenches(p):
+    """Forces and torques on the bodies, shape (5, 6); a motor acts on propeller and chassis."""
+    out = np.empty((5, 6))
+    for k in range(3):
+        out[0, k], out[0, 3 + k] = p.wrench.force_world[k], p.wrench.torque_body[k]
+    for i in range(4):
+        r = p.rotors[i]
+        for k in range(3):
+            out[i + 1, k], out[i + 1, 3 + k] = r.wrench.force_world[k], r.wrench.torque_body[k]
+        out[i + 1, 5] += r.spins * r.drive
+        out[0, 5] -= r.spins * r.drive
+    return out
+
+
+@kernel
+def _ranks(a):
+    """Of the hinges' rows, and of all: of a drive's three rows two are its hinge's."""
+    held = 5 * len(a.joint_bodies)
+    return held, held + len(a.drive_bodies)
+
+
+@leaf
+def _upright(b):
+    """Whether a pitch is apart from 90 degrees; it passes there without a jump, so that no step leaps over it."""
+    return math.cos(b.angles[1]) > NEAR
+
+
+@kernel
+def _all_upright(x):
+    b = x.body
+    return _upright(b[0]) and _upright(b[1]) and _upright(b[2]) and _upright(b[3]) and _upright(b[4])
+
+
+@leaf
+def _stopped(b):
+    """The tangent of one body where angles end: infinite for a pitch that is there, and nothing else."""
+    return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
+
+
+@apart
+def seen(layout, x):
+    """The Motion of the chassis with the speeds of the rotors."""
+    return on_se3.seen(layout, five(x))
+
+
+@apart
+def rate(drive, t, x):
+    """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
+    if not _all_upright(x):
+        b = x.body
+        return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
+    p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
+    given = drive.parameters.layout.bodies
+    a = _system(given.arrays, p)
+    q, v = _arrays(x)
+    f = given.feedback
+    s, _ = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, _ranks(a)[1])
+    return _tree(v, s.acceleration)
+
+
+@apart
+def struck(drive, x):
+    """As `multirotor_multibody_equations.struck`."""
+    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    a = _system(drive.parameters.layout.bodies.arrays, p)
+    q, v = _arrays(x)
+    q, v = stabilisation.project(a, q, v, _imposed(a, p), _ranks(a))
+    return _tree(q, v)
+
+
+@apart
+def held(drive, x):
+    """The bodies brought together again, as the assembly says."""
+    given = drive.parameters.layout.bodies
+    if given.hold == five_body_stabilisation.NONE or not _all_upright(x):
+        return x
+    if given.hold == five_body_stabilisation.PROJECTION:
+        return struck(drive, x)
+    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    a = _system(given.arrays, p)
+    q, v = _arrays(x)
+    q, v = stabilisation.partition(a, q, v, _imposed(a, p), _ranks(a))
+    return _tree(q, v)
+
+
+@kernel
+def accelerations(drive, t, x):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    b, tangent = x.body[0], rate(drive, t, x).body[0]
+    G, change = cardan_angles.rate_matrix(b.angles), cardan_angles.rate_matrix_derivative(b.angles, b.angle_rates)
+    from_rates, from_angles = apply(G, tangent.angle_rates), apply(change, b.angle_rates)
+    angular = (from_rates[0] + from_angles[0], from_rates[1] + from_angles[1], from_rates[2] + from_angles[2])
+    return tangent.velocity_world, angular
+
+
+FORMS[FiveEulerBodies] = Form(seen, rate, held, accelerations)
+
+
+def singular(x: FiveEulerBodies) -> int:
+    """The body whose pitch has reached 90 degrees in a state that is no longer finite; -1 if none has."""
+    return next((i for i, b in enumerate(x.body) if math.isinf(b.angles[1])), -1)
+
+
+def parameters(*given, **named) -> MultirotorParameters:
+    """As `multirotor_multibody.parameters`."""
+    return _assembled(multirotor_multibody.parameters(*given, **named))
+
+
+def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """As `multirotor_multibody.after`."""
+    return _assembled(multirotor_multibody.after(p, k, becomes))
+
+
+def _assembled(p: MultirotorParameters) -> MultirotorParameters:
+    bodies = p.layout.bodies
+    drone = bodies.drone
+    system = drone_system(drone, tuple(spins == 0.0 for spins in drone.spins))
+    for k, held in enumerate(drone.held):
+        system = system if held else system.without(f"hinge {k + 1}")
+    return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=system.arrays)))
+
+
+def initial_state(*given, **named) -> MultirotorState:
+    """As `multirotor_multibody.initial_state`."""
+    state = multirotor_multibody.initial_state(*given, **named)
+    return state._replace(motion=of_five(state.motion))

@@ -1,0 +1,101 @@
+"""The multirotor as five bodies: chassis and four propellers that turn on hinges, under the effects of its scene.
+
+What is known of them, what may become of a propeller, and their first state; `multirotor_multibody_equations` has how
+they move.
+"""
+
+from typing import TYPE_CHECKING
+
+from lapwing.dynamics.effects._types import PerRotor
+from lapwing.dynamics.effects.gyroscopic_torque import GyroscopicTorque
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.multibody import five_bodies, five_body_stabilisation
+from lapwing.dynamics.multibody.delivery_drone import Drone
+from lapwing.dynamics.multibody.five_bodies import BodyState
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import Assembly
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation
+BECOMES = {  # what may become of a propeller: (spins, powered, held)
+    "locked": (0.0, 0.0, 1.0),  # its speed relative to the chassis is zero from now on
+    "free": (1.0, 0.0, 1.0),  # its motor gives no torque any more, the air brakes it
+    "torn_off": (1.0, 0.0, 0.0),  # its hinge and its drive are gone: gravity alone acts on it, no ground stops it
+}
+STABILISATIONS = {
+    "none": five_body_stabilisation.NONE, "partitioning": five_body_stabilisation.PARTITION, "projection": five_body_stabilisation.PROJECTION, "baumgarte": five_body_stabilisation.NONE,
+}  # fmt: skip
+
+
+def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
+    """The five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
+
+    Raises:
+        ValueError: "key: message"; not four rotors, nothing said of a single one, tilted ones, or products of inertia.
+    """
+    rotors = airframe.rotors
+    if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
+        raise ValueError("rotors: the five bodies need four rotors with mass and blade_inertia")
+    if airframe.payload:
+        raise ValueError("payload: the five bodies have no place for one; leave the table out")
+    if rotors.tilted_axis:
+        raise ValueError("rotors.axis: the five bodies need rotors that push along body z")
+    if any(airframe.mass.products):
+        raise ValueError("mass.products: the five bodies need principal axes, and products of 0")
+    spins = 1.0 if drive == "torque" else 0.0
+    mass = airframe.mass.total - 4.0 * rotors.mass
+    blade = (*rotors.blade_inertia, rotors.inertia)
+    return Drone(mass, airframe.mass.inertia, rotors.position, (rotors.mass,) * 4, (blade,) * 4, (spins,) * 4)
+
+
+def parameters(
+    airframe: "Airframe", effects: tuple = (), drive: str = "torque", stabilisation: str = "projection"
+) -> MultirotorParameters:
+    """The compiled plant's numbers, as `multirotor.parameters`.
+
+    Args:
+        airframe: with four rotors and what is to be known of one.
+        effects: from `lapwing.dynamics.effects.from_scene`; the bodies need no `gyroscopic_torque`, it is left out.
+        drive: "torque" (the motors' torque turns the propellers) or "speed" (their acceleration is imposed).
+        stabilisation: one of STABILISATIONS.
+
+    Raises:
+        ValueError: as `drone_of`.
+    """
+    feedback = FEEDBACK if stabilisation == "baumgarte" else 0.0
+    assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, (1.0,) * 4, ())
+    p = multirotor.parameters(airframe, tuple(e for e in effects if not isinstance(e, GyroscopicTorque)))
+    return p._replace(layout=p.layout._replace(bodies=assembly))
+
+
+def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """The parameters once propeller k (0 to 3) has become what BECOMES names; see `struck` for the state then."""
+
+    def changed(values: PerRotor, value: float) -> PerRotor:
+        return (*values[:k], value, *values[k + 1 :])
+
+    bodies, (spins, powered, held) = p.layout.bodies, BECOMES[becomes]
+    drone = bodies.drone._replace(spins=changed(bodies.drone.spins, spins), held=changed(bodies.drone.held, held))
+    bodies = bodies._replace(drone=drone, powered=changed(bodies.powered, powered))
+    return p._replace(layout=p.layout._replace(bodies=bodies))
+
+
+def initial_state(
+    p: MultirotorParameters,
+    position_world: Vec3 = ZERO,
+    attitude: Quaternion = NO_ROTATION,
+    rotor_speed: float = 0.0,
+    velocity_world: Vec3 = ZERO,
+    omega_body: Vec3 = ZERO,
+) -> MultirotorState:
+    """All rotors at the same speed [rad/s], blades along x, the effects' memory fresh; without more at rest."""
+    plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
+    d = p.layout.bodies.drone
+    chassis = BodyState(position_world, attitude, velocity_world, omega_body)
+    speeds = tuple(-sign * rotor_speed for sign in p.layout.reaction_sign)
+    x = five_body_stabilisation.together(five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds)
+    return plain._replace(motion=x)

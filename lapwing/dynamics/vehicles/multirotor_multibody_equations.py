@@ -1,0 +1,198 @@
+"""The equations of motion of a multirotor of five bodies, and the forces in its hinges.
+
+A form of the multirotor's state: each body has its own pose on SE(3), the arrow structure is eliminated (theory.md,
+eqs. (8.40)-(8.46)). What `gyroscopic_torque` and mass properties averaged over a turn stand for in the reduced model
+follows here from the bodies themselves.
+"""
+
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._rotor_sums import total, total_wrench
+from lapwing.dynamics.effects._types import Motion, PerRotor
+from lapwing.dynamics.lie.quaternion import rotate_back
+from lapwing.dynamics.multibody import five_bodies
+from lapwing.dynamics.multibody import five_body_stabilisation as hold
+from lapwing.dynamics.multibody.delivery_drone import Drone
+from lapwing.dynamics.multibody.five_bodies import NO_WRENCH, FiveBodies, Machine, Rotor, Wrench
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, scale, subtract
+from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, evaluate
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each
+
+
+class Assembly(NamedTuple):
+    """The bodies, how they are driven and held together."""
+
+    drone: Drone
+    hold: int  # of lapwing.dynamics.multibody.five_body_stabilisation, after every step
+    feedback: float  # [1/s]
+    powered: PerRotor  # 0: the motor gives no torque; with an imposed speed, that speed is zero
+    arrays: Any  # system.Arrays of the general engine; () on the fast path
+
+
+class Acting(NamedTuple):
+    """What acts on the bodies, each where it acts."""
+
+    gravity_world: Vec3  # [m/s^2]
+    force_world: Vec3  # [N] on the chassis, weight and thrust not included
+    torque_body: Vec3  # [N m] on the chassis
+    rotor: tuple  # (thrust [N], torque [N m], acceleration [rad/s^2]) of each rotor, as the reduced model has them
+
+
+@leaf
+def _rotor_speed(chassis_rate, sign, propeller):
+    # a rotor that pushes the body to +z turns about -z itself
+    return sign * (chassis_rate - propeller.omega_body[2])
+
+
+@leaf
+def _product(_, a, b):
+    return a * b
+
+
+@leaf
+def seen(layout, x):
+    """The Motion of the chassis with the speeds of the rotors; of one that was torn off it is zero."""
+    c = x.chassis
+    speed = each(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
+    speed = each(_product, 0.0, layout.bodies.drone.held, speed)
+    return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
+
+
+@leaf
+def _triple(accelerations, load, k):
+    return load[0], load[1], accelerations[k]
+
+
+@leaf
+def acting(drive, t, motion):
+    """(situation, Acting): the effects of `multirotor.evaluate`, taken apart by body."""
+    s, rotors, force, torque = evaluate(drive, t, motion)
+    R, layout = s.R_world_body, s.layout
+    field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
+    known = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
+    arms = (
+        total(each(_product, 0.0, layout.y_body, rotors.thrust)),
+        -total(each(_product, 0.0, layout.x_body, rotors.thrust)),
+        total(each(_product, 0.0, layout.reaction_sign, rotors.torque)),
+    )
+    loads = each(pair, 0.0, rotors.thrust, rotors.torque)
+    parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
+    return s, Acting(field, subtract(force, known), subtract(torque, arms), parts)
+
+
+@leaf
+def _rotor(k, layout, R, motion, part):
+    d, sign, powered = layout.bodies.drone, -layout.reaction_sign[k], layout.bodies.powered[k]
+    thrust, torque, acceleration = part
+    spins, axial = d.spins[k], d.propeller_inertia[k][2]
+    drive = powered * sign * (spins * (axial * acceleration + torque) + (1.0 - spins) * acceleration)
+    wrench = Wrench(scale(thrust, (R[2], R[5], R[8])), (0.0, 0.0, -sign * torque))
+    speed = powered * sign * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench, d.held[k])
+
+
+@leaf
+def machine(drive, t, motion):
+    """`five_bodies.Machine` at an instant, its imposed speeds those of the state."""
+    s, a = acting(drive, t, motion)
+    layout, R, part = s.layout, s.R_world_body, a.rotor
+    rotors = (
+        _rotor(0, layout, R, motion, part[0]),
+        _rotor(1, layout, R, motion, part[1]),
+        _rotor(2, layout, R, motion, part[2]),
+        _rotor(3, layout, R, motion, part[3]),
+    )
+    mass = s.body.mass - total(layout.bodies.drone.propeller_mass)
+    wrench = Wrench(a.force_world, a.torque_body)
+    return Machine(mass, s.body.inertia, a.gravity_world, wrench, rotors, layout.bodies.feedback)
+
+
+@leaf
+def _still(k, layout, motion):
+    d = layout.bodies.drone
+    speed = -layout.bodies.powered[k] * layout.reaction_sign[k] * motion.rotor_speed[k]
+    return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH, d.held[k])
+
+
+@leaf
+def unloaded(drive, motion):
+    """The machine without loads: all that projection looks at."""
+    layout = drive.parameters.layout
+    rotors = (
+        _still(0, layout, motion),
+        _still(1, layout, motion),
+        _still(2, layout, motion),
+        _still(3, layout, motion),
+    )
+    mass = drive.body.mass - total(layout.bodies.drone.propeller_mass)
+    return Machine(mass, drive.body.inertia, ZERO, NO_WRENCH, rotors, 0.0)
+
+
+@kernel
+def rate(drive, t, x):
+    """Tangent of the five bodies."""
+    return five_bodies.rate(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+
+
+@kernel
+def held(drive, x):
+    """The bodies brought together again, as the assembly says."""
+    how = drive.parameters.layout.bodies.hold
+    if how == hold.NONE:
+        return x
+    p = unloaded(drive, seen(drive.parameters.layout, x))
+    return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
+
+
+@kernel
+def struck(drive, x):
+    """The bodies after impulses in the hinges that meet all constraints at once; they keep the momentum."""
+    return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
+
+
+@kernel
+def accelerations(drive, t, x):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    tangent = rate(drive, t, x)
+    return tangent.chassis.velocity_world, tangent.chassis.omega_body
+
+
+FORMS[FiveBodies] = Form(seen, rate, held, accelerations)
+
+
+@leaf
+def _on_propeller(x, reaction):
+    force, torque = reaction
+    return force, rotate_back(x.attitude, torque)
+
+
+@leaf
+def _on_chassis(chassis, x, reaction):
+    force, torque = reaction
+    arm = subtract(x.position_world, chassis.position_world)
+    return scale(-1.0, force), scale(-1.0, rotate_back(chassis.attitude, add(torque, cross(arm, force))))
+
+
+@kernel
+def joints(drive, t, x):
+    """(force [N] in the world, torque about the centre of mass [N m] in the body) of the hinges on each body, chassis
+    first; z of a propeller's torque is what its drive gives."""
+    on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+    b, c = x.propellers, x.chassis
+    chassis = total_wrench(
+        (
+            _on_chassis(c, b[0], on[0]),
+            _on_chassis(c, b[1], on[1]),
+            _on_chassis(c, b[2], on[2]),
+            _on_chassis(c, b[3], on[3]),
+        )
+    )
+    return (
+        chassis,
+        _on_propeller(b[0], on[0]),
+        _on_propeller(b[1], on[1]),
+        _on_propeller(b[2], on[2]),
+        _on_propeller(b[3], on[3]),
+    )

@@ -1,0 +1,164 @@
+"""A multirotor that carries a point mass on a massless cable, under the effects of its scene (theory.md, section 1.5).
+
+A form of `multirotor`'s state. The cable is a spring with a damper that can pull and not push: it goes slack and taut
+again without an event to be found, and what it pulls with when it comes taut is bounded by its stiffness, where a rigid
+cable would need an impulse. A cable of steel or aramid is elastic, too; the price is a step that its frequency allows.
+"""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate, rotation_matrix
+from lapwing.dynamics.terrain import surface
+from lapwing.dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
+from lapwing.dynamics.vehicles.newton_euler import newton_euler
+from lapwing.kernels import kernel, leaf
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+GROUND_FREQUENCY, GROUND_DAMPING = 100.0, 0.7  # [rad/s], ratio of the load on the ground
+SLIDING, FRICTION = 0.05, 0.6  # [m/s] from which on the load slides with the whole coefficient of friction
+
+
+class Sling(NamedTuple):
+    """The cable and what hangs on it."""
+
+    load_mass: float  # [kg]
+    length: float  # [m] of the cable without tension
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    hook_body: Vec3  # [m] where it is fastened
+    drag_area: float  # [m^2] of the load, drag coefficient times area
+    terrain: Any  # the ground under the load
+
+
+class SlungMotion(NamedTuple):
+    """The vehicle and the load; world frame ENU."""
+
+    vehicle: Motion
+    load_position: Vec3  # [m]
+    load_velocity: Vec3  # [m/s]
+
+
+@leaf
+def seen(layout, x):
+    """The Motion of the vehicle."""
+    return x.vehicle
+
+
+@leaf
+def tension(sling, away, speed_away):
+    """(force [N] that pulls the hook towards the load, length [m]): none while the cable is slack.
+
+    Args:
+        sling: Sling.
+        away: from hook to load [m].
+        speed_away: its rate of change [m/s].
+    """
+    distance = norm(away)
+    stretch = distance - sling.length
+    if stretch <= 0.0:
+        return (0.0, 0.0, 0.0), distance
+    pull = sling.stiffness * stretch + sling.damping * dot(away, speed_away) / distance
+    return scale(max(pull, 0.0) / distance, away), distance
+
+
+@leaf
+def cable(sling, R_world_body, x):
+    """(force [N] in the world on the vehicle, torque [N m] on it in the body)."""
+    v = x.vehicle
+    arm = apply(R_world_body, sling.hook_body)
+    turning = apply(R_world_body, cross(v.omega_body, sling.hook_body))
+    away = subtract(x.load_position, add(v.position_world, arm))
+    force, _ = tension(sling, away, subtract(x.load_velocity, add(v.velocity_world, turning)))
+    return force, cross(sling.hook_body, apply_transposed(R_world_body, force))
+
+
+@leaf
+def ground(sling, position, velocity):
+    """Force [N] of the ground on the load: a spring with a damper that does not pull, and Coulomb's friction."""
+    height, normal = surface(sling.terrain, position[0], position[1])
+    depth = (height - position[2]) * normal[2]
+    if depth <= 0.0:
+        return (0.0, 0.0, 0.0)
+    m, w = sling.load_mass, GROUND_FREQUENCY
+    rising = dot(velocity, normal)
+    press = max(m * w * (w * depth - 2.0 * GROUND_DAMPING * rising), 0.0)
+    sliding = subtract(velocity, scale(rising, normal))
+    return subtract(scale(press, normal), scale(FRICTION * press / max(norm(sliding), SLIDING), sliding))
+
+
+@leaf
+def load_acceleration(sling, field, air, pull, x):
+    """[m/s^2] of the load, which the cable pulls back with the force `pull` [N]."""
+    wind = subtract(air.wind_world, x.load_velocity)
+    drag = scale(0.5 * air.density * sling.drag_area * norm(wind), wind)
+    force = add(subtract(drag, pull), ground(sling, x.load_position, x.load_velocity))
+    return add(field, scale(1.0 / sling.load_mass, force))
+
+
+@kernel
+def rate(drive, t, x):
+    """Tangent of vehicle and load (theory.md, eqs. (1.20) to (1.22))."""
+    sling = drive.parameters.layout.bodies
+    s, rotors, force, torque = evaluate(drive, t, x.vehicle)
+    pull, turn = cable(sling, s.R_world_body, x)
+    field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
+    linear, angular = newton_euler(s.body, drive, s, add(force, pull), add(torque, turn))
+    v = x.vehicle
+    tangent = Motion(v.velocity_world, v.omega_body, linear, angular, rotors.acceleration)
+    return SlungMotion(tangent, x.load_velocity, load_acceleration(sling, field, s.air, pull, x))
+
+
+@leaf
+def _itself(_, x):
+    return x
+
+
+@kernel
+def accelerations(drive, t, x):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the vehicle."""
+    tangent = rate(drive, t, x)
+    return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
+
+
+FORMS[SlungMotion] = Form(seen, rate, _itself, accelerations)
+
+
+@leaf
+def cable_force(layout, x):
+    """Force [N] in the world of the cable on the load."""
+    force, _ = cable(layout.bodies, rotation_matrix(x.vehicle.attitude), x)
+    return scale(-1.0, force)
+
+
+def frequency(sling: Sling, mass: float) -> float:
+    """Of the load on the taut cable [rad/s] against a vehicle of a mass [kg]."""
+    return math.sqrt(sling.stiffness * (1.0 / sling.load_mass + 1.0 / mass))
+
+
+def parameters(airframe: "Airframe", sling: Sling, effects: tuple = ()) -> MultirotorParameters:
+    """The compiled plant's numbers, as `multirotor.parameters`."""
+    p = multirotor.parameters(airframe, effects)
+    return p._replace(layout=p.layout._replace(bodies=sling))
+
+
+def initial_state(
+    p: MultirotorParameters,
+    position_world: Vec3 = ZERO,
+    attitude: Quaternion = NO_ROTATION,
+    rotor_speed: float = 0.0,
+    velocity_world: Vec3 = ZERO,
+    omega_body: Vec3 = ZERO,
+) -> MultirotorState:
+    """As of the bare vehicle; the load hangs under the hook, or stands on the ground there, at rest."""
+    plain = multirotor.initial_state(p, position_world, attitude, rotor_speed, velocity_world, omega_body)
+    sling = p.layout.bodies
+    x, y, z = (float(v) for v in add(position_world, rotate(attitude, sling.hook_body)))
+    load = (x, y, max(z - sling.length, surface(sling.terrain, x, y)[0]))
+    return plain._replace(motion=SlungMotion(plain.motion, load, velocity_world))

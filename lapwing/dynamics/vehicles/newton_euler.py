@@ -1,0 +1,59 @@
+"""Newton's and Euler's equations of one rigid body, as the class of its mass properties has them (theory.md, 1.1)."""
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._types import FullMassProperties, OffsetMassProperties
+from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, scale, subtract
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import implements
+
+
+def angular_acceleration(body, omega, torque):
+    """Euler's equations (theory.md, eqs. (1.6), (1.6a)), as the class of the mass properties has them."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(angular_acceleration, inline=True)
+def _angular_acceleration_of_class(body, omega, torque):
+    return _with_products if body.instance_class is FullMassProperties else _about_principal_axes
+
+
+@leaf
+def _with_products(body, omega, torque):
+    return apply(body.inverse_inertia, subtract(torque, cross(omega, apply(body.inertia, omega))))
+
+
+@leaf
+def _about_principal_axes(body, omega, torque):
+    gyration, inverse = body.gyration, body.inverse_inertia
+    return (
+        gyration[0] * (omega[1] * omega[2]) + inverse[0] * torque[0],
+        gyration[1] * (omega[2] * omega[0]) + inverse[1] * torque[1],
+        gyration[2] * (omega[0] * omega[1]) + inverse[2] * torque[2],
+    )
+
+
+def newton_euler(body, drive, s, force, torque):
+    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) under a force [N] in the world and a torque [N m] in
+    the body about the motion's position, as the class of the mass properties has them."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(newton_euler, inline=True)
+def _newton_euler_of_class(body, drive, s, force, torque):
+    return _about_offset_centre if body.instance_class is OffsetMassProperties else _about_centre
+
+
+@leaf
+def _about_centre(body, drive, s, force, torque):
+    return scale(body.inverse_mass, force), angular_acceleration(body, s.motion.omega_body, torque)
+
+
+@leaf
+def _about_offset_centre(body, drive, s, force, torque):
+    """With the centre of mass at c from the position: gravity alone acts there (theory.md, eq. (2.42))."""
+    R, omega, c = s.R_world_body, s.motion.omega_body, body.centre_body
+    weight = scale(body.mass, hooks.all_fields(drive.parameters.effects, drive.memory, ZERO))
+    others = apply_transposed(R, subtract(force, weight))
+    angular = _with_products(body, omega, subtract(torque, cross(c, others)))
+    turning = add(cross(angular, c), cross(omega, cross(omega, c)))
+    return subtract(scale(body.inverse_mass, force), apply(R, turning)), angular

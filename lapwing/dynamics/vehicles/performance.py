@@ -1,0 +1,233 @@
+"""What a multirotor can do in steady flight, from the same models that the plant integrates.
+
+Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)) and the thrust of
+equal rotors in the air that comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque
+(theory.md, section 1.4). Of rotors that are tilted the sum of their thrusts counts, and the mean air along their axes;
+of rotors over one another what the lower ones lose (eq. (2.44)), all of them at one speed.
+"""
+
+import math
+from typing import NamedTuple
+
+from scipy.optimize import brentq, minimize_scalar
+
+from lapwing.dynamics import atmosphere
+from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.effects.coaxial_wash import CoaxialWash, stacked
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.dynamics.vehicles.airframe_tables import Motor
+from lapwing.dynamics.vehicles.propeller import (
+    drag_coefficients,
+    h_force_coefficient,
+    thrust_coefficient,
+    torque_coefficient,
+)
+
+GRAVITY = 9.80665  # [m/s^2]
+DENSITY = 1.225  # [kg/m^3]
+CELL_VOLTAGE = 3.7  # [V] nominal
+ITERATIONS = 100  # of the rotor speed; each takes off a tenth and more of what is left
+
+
+class Trim(NamedTuple):
+    """Steady level flight."""
+
+    tilt: float  # [rad] from the vertical
+    thrust: float  # [N] of a rotor that stands in nobody's wake
+    rotor_speed: float  # [rad/s]
+    voltage: float  # [V] of the motor that turns hardest
+    current: float  # [A] of the same
+    power: float  # [W] of all motors
+
+
+class Gain(NamedTuple):
+    """Thrust and torque that a rotor in a wake has more than a free one at the same speed."""
+
+    thrust: float  # [N]
+    torque: float  # [N m]
+
+
+class Rotor(NamedTuple):
+    """What one rotor gives: thrust and torque over the square of its speed, and what inflow along its axis takes."""
+
+    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where it goes with the density
+    torque: float  # [N m s^2/rad^2], the same
+    with_density: bool = True
+    pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
+    parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
+    drag: float = 0.0  # [m^3/rad] across the axis, over density, rotor speed and velocity
+    wash: CoaxialWash | None = None  # what those lose that stand in the wake of others
+
+    def constants(self, density: float) -> tuple[float, float]:
+        """Thrust and torque over the square of the speed at a density [kg/m^3]."""
+        factor = density if self.with_density else 1.0
+        return factor * self.thrust, factor * self.torque
+
+    def gains(self, count: int, density: float, speed: float, axial: float = 0.0, across: float = 0.0) -> list[Gain]:
+        """What each of `count` rotors gains in the wake of another one; arguments as of `CoaxialWash.changes`."""
+        changes = self.wash.changes(speed, axial, across) if self.wash else [(0.0, 0.0)] * count
+        return [Gain(density * thrust, density * torque) for thrust, torque in changes]
+
+
+def rotor_of(airframe: Airframe) -> Rotor:
+    """The rotor that the airframe's propeller makes.
+
+    Raises:
+        ValueError: it has none, or one that cannot stand in the wake of another as the vehicle's do.
+    """
+    propeller, square = airframe.propeller, (2.0 * math.pi) ** 2
+    if propeller is None:
+        raise ValueError("the vehicle has no [propeller]; give a scene with [effects.rotor_quadratic] instead")
+    return Rotor(
+        thrust_coefficient(propeller) * propeller.diameter**4 / square,
+        torque_coefficient(propeller) * propeller.diameter**5 / square,
+        pitch=propeller.pitch,
+        parts=drag_coefficients(propeller),
+        drag=h_force_coefficient(propeller),
+        wash=CoaxialWash.from_scene({}, airframe) if stacked(airframe) else None,
+    )
+
+
+def _lift(airframe: Airframe) -> float:
+    """Force of all rotors over the thrust of one: their number, less where they push past one another."""
+    axes = airframe.rotors.tilted_axis
+    return math.hypot(*map(sum, zip(*axes, strict=True))) if axes else len(airframe.rotors.position)
+
+
+def trim(
+    airframe: Airframe,
+    speed: float = 0.0,
+    density: float = DENSITY,
+    mass: float | None = None,
+    rotor: Rotor | None = None,
+) -> Trim:
+    """Steady level flight at a speed [m/s]; `mass` [kg] and `rotor` instead of the airframe's.
+
+    Raises:
+        ValueError: the airframe has no propeller, or no drag areas and a speed above 0.
+    """
+    rotor, count = rotor or rotor_of(airframe), len(airframe.rotors.position)
+    if speed > 0.0 and airframe.drag is None:
+        raise ValueError("the vehicle has no [drag]")
+    weight = (airframe.mass.total if mass is None else mass) * GRAVITY
+    ahead, _, below = airframe.drag.area if airframe.drag else (0.0, 0.0, 0.0)
+    pressure = 0.5 * density * speed * speed
+
+    k_thrust, k_torque = rotor.constants(density)
+    lift = _lift(airframe)
+    omega = math.sqrt(weight / (lift * k_thrust))
+    for _ in range(ITERATIONS):  # the rotors' drag goes with their speed
+        before, across = omega, pressure * ahead + count * density * rotor.drag * omega * speed
+
+        def forces(tilt: float, across: float = across) -> tuple[float, float]:
+            """What the thrust must push forward and up."""
+            c, s = math.cos(tilt), math.sin(tilt)
+            return across * c * c + pressure * below * s * s, weight + (pressure * below - across) * s * c
+
+        tilt = brentq(lambda a: math.sin(a) * forces(a)[1] - math.cos(a) * forces(a)[0], 0.0, 0.5 * math.pi)
+        axial = speed * math.sin(tilt) * (lift / count)
+        gains = rotor.gains(count, density, omega, axial, speed * math.cos(tilt))
+        thrust = math.hypot(*forces(tilt)) / lift - sum(gain.thrust for gain in gains) / count
+        w = 2.0 * math.pi * axial / rotor.pitch
+        omega = 0.5 * (w + math.sqrt(w * w + 4.0 * thrust / k_thrust))
+        if abs(omega - before) < 1e-12 * omega:
+            break
+    profile, induced = rotor.parts
+    torque = k_torque * (profile * omega**2 + induced * (omega - w) ** 2) / (profile + induced)
+    motor = airframe.motor
+    electrics = [_electrics(motor, omega, torque + gain.torque) for gain in gains]
+    power = sum(voltage * current for voltage, current in electrics) / motor.esc_efficiency
+    return Trim(tilt, thrust, omega, *max(electrics), power)
+
+
+def _electrics(motor: Motor, speed: float, torque: float) -> tuple[float, float]:
+    """(voltage [V], current [A]) of a motor that turns its rotor at a speed [rad/s] against a torque [N m]."""
+    current = torque / (motor.belt_efficiency * motor.rotor_constant) + motor.no_load_current
+    return motor.rotor_constant * speed + (motor.resistance + motor.esc_resistance) * current, current
+
+
+def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Of all rotors at rest in the air [N], at the highest voltage, current or power of any, whichever comes first."""
+    rotor, motor, count = rotor or rotor_of(airframe), airframe.motor, len(airframe.rotors.position)
+    gains = rotor.gains(count, density, 1.0)  # in proportion to the square of the speed
+    k_thrust, k_torque = rotor.constants(density)
+    k_thrust += sum(gain.thrust for gain in gains) / count
+    k_torque += max(gain.torque for gain in gains)
+
+    def excess(omega: float) -> float:
+        """The largest of what voltage, current and power are above their limits, in parts of these."""
+        voltage, current = _electrics(motor, omega, k_torque * omega**2)
+        used = (
+            voltage / motor.max_voltage,
+            current / airframe.motor_current_limit,
+            voltage * current / motor.power_limit,
+        )
+        return max(used) - 1.0
+
+    highest = brentq(excess, 0.0, motor.max_voltage / motor.rotor_constant)
+    return _lift(airframe) * k_thrust * highest**2
+
+
+def thrust_over_weight(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Of the loaded vehicle at rest in the air; the voltage that the motors' resistance takes is counted."""
+    return maximum_thrust(airframe, density, rotor) / (airframe.mass.total * GRAVITY)
+
+
+def battery_energy(airframe: Airframe) -> float:
+    """Nominal [J], drawn to the last."""
+    if airframe.battery is None:
+        raise ValueError("the vehicle has no [battery]")
+    return airframe.battery.cells * CELL_VOLTAGE * airframe.battery.capacity
+
+
+def hover_time(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """[s] at constant power."""
+    return battery_energy(airframe) / trim(airframe, 0.0, density, rotor=rotor).power
+
+
+def maximum_payload(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """[kg] that the maximum thrust lifts beyond the empty vehicle, nothing kept for control."""
+    return maximum_thrust(airframe, density, rotor) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
+
+
+def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """[rad] at which the maximum thrust still carries the weight."""
+    return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
+
+
+def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Rotor | None = None) -> float:
+    """Altitude [m] at which the maximum thrust is the weight (theory.md, eq. (2.3)).
+
+    Raises:
+        ValueError: the thrust does not depend on the density.
+    """
+    if rotor is not None and not rotor.with_density:
+        raise ValueError("[effects.rotor_quadratic] knows no density of the air")
+    weight = airframe.mass.total * GRAVITY
+
+    def excess(altitude: float) -> float:
+        return maximum_thrust(airframe, atmosphere.density(air, altitude), rotor) - weight
+
+    return brentq(excess, 0.0, 30_000.0) if excess(0.0) > 0.0 else 0.0
+
+
+def maximum_speed(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """[m/s] in level flight, where the voltage is all used."""
+    highest = airframe.motor.max_voltage
+
+    def excess(speed: float) -> float:
+        return trim(airframe, speed, density, rotor=rotor).voltage - highest
+
+    return brentq(excess, 0.0, 200.0) if excess(0.0) < 0.0 else 0.0
+
+
+def maximum_range(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> tuple[float, float]:
+    """(distance [m], at the speed [m/s]) in still air."""
+    energy = battery_energy(airframe)
+    best = minimize_scalar(
+        lambda speed: -speed / trim(airframe, speed, density, rotor=rotor).power,
+        bounds=(0.1, maximum_speed(airframe, density, rotor)),
+        method="bounded",
+    )
+    return -best.fun * energy, best.x

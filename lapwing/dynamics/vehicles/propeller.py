@@ -1,0 +1,77 @@
+"""Thrust and torque coefficients of a propeller from its geometry (theory.md, eq. (1.9) to (1.11))."""
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe_tables import Propeller
+
+
+def blade_angle(propeller: "Propeller") -> float:
+    """Effective angle of attack of the blade section at rest [rad], already divided by 1 + K_0 / (pi A)."""
+    geometric = math.atan(propeller.pitch / (math.pi * propeller.diameter))
+    angle = propeller.downwash_factor * geometric - propeller.zero_lift_angle
+    return angle / (1.0 + propeller.lift_curve_slope / (math.pi * propeller.aspect_ratio))
+
+
+def thrust_coefficient(propeller: "Propeller") -> float:
+    """C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory.md, eq. (1.9))."""
+    lift = propeller.lift_curve_slope * blade_angle(propeller) / propeller.aspect_ratio
+    blades = propeller.lift_correction * propeller.radius_weight**2 * propeller.blades
+    return 0.25 * math.pi**2 * blades * lift
+
+
+def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
+    """Of the blade section: (zero-lift part, part induced by lift) (theory.md, eq. (1.11))."""
+    lift = propeller.lift_curve_slope * blade_angle(propeller)
+    induced = lift**2 / (math.pi * propeller.aspect_ratio * propeller.oswald_factor)
+    return propeller.zero_lift_drag, induced
+
+
+def from_stand(
+    propeller: "Propeller", density: float, speed: float, thrust: float, torque: float
+) -> tuple[float, float]:
+    """(lift_correction, zero_lift_drag) with which a propeller of this geometry gives what a thrust stand has shown.
+
+    Args:
+        propeller: the geometry; of these two constants nothing is used.
+        density: [kg/m^3] of the air on that day.
+        speed: [rad/s] of the propeller.
+        thrust: [N] at that speed.
+        torque: [N m].
+
+    Raises:
+        ValueError: no propeller of this geometry gives that.
+    """
+    n = speed / (2.0 * math.pi)
+    full = propeller.model_copy(update={"lift_correction": 1.0})
+    lift_correction = thrust / (density * n**2 * propeller.diameter**4) / thrust_coefficient(full)
+    weight = lift_correction * propeller.radius_weight**2 * propeller.blades**2
+    drag = 8.0 * propeller.aspect_ratio * torque / (density * n**2 * propeller.diameter**5) / (math.pi**2 * weight)
+    zero_lift_drag = drag - drag_coefficients(propeller)[1]
+    if lift_correction > 1.0:
+        most = thrust / lift_correction
+        raise ValueError(
+            f"{thrust:g} N at {speed:g} rad/s is more than the {most:.3g} N that a propeller of this geometry can "
+            "give; expected a higher speed, or a downwash_factor nearer 1"
+        )
+    if zero_lift_drag < 0.0:
+        least = torque * drag_coefficients(propeller)[1] / drag
+        raise ValueError(
+            f"{torque:g} N m at {speed:g} rad/s is less than the {least:.3g} N m that this thrust costs; "
+            "expected a larger torque, or less thrust"
+        )
+    return lift_correction, zero_lift_drag
+
+
+def h_force_coefficient(propeller: "Propeller") -> float:
+    """[m^3/rad] of the drag across the axis over density, rotor speed and velocity (theory.md, eq. (2.11))."""
+    radius = 0.5 * propeller.diameter
+    blade_area = propeller.blades * radius * propeller.diameter / propeller.aspect_ratio
+    return blade_area * sum(drag_coefficients(propeller)) * radius / 4.0
+
+
+def torque_coefficient(propeller: "Propeller") -> float:
+    """C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory.md, eq. (1.10))."""
+    blades = propeller.lift_correction * propeller.radius_weight**2 * propeller.blades**2
+    return math.pi**2 * blades * sum(drag_coefficients(propeller)) / (8.0 * propeller.aspect_ratio)

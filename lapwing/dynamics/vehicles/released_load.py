@@ -1,0 +1,70 @@
+"""Quadrotors and the load that they have let go: free bodies (theory.md, eq. (7.29))."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
+from lapwing.dynamics.vehicles import cooperative_load as formation
+from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each_index
+
+
+class ReleasedLoadParameters(NamedTuple):
+    """Tuples have one entry for each quadrotor."""
+
+    quad_mass: tuple[float, ...]  # [kg]
+    quad_inertia: tuple[Vec3, ...]  # [kg m^2] principal moments
+    gravity: float  # [m/s^2]
+    drive: LiftCommand
+
+
+class ReleasedLoadState(NamedTuple):
+    """World frame ENU."""
+
+    load_position: Vec3  # [m]
+    load_velocity: Vec3  # [m/s]
+    attitude: tuple[Quaternion, ...]
+    omega_body: tuple[Vec3, ...]  # [rad/s]
+    quad_position: tuple[Vec3, ...]  # [m]
+    quad_velocity: tuple[Vec3, ...]  # [m/s]
+
+
+def release(p: CooperativeLoadParameters, x: CooperativeLoadState) -> tuple[ReleasedLoadParameters, ReleasedLoadState]:
+    """The load and vehicles as separate free bodies once the links are gone; their motion and command stay."""
+    quads = range(len(x.link))
+    positions = tuple(formation.quad_position(p, x, i) for i in quads)
+    velocities = tuple(formation.quad_velocity(p, x, i) for i in quads)
+    return (
+        ReleasedLoadParameters(p.quad_mass, p.quad_inertia, p.gravity, p.drive),
+        ReleasedLoadState(x.load_position, x.load_velocity, x.attitude, x.omega_body, positions, velocities),
+    )
+
+
+@leaf
+def _acceleration(p, x, i):
+    force = formation.thrust_world(x, p.drive.thrust, i)
+    return add(scale(1.0 / p.quad_mass[i], force), (0.0, 0.0, -p.gravity))
+
+
+@leaf
+def _body_rate(p, x, i):
+    inertia, o = p.quad_inertia[i], x.omega_body[i]
+    return divide(add(p.drive.moment_body[i], cross(multiply(inertia, o), o)), inertia)
+
+
+@leaf
+def rate(p, t, x):
+    """Tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
+    return ReleasedLoadState(
+        x.load_velocity,
+        (0.0, 0.0, -p.gravity),
+        x.omega_body,
+        each_index(_body_rate, x.quad_position, p, x),
+        x.quad_velocity,
+        each_index(_acceleration, x.quad_position, p, x),
+    )
+
+
+RATES[ReleasedLoadParameters] = rate

@@ -1,0 +1,36 @@
+"""The free rigid body: Euler's equations about principal axes (theory.md, eq. (7.1))."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.dynamics.vector import Vec3, cross, divide, multiply
+from lapwing.kernels import leaf
+
+
+class RigidBody(NamedTuple):
+    """State of anything that only turns."""
+
+    attitude: Quaternion
+    omega_body: Vec3  # [rad/s]
+
+
+class FreeBodyParameters(NamedTuple):
+    """No torque at all."""
+
+    inertia: Vec3  # [kg m^2] principal moments
+
+    @property
+    def torque_without_rate(self) -> bool:
+        """There is none."""
+        return True
+
+
+@leaf
+def rate(p, t, x):
+    """omega' = I^-1 (I omega x omega)."""
+    o = x.omega_body
+    return RigidBody(o, divide(cross(multiply(p.inertia, o), o), p.inertia))
+
+
+RATES[FreeBodyParameters] = rate

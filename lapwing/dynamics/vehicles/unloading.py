@@ -1,0 +1,178 @@
+"""The crate that unloads itself: a pack on driven rollers, a door on a spring, the ground.
+
+The pack is a rigid box with six degrees of freedom, the door turns about its lower edge (theory.md, chapter 9). The
+hinge is the origin of the crate's frame: x outward along the tilted floor, y along the hinge, z away from the floor.
+The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which gives the spring; the sizes are ours.
+"""
+
+import math
+from typing import NamedTuple
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.lie.quaternion import Quaternion, exp
+from lapwing.dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
+from lapwing.dynamics.vehicles.unloading_contact_points import CORNERS, ROLLERS, SIDES, Y, contacts, frames
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each_index
+
+LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] at which somebody takes the pack up, [s] in which he gets it moving
+Surface = tuple[float, float, float, float]  # stiffness [N/m], damping [N s/m], static and dynamic friction
+
+
+class UnloadingParameters(NamedTuple):
+    """SI units."""
+
+    pack_mass: float  # [kg]
+    pack_half: Vec3  # [m] half its length, width, height
+    pack_inertia: Vec3  # [kg m^2]
+    tilt: float  # [rad] of the crate's floor, down towards the door
+    floor_height: float  # [m] of the hinge over the ground
+    depth: float  # [m] from the hinge to the rear wall
+    half_width: float  # [m] between the middle and a side wall
+    roller_radius: float  # [m]
+    roller_spacing: float  # [m] between two axes; the first is half of it behind the hinge
+    roller_speed: float  # [rad/s] at the end of the ramp
+    ramp_start: float  # [s] when the rollers start and the door is unlocked
+    ramp_duration: float  # [s]
+    door_length: float  # [m]
+    door_mass: float  # [kg]
+    door_spring: float  # [N m/rad]
+    door_preload: float  # [rad] that the spring is wound up when the door is shut
+    door_damping: float  # [N m s/rad]
+    door_lock: float  # [N m/rad] of the lock and of the stop
+    edge_radius: float  # [m] of the hinge's and the door's edges
+    pickup: float  # [s] when somebody takes the pack away
+    gravity: float  # [m/s^2]
+    on_rollers: Surface
+    on_door: Surface
+    on_ground: Surface
+
+
+class UnloadingState(NamedTuple):
+    """World frame; z = 0 is the ground, y the direction of the hinge."""
+
+    position_world: Vec3  # [m] of the pack's middle
+    attitude: Quaternion  # of the pack
+    velocity_world: Vec3  # [m/s]
+    omega_body: Vec3  # [rad/s]
+    door: tuple[float, float]  # angle from shut [rad], rate [rad/s]
+    on_rollers: tuple[Vec3, ...]  # bristles [m]: two on each roller, then two on the hinge's edge
+    on_door: tuple[Vec3, ...]  # eight corners, then two on the door's outer edge
+    on_ground: tuple[Vec3, ...]  # eight corners
+
+
+@leaf
+def _wrench(touches, x):
+    """Sum of the forces [N] and of their torques about the pack's middle [N m], world frame."""
+    force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for one in touches:
+        force = add(force, one.force)
+        torque = add(torque, cross(subtract(one.place, x.position_world), one.force))
+    return force, torque
+
+
+@leaf
+def _sum(a, b):
+    return add(a[0], b[0]), add(a[1], b[1])
+
+
+@leaf
+def door_acceleration(p, t, x, f, on_pack):
+    """Angular acceleration of the door [rad/s^2] under the pack's reaction `on_pack` (theory.md, eq. (9.9))."""
+    angle, rate = x.door
+    push = 0.0
+    for one in on_pack:
+        # virtual work of the reaction at its place: the door's material there moves along inward x lever
+        push += dot(one.force, cross(Y, subtract(one.place, f.hinge)))
+    weight = 0.5 * p.door_mass * p.gravity * p.door_length * f.inward[2]
+    spring = -p.door_spring * (angle + p.door_preload) - p.door_damping * rate
+    if angle < 0.0 or t < p.ramp_start:
+        spring -= p.door_lock * angle + 0.01 * p.door_lock * rate
+    below = -(f.hinge[2] + p.door_length * f.along_door[2])
+    ground = 0.0
+    if below > 0.0:
+        upward = -p.door_length * f.inward[2]  # of the outer edge over the angle
+        ground = max(p.on_ground[0] * below - p.on_ground[1] * upward * rate, 0.0) * upward
+    return (weight + spring + ground - push) * 3.0 / (p.door_mass * p.door_length * p.door_length)
+
+
+@leaf
+def _bristle_rate(touches, i):
+    return touches[i].bristle_rate
+
+
+@kernel
+def rate(p, t, x):
+    """Newton and Euler for the pack, the door's equation, and the bristles (theory.md, eqs. (9.3) to (9.9))."""
+    f = frames(p, t, x)
+    found = contacts(p, t, x)
+    o, v = x.omega_body, x.velocity_world
+    if t < p.pickup:
+        force, torque = _sum(_sum(_wrench(found.rollers, x), _wrench(found.door, x)), _wrench(found.ground, x))
+        force, torque = _sum((force, torque), _wrench(found.walls, x))
+        acceleration = add(scale(1.0 / p.pack_mass, force), (0.0, 0.0, -p.gravity))
+        spin = apply_transposed(f.pack, torque)
+        angular = divide(add(spin, cross(multiply(p.pack_inertia, o), o)), p.pack_inertia)
+    else:
+        acceleration = scale(1.0 / GRIP, subtract((0.0, 0.0, LIFT_SPEED), v))
+        angular = scale(-1.0 / GRIP, o)
+    return UnloadingState(
+        v,
+        o,
+        acceleration,
+        angular,
+        (x.door[1], door_acceleration(p, t, x, f, found.door)),
+        each_index(_bristle_rate, x.on_rollers, found.rollers),
+        each_index(_bristle_rate, x.on_door, found.door),
+        each_index(_bristle_rate, x.on_ground, found.ground),
+    )
+
+
+RATES[UnloadingParameters] = rate
+
+
+def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:
+    """At rest on the rollers, its front `gap` [m] behind the shut door."""
+    none = (0.0, 0.0, 0.0)
+    c, s = math.cos(p.tilt), math.sin(p.tilt)
+    back, up = gap + p.pack_half[0], 2.0 * p.roller_radius + p.pack_half[2]
+    position = (up * s - back * c, 0.0, p.floor_height + back * s + up * c)
+    return UnloadingState(
+        position,
+        exp((0.0, p.tilt, 0.0)),
+        none,
+        none,
+        (0.0, 0.0),
+        (none,) * (2 * ROLLERS + len(SIDES)),
+        (none,) * (CORNERS + len(SIDES)),
+        (none,) * CORNERS,
+    )
+
+
+@leaf
+def _force(touches, i):
+    return touches[i].force
+
+
+@kernel
+def forces_on_pack(p, t, x):
+    """World forces [N]: (at the ten places on rollers and hinge, of the door, of the ground, of the walls)."""
+    found = contacts(p, t, x)
+    rollers = each_index(_force, x.on_rollers, found.rollers)
+    return rollers, _wrench(found.door, x)[0], _wrench(found.ground, x)[0], _wrench(found.walls, x)[0]
+
+
+@kernel
+def energy(p, t, x):
+    """Kinetic and potential energy [J] of pack, door, its spring and the ground's and rollers' springs under them.
+
+    Bristles, the door's stop and its edge on the ground are left out: it is an energy while the door is off both.
+    """
+    f = frames(p, t, x)
+    o, v = x.omega_body, x.velocity_world
+    inertia = p.door_mass * p.door_length * p.door_length / 3.0
+    kinetic = 0.5 * (p.pack_mass * dot(v, v) + dot(o, multiply(p.pack_inertia, o)) + inertia * x.door[1] * x.door[1])
+    height = f.hinge[2] + 0.5 * p.door_length * f.along_door[2]
+    weight = p.gravity * (p.pack_mass * x.position_world[2] + p.door_mass * height)
+    wound = x.door[0] + p.door_preload
+    return kinetic + weight + 0.5 * p.door_spring * wound * wound

@@ -1,0 +1,154 @@
+"""Where the pack touches what, and how fast: rollers, edges, door, ground and walls (theory.md, section 9.3).
+
+`p` is a UnloadingParameters, `x` a UnloadingState.
+"""
+
+import math
+from typing import NamedTuple
+
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
+from lapwing.dynamics.vehicles.unloading_contact import Touch, touch
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each_index
+
+ROLLERS, CORNERS = 4, 8
+SIDES = (-0.8, 0.8)  # where along the pack's width it rests on a roller or an edge, of half its width
+Y = (0.0, 1.0, 0.0)
+SIGNS = tuple((float(a), float(b), float(c)) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1))
+
+
+class Frames(NamedTuple):
+    """What all contacts look at."""
+
+    pack: tuple  # R_world_body
+    spin_world: Vec3  # [rad/s] of the pack
+    forward: Vec3  # x of the crate in the world
+    upward: Vec3  # z of the crate in the world
+    hinge: Vec3  # [m] world frame
+    along_door: Vec3  # from the hinge outward in the door
+    inward: Vec3  # normal of the door's inner face
+    rolling: float  # [rad/s]
+
+
+@leaf
+def roller_speed(p, t):
+    """Speed of the rollers at time t [rad/s]: a ramp."""
+    return p.roller_speed * min(max((t - p.ramp_start) / p.ramp_duration, 0.0), 1.0)
+
+
+@leaf
+def frames(p, t, x):
+    """The frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
+    c, s = math.cos(p.tilt), math.sin(p.tilt)
+    forward, upward = (c, 0.0, -s), (s, 0.0, c)
+    opened, shut = math.sin(x.door[0]), math.cos(x.door[0])
+    along = add(scale(shut, upward), scale(opened, forward))
+    inward = add(scale(opened, upward), scale(-shut, forward))
+    pack = rotation_matrix(x.attitude)
+    hinge = (0.0, 0.0, p.floor_height)
+    return Frames(pack, apply(pack, x.omega_body), forward, upward, hinge, along, inward, roller_speed(p, t))
+
+
+@leaf
+def material_velocity(x, f, place):
+    """Velocity of the pack's material at a place [m/s]."""
+    return add(x.velocity_world, cross(f.spin_world, subtract(place, x.position_world)))
+
+
+@leaf
+def bar(p, x, f, surface, centre, radius, rolling, velocity, bristle):
+    """Contact with a cylinder along y through `centre`, which turns at `rolling` [rad/s] (theory.md, eq. (9.7))."""
+    h = p.pack_half
+    q = apply_transposed(f.pack, subtract(centre, x.position_world))
+    nearest = (min(max(q[0], -h[0]), h[0]), min(max(q[1], -h[1]), h[1]), min(max(q[2], -h[2]), h[2]))
+    gap = subtract(nearest, q)
+    distance = norm(gap)
+    normal = apply(f.pack, scale(1.0 / max(distance, 1e-12), gap))
+    place = add(x.position_world, apply(f.pack, nearest))
+    own = add(velocity, scale(rolling, cross(Y, subtract(place, centre))))
+    # an axis inside of the pack has no nearest face: the pack would be through
+    depth = radius - distance if distance > 0.0 else 0.0
+    return touch(surface, depth, normal, place, subtract(material_velocity(x, f, place), own), bristle)
+
+
+@kernel
+def roller_touch(p, x, f, i):
+    """Contact i of the pack with the rollers (two each) and with the hinge's edge (two)."""
+    sideways = scale(SIDES[i % 2] * p.pack_half[1], Y)
+    if i < 2 * ROLLERS:
+        behind = (i // 2 + 0.5) * p.roller_spacing
+        centre = add(f.hinge, add(scale(-behind, f.forward), scale(p.roller_radius, f.upward)))
+        radius, rolling = p.roller_radius, f.rolling
+    else:
+        centre = add(f.hinge, scale(-p.edge_radius, f.upward))
+        radius, rolling = p.edge_radius, 0.0
+    centre = (centre[0], x.position_world[1] + sideways[1], centre[2])
+    return bar(p, x, f, p.on_rollers, centre, radius, rolling, (0.0, 0.0, 0.0), x.on_rollers[i])
+
+
+@leaf
+def corner(p, x, f, i):
+    """Corner i of the pack in the world [m]."""
+    return add(x.position_world, apply(f.pack, multiply(SIGNS[i], p.pack_half)))
+
+
+@kernel
+def door_touch(p, x, f, i):
+    """Contact i of the pack with the door: eight corners on its inner face, and its outer edge on the pack twice."""
+    if i >= CORNERS:
+        centre = add(f.hinge, scale(p.door_length, f.along_door))
+        centre = (centre[0], x.position_world[1] + SIDES[i - CORNERS] * p.pack_half[1], centre[2])
+        moving = scale(-x.door[1] * p.door_length, f.inward)
+        return bar(p, x, f, p.on_door, centre, p.edge_radius, 0.0, moving, x.on_door[i])
+    place = corner(p, x, f, i)
+    lever = subtract(place, f.hinge)
+    reach, behind = dot(lever, f.along_door), -dot(lever, f.inward)
+    # a corner further behind than this has come around the door, not through it
+    inside = 0.0 < reach < p.door_length and behind < 0.02
+    own = add(scale(-x.door[1] * reach, f.inward), scale(-x.door[1] * behind, f.along_door))
+    relative = subtract(material_velocity(x, f, place), own)
+    return touch(p.on_door, behind if inside else 0.0, f.inward, place, relative, x.on_door[i])
+
+
+@kernel
+def ground_touch(p, x, f, i):
+    """Contact of corner i with the ground."""
+    place = corner(p, x, f, i)
+    return touch(p.on_ground, -place[2], (0.0, 0.0, 1.0), place, material_velocity(x, f, place), x.on_ground[i])
+
+
+@kernel
+def wall_touch(p, x, f, i):
+    """Contact of corner i with the crate's walls, which are smooth: the rear one and the two at the sides."""
+    place = corner(p, x, f, i)
+    lever = subtract(place, f.hinge)
+    velocity, nothing = material_velocity(x, f, place), (0.0, 0.0, 0.0)
+    smooth = (p.on_rollers[0], p.on_rollers[1], 1e-9, 1e-9)
+    deep = dot(lever, f.forward)
+    rear = touch(smooth, -p.depth - deep, f.forward, place, velocity, nothing).force
+    side = -1.0 if place[1] > 0.0 else 1.0
+    over = abs(place[1]) - p.half_width if deep < 0.0 else 0.0
+    beside = touch(smooth, over, (0.0, side, 0.0), place, velocity, nothing).force
+    return Touch(add(rear, beside), place, nothing)
+
+
+class Contacts(NamedTuple):
+    """Every contact of the pack."""
+
+    rollers: tuple[Touch, ...]
+    door: tuple[Touch, ...]
+    ground: tuple[Touch, ...]
+    walls: tuple[Touch, ...]
+
+
+@kernel
+def contacts(p, t, x):
+    """All contacts of the pack at time t."""
+    f = frames(p, t, x)
+    return Contacts(
+        each_index(roller_touch, x.on_rollers, p, x, f),
+        each_index(door_touch, x.on_door, p, x, f),
+        each_index(ground_touch, x.on_ground, p, x, f),
+        each_index(wall_touch, x.on_ground, p, x, f),
+    )

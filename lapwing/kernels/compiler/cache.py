@@ -1,0 +1,120 @@
+"""Numba's cache of one kernel: a file for each compiled version, found by its key."""
+
+import contextlib
+import pickle
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba.core import sigutils
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaWarning
+from numba.core.serialize import dumps
+
+from lapwing.kernels.compiler import cache_files, file_locks, source_digest
+from lapwing.kernels.compiler.cache_key import Key, NotKeptError, key
+from lapwing.kernels.compiler.code_libraries import InnerLibrary
+from lapwing.kernels.compiler.pipeline import is_nested, reduced, restored
+
+
+class Statistics(NamedTuple):
+    """Of the kernels that this process has needed so far."""
+
+    compiled: int
+    loaded: int  # from the disk, with all that they call
+
+
+_counted = {"compiled": 0, "loaded": 0}
+_listeners: list[Callable[[str], None]] = []
+
+
+def statistics() -> Statistics:
+    """How many versions of kernels this process has compiled, and how many it has loaded."""
+    return Statistics(**_counted)
+
+
+def on_compile(listener: Callable[[str], None]) -> None:
+    """Call `listener` with the name of every kernel ("module.function") before it is compiled, here or by another
+    process that this one then waits for."""
+    _listeners.append(listener)
+
+
+class KernelCache(_Cache):
+    """Keeps one kernel's machine code below `_files.root()`; where that cannot be done, nothing is kept."""
+
+    def __init__(self, dispatcher: Dispatcher):
+        self._dispatcher = dispatcher
+        function = dispatcher.py_func
+        self._label = f"{function.__module__}.{function.__qualname__}"
+        self._folder = f"kernels/{function.__module__}"
+        self._name = "".join(c for c in function.__qualname__ if c.isalnum() or c in "._")[:80]
+        self._enabled = True
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder of this kernel's files."""
+        root = cache_files.root()
+        return str(root / self._folder) if root else None
+
+    def enable(self) -> None:
+        """Look up and keep versions."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Do neither."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Delete every version of this kernel."""
+        cache_files.remove(self._folder, self._name)
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """The version for a signature; None if it must be compiled."""
+        target_context.refresh()
+        found = self._key(sig, target_context.codegen()) if self._enabled else None
+        result = self._loaded(found, sig, target_context)
+        if result is None:
+            for listener in _listeners:
+                listener(self._label)
+            if found:
+                file_locks.acquire(f"{self._folder}/{self._file(found, is_nested())}-{found.sources}")
+                result = self._loaded(found, sig, target_context)
+        if result is not None:
+            _counted["loaded"] += 1
+        return result
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Keep a version that has just been compiled."""
+        _counted["compiled"] += 1
+        if data.lifted or data.library.has_dynamic_globals:
+            warnings.warn(f"{self._label} is not kept on disk: it uses addresses of this process", NumbaWarning, 2)
+            return
+        found = self._key(sig, data.codegen) if self._enabled else None
+        if found is not None:
+            name = self._file(found, isinstance(data.library, InnerLibrary))
+            cache_files.write(self._folder, name, found.sources, dumps((found, reduced(data))))
+
+    def _loaded(self, found: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
+        inner = is_nested()
+        content = cache_files.read(self._folder, self._file(found, inner), found.sources) if found else None
+        if content is None:
+            return None
+        with contextlib.suppress(Exception):  # whatever it is, compiling mends it
+            kept, payload = pickle.loads(content)
+            result = restored(target_context, payload) if inner else CompileResult._rebuild(target_context, *payload)
+            if kept == found and result.signature.args == sigutils.normalize_signature(sig)[0]:
+                return result
+        return None
+
+    def _file(self, found: Key, inner: bool) -> str:
+        return f"{self._name}-{'inner-' if inner else ''}{found.made_of}"
+
+    def _key(self, sig: Any, codegen: Any) -> Key | None:
+        arguments, returns = sigutils.normalize_signature(sig)
+        try:
+            found = key(self._dispatcher, arguments, returns, codegen.magic_tuple())
+        except NotKeptError:
+            return None
+        return found if source_digest.unchanged(found.modules) else None

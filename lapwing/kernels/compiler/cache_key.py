@@ -1,0 +1,210 @@
+"""What a compiled version of a kernel is made of, as text that is the same in every process.
+
+Three things make it up: the types of its arguments; every function that it can reach through names, closures and
+tables (`ByClass`), with the constants that these take from their modules; and the sources that can be in it.
+Anything that cannot be told for certain makes the version one that is not kept.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+import hashlib
+import sys
+from collections.abc import Iterable
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+import llvmlite
+import numba
+import numpy as np
+from numba.core import config, types
+from numba.core.dispatcher import Dispatcher
+
+from lapwing.kernels.compiler import source_digest
+from lapwing.kernels.compiler.dispatch_table import ByClass
+
+VERSIONED = {"builtins", "llvmlite", "numba", "numpy"}  # their version is in every key
+PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
+
+
+class NotKeptError(Exception):
+    """Something in a kernel has no text that would be the same in every process."""
+
+
+class Key(NamedTuple):
+    """Of one compiled version."""
+
+    made_of: str  # types, functions and constants, compiler: a digest
+    sources: str  # digest of all sources that can be in it
+    modules: frozenset[str]  # whose sources they are
+
+
+class Part(NamedTuple):
+    """The text of one function, what it refers to, and the values that it was made from."""
+
+    text: str
+    functions: tuple[FunctionType, ...]
+    modules: frozenset[str]
+    seen: tuple[tuple[dict, str, Any], ...]  # (namespace, name, value)
+
+
+class _Writer:
+    """Writes texts and collects what they refer to."""
+
+    def __init__(self) -> None:
+        self.functions: list[FunctionType] = []
+        self.modules: set[str] = set()
+        self.seen: list[tuple[dict, str, Any]] = []
+        self.mutable = False  # may a value have changed although it is the same object?
+
+    def value(self, value: Any) -> str:
+        """Text of a constant, a class, a numba type or a function.
+
+        Raises:
+            NotKeptError: it is none of these.
+        """
+        if isinstance(value, PLAIN):
+            return f"{type(value).__name__} {value!r}"
+        if isinstance(value, Dispatcher):
+            self.functions.append(value.py_func)
+            return f"{_name(value.py_func)} {sorted(value.targetoptions.items())}"
+        if isinstance(value, types.Type):
+            return self.of_type(value)
+        if isinstance(value, type):
+            return self.of_class(value)
+        if isinstance(value, FunctionType):  # no code of a kernel, but stands for some in its module
+            self.modules.add(value.__module__)
+            return _name(value)
+        if isinstance(value, tuple):
+            return f"{self.of_class(type(value))}({', '.join(map(self.value, value))})"
+        self.mutable = True
+        if isinstance(value, list):
+            return f"[{', '.join(map(self.value, value))}]"
+        if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+            array = np.asarray(value)
+            return f"{array.dtype.str} {array.shape} {hashlib.blake2b(array.tobytes()).hexdigest()}"
+        raise NotKeptError(f"{type(value).__name__} has no text")
+
+    def of_type(self, value: types.Type) -> str:
+        """Types are equal if their classes and keys are."""
+        if isinstance(value, types.Dispatcher):  # numba would rebuild it as another one
+            raise NotKeptError("a function as an argument")
+        inside = (value.key, value._fields) if isinstance(value, types.StructRef) else value.key
+        return f"{self.of_class(type(value))}[{self.value(inside)}]"
+
+    def of_class(self, value: type) -> str:
+        """A class by its name, and what it stands for."""
+        module, name = value.__module__, value.__qualname__
+        if module.partition(".")[0] in VERSIONED:
+            return f"{module}.{name}"
+        found: Any = sys.modules.get(module)
+        for part in name.split("."):
+            found = getattr(found, part, None)
+        if found is not value or module == "__main__":
+            raise NotKeptError(f"class {name} cannot be imported")
+        self.modules.add(module)
+        tables = sorted(ByClass.tables.items())  # modules are not imported in the same order everywhere
+        entries = [f", {name}: {self.value(table[value])}" for name, table in tables if value in table]
+        return f"{module}.{name}{''.join(entries)}"
+
+    def of_global(self, path: str, namespace: dict, name: str, names: set[str], told: bool) -> str:
+        """What a function takes from its module, which may have been set from elsewhere; `told` by its source."""
+        value = namespace[name]
+        self.seen.append((namespace, name, value))
+        if isinstance(value, ModuleType):
+            if value.__name__.partition(".")[0] in VERSIONED:
+                return value.__name__
+            self.modules.add(value.__name__)
+            inside = sorted(n for n in names if n in vars(value))
+            return "\n".join(self.of_global(f"{path}.{n}", vars(value), n, set(), told) for n in inside)
+        try:
+            return f"{path} = {self.value(value)}"
+        except NotKeptError:
+            if told:
+                return path
+            raise
+
+
+def _name(function: FunctionType) -> str:
+    return f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
+
+
+def _codes(code: CodeType) -> Iterable[CodeType]:
+    """A function's code, and that of the functions in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+_parts: dict[FunctionType, Part] = {}
+_entered = 0
+
+
+def _part(function: FunctionType) -> Part:
+    """A function by itself: its code, and what its names, closure and defaults refer to."""
+    global _entered
+    if _entered != ByClass.entered:
+        _parts.clear()
+        _entered = ByClass.entered
+    part = _parts.get(function)
+    if part and all(namespace.get(name) is value for namespace, name, value in part.seen):
+        return part
+    writer = _Writer()
+    writer.modules.add(function.__module__)
+    codes = list(_codes(function.__code__))
+    names = {name for code in codes for name in code.co_names}
+    inside = (*(cell.cell_contents for cell in function.__closure__ or ()), function.__defaults__)
+    namespace = function.__globals__
+    told = namespace is getattr(sys.modules.get(function.__module__), "__dict__", None)
+    lines = [
+        _name(function),
+        hashlib.blake2b(b"".join(code.co_code for code in codes), digest_size=16).hexdigest(),
+        *(repr(value) for code in codes for value in code.co_consts if not isinstance(value, CodeType)),
+        *(str(code.co_names) for code in codes),
+        *map(writer.value, inside),
+        *(writer.of_global(name, namespace, name, names, told) for name in sorted(names) if name in namespace),
+    ]
+    part = Part("\n".join(lines), tuple(writer.functions), frozenset(writer.modules), tuple(writer.seen))
+    if not writer.mutable:
+        _parts[function] = part
+    return part
+
+
+def key(dispatcher: Dispatcher, arguments: tuple, returns: Any, target: tuple) -> Key:
+    """The key of a kernel's version for the types of arguments.
+
+    Args:
+        dispatcher: the kernel.
+        arguments: numba types.
+        returns: numba type of the result where it is prescribed, else None.
+        target: numba's description of the processor.
+
+    Raises:
+        NotKeptError: the version cannot be told from others in another process.
+    """
+    writer = _Writer()
+    text = writer.value((dispatcher, *arguments, returns))
+    reached, done = {text}, set()
+    while writer.functions:
+        function = writer.functions.pop()
+        if function not in done:
+            done.add(function)
+            part = _part(function)
+            reached.add(part.text)
+            writer.functions += part.functions
+            writer.modules |= part.modules
+    modules = frozenset(m for m in writer.modules if m.partition(".")[0] not in VERSIONED)
+    if "__main__" in modules or None in modules:
+        raise NotKeptError("outside of a module")
+    lines = [*_compiler(), str(target), *sorted(reached)]
+    made_of = hashlib.blake2b("\n".join(lines).encode(), digest_size=16).hexdigest()
+    try:
+        return Key(made_of, source_digest.digest(modules), modules)
+    except (OSError, SyntaxError) as error:
+        raise NotKeptError(str(error)) from None
+
+
+def _compiler() -> tuple[str, ...]:
+    settings = (config.OPT, config.LOOP_VECTORIZE, config.SLP_VECTORIZE, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT)
+    return (sys.version, numba.__version__, llvmlite.__version__, np.__version__, *map(str, settings))

@@ -1,0 +1,231 @@
+"""How kernels are compiled: what is compiled for another kernel's sake is optimised, but gets no machine code.
+
+Of every function, however small, numba makes machine code and two wrappers, for calls from Python and from C. A kernel
+calls hundreds that end up inlined in it, so that most of the compile time went there. Here such a function is an
+`InnerLibrary`: optimised LLVM code, linked into its caller as numba links any, which takes its arguments whole
+(`_calls`). The outermost kernel's own code does the same with or without (docs/benchmarks.md, "Compile time").
+"""
+
+import gc
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numba
+from numba.core import ir, sigutils, types
+from numba.core.compiler import Compiler, CompileResult, DefaultPassBuilder, PassManager
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
+
+from lapwing.kernels.compiler.call_convention import InnerLower, KernelLower, is_whole, offer
+from lapwing.kernels.compiler.code_libraries import InnerLibrary, KernelLibrary
+from lapwing.kernels.compiler.file_locks import released_at_end
+
+
+class _Depth(threading.local):
+    """Of the compilations in this thread that wait for one another."""
+
+    value = 0
+
+
+_depth = _Depth()
+
+
+@contextmanager
+def _nested() -> Iterator[None]:
+    _depth.value += 1
+    try:
+        yield
+    finally:
+        _depth.value -= 1
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Without looking for garbage: of what a compilation makes nearly all is in use until it ends."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def is_nested() -> bool:
+    """Does a compilation in this thread wait for the next one?"""
+    return _depth.value > 0
+
+
+def reduced(result: CompileResult) -> tuple:
+    """What is kept of a result."""
+    parts = result._reduce()
+    return (*parts[:-1], result.library.environments()) if isinstance(result.library, InnerLibrary) else parts
+
+
+def restored(target_context: Any, reduced: tuple) -> CompileResult:
+    """The result of compiling an inner function, from what `CompileResult._reduce` gave of it."""
+    serialised, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = reduced
+    for reload in reload_init:
+        reload()
+    library = InnerLibrary.restored(target_context.codegen(), serialised)
+    return CompileResult(
+        typing_context=target_context.typing_context, target_context=target_context, library=library,
+        environment=environment, entry_point=_refusal(target_context), fndesc=fndesc, type_annotation=annotation,
+        signature=signature, objectmode=objectmode, lifted=lifted, typing_error=None, call_helper=None, metadata=None,
+        reload_init=reload_init, referenced_envs=environments,
+    )  # fmt: skip
+
+
+@numba.njit
+def _refuse() -> None:
+    raise RuntimeError("compiled for other kernels only")
+
+
+def _refusal(target_context: Any) -> Any:
+    """A new object that stands where numba wants an entry from Python: by it the caller finds the inner function."""
+    _refuse.compile(())
+    result = _refuse.overloads[()]
+    return target_context.get_executable(result.library, result.fndesc, result.environment)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """To machine code with wrappers for Python and C."""
+
+    _name = "kernel_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """What writes the LLVM code."""
+        return KernelLower
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower the function of `state`."""
+        if state.library is None:
+            state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.vectorises = hasattr(state.func_id.func, "__vectorised__")
+            state.library.uncounted = hasattr(state.func_id.func, "__uncounted__")
+            state.library.enable_object_caching()
+        return super().run_pass(state)
+
+
+def _forwards(func_ir: Any) -> bool:
+    """Whether a function hands its arguments to another, and returns what that returns.
+
+    Not with a kernel among them: its address, of which nothing is made, goes only when the code is optimised.
+    """
+    if len(func_ir.blocks) != 1:
+        return False
+    (block,) = func_ir.blocks.values()
+    values = [instruction.value for instruction in block.find_insts(ir.Assign)]
+    operations = [value.op for value in values if isinstance(value, ir.Expr)]
+    names = [value for value in values if isinstance(value, ir.Global | ir.FreeVar)]
+    return operations.count("call") == 1 and set(operations) <= {"call", "cast"} and len(names) <= 1
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class InnerLowering(KernelLowering):
+    """To an `InnerLibrary`, without wrappers."""
+
+    _name = "inner_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """The same, for a function that takes its arguments whole."""
+        return InnerLower
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower the function of `state`."""
+        state.flags = state.flags.copy()
+        state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
+        state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.forwards = state.flags.forceinline and _forwards(state.func_ir)
+        super().run_pass(state)
+        entry, lowered = _refusal(state.targetctx), state["cr"]
+        if hasattr(state.func_id.func, "__apart__") and is_whole(lowered.fndesc):
+            state.library.apart = lowered.fndesc.mangled_name
+        offer(state.targetctx, entry, lowered.fndesc, state.library)
+        state.reload_init.extend(state.library._reload_init)
+        state["cr"] = lowered._replace(cfunc=entry)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelRewrites(NopythonRewrites):
+    """numba's rewrites of what has types: of expressions with arrays, and of those indexed by texts."""
+
+    _name = "kernel_rewrites"
+
+    def run_pass(self, state: Any) -> bool:
+        """Rewrite the function of `state` where it holds either."""
+        if any(isinstance(kind, types.Array | types.misc.StringLiteral) for kind in state.typemap.values()):
+            return super().run_pass(state)
+        return False
+
+
+class Pipeline(Compiler):
+    """numba's pipeline, with the passes of this module."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only one."""
+        ours = {NativeLowering: InnerLowering if _depth.value > 1 else KernelLowering, NopythonRewrites: KernelRewrites}
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        pipeline.passes = [(ours.get(each, each), text) for each, text in pipeline.passes]
+        pipeline.finalize()
+        return [pipeline]
+
+    def _compile_core(self) -> CompileResult:
+        with _nested(), _no_collection():
+            result = super()._compile_core()
+        if not is_nested():  # those of the inner functions that it holds
+            for environment in result._find_referenced_environments():
+                result.library.codegen.set_env(environment.env_name, environment)
+        # numba's own form of the function, only to be printed: most of what Python keeps, and slow to put into text
+        return result._replace(type_annotation="")
+
+
+def _widened(kind: types.Type) -> types.Type:
+    """The type of a number, where this is that of a constant."""
+    return types.misc.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
+
+
+class KernelDispatcher(CPUDispatcher):
+    """numba's dispatcher, which compiles a function again when Python calls what was compiled for kernels only."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """One version for all whole numbers and truth values, constant or not, where numba makes one for each constant:
+        LLVM puts constants in where it inlines the function."""
+        one, named = [_widened(kind) for kind in args], {name: _widened(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(one), named)
+
+    def compile(self, sig: Any) -> Any:
+        """Its entry from Python for a signature.
+
+        numba's own keeps the time, which is a twentieth of it: every call of LLVM is told to all that wait.
+        """
+        arguments, returns = sigutils.normalize_signature(sig)
+        with released_at_end(), global_compiler_lock, self._compiling_counter:
+            result = self.overloads.get(tuple(arguments))
+            if result is not None and (is_nested() or not isinstance(result.library, InnerLibrary)):
+                return result.entry_point
+            if (result := self._cache.load_overload(sig, self.targetctx)) is not None:
+                self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+                self.add_overload(result)
+            else:
+                result = self._compiler.compile(arguments, returns)
+                self.add_overload(result)
+                self._cache.save_overload(sig, result)
+            return result.entry_point
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Offer a version to kernels, and to Python if it is emitted."""
+        if isinstance(cres.library, InnerLibrary):
+            self.overloads[tuple(cres.signature.args)] = cres
+            offer(self.targetctx, cres.entry_point, cres.fndesc, cres.library)  # also what came from the disk
+        else:
+            super().add_overload(cres)

@@ -1,0 +1,161 @@
+"""The state of the sources that modules are made of: their own and, transitively, those that they import."""
+
+import hashlib
+import importlib.util
+import os
+import sys
+import sysconfig
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from lapwing.kernels.compiler.import_scan import imports
+from lapwing.kernels.compiler.start_time import BEGAN
+
+OURS = {"cosim", "dynamics", "lapwing", "messages", "services", "studies"}
+STANDARD = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
+INSTALLED = {"site-packages", "dist-packages"}
+
+
+class Source(NamedTuple):
+    """One module: its file, the digest of that, and the modules that it imports."""
+
+    path: str
+    digest: str
+    imports: tuple[str, ...]
+
+
+@cache
+def _file(module: str) -> str | None:
+    """The source file of a module, without importing it; None if there is none."""
+    loaded = sys.modules.get(module)
+    if loaded is not None:
+        path = getattr(loaded, "__file__", None)
+        return path if isinstance(path, str) and path.endswith(".py") else None
+    package, _, name = module.rpartition(".")
+    if not package:
+        try:
+            spec = importlib.util.find_spec(module)
+        except (ImportError, ValueError):
+            return None
+        return spec.origin if spec and spec.origin and spec.origin.endswith(".py") else None
+    for folder in _folders(package):
+        for entry, path in ((name, f"{folder}/{name}/__init__.py"), (f"{name}.py", f"{folder}/{name}.py")):
+            if entry in _entries(folder) and os.path.isfile(path):
+                return path
+    return None
+
+
+@cache
+def _folders(package: str) -> tuple[str, ...]:
+    """Where the modules of a package are; () if it is a plain module."""
+    loaded = sys.modules.get(package)
+    if loaded is not None:
+        return tuple(getattr(loaded, "__path__", ()))
+    path = _file(package)
+    if path is not None:
+        return (os.path.dirname(path),) if os.path.basename(path) == "__init__.py" else ()
+    above, _, name = package.rpartition(".")
+    if above:
+        return tuple(f"{folder}/{name}" for folder in _folders(above) if name in _entries(folder))
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        return ()
+    return tuple(spec.submodule_search_locations or ()) if spec else ()
+
+
+@cache
+def _entries(folder: str) -> frozenset[str]:
+    try:
+        return frozenset(os.listdir(folder))
+    except OSError:
+        return frozenset()
+
+
+@cache
+def _kind(package: str) -> str:
+    """Whether a top-level package is "followed", only "stamped" as it is somebody else's, "standard" or "missing"."""
+    place = _file(package) or next(iter(_folders(package)), None)
+    if place is None:
+        return "standard" if package in sys.stdlib_module_names else "missing"
+    if INSTALLED.intersection(Path(place).parts):
+        return "stamped"
+    return "standard" if place.startswith(STANDARD) else "followed"
+
+
+@cache
+def _source(module: str) -> Source:
+    """A module that has a file. Of somebody else's package, named with a `*`, only its state as a whole counts."""
+    path = _file(module.rstrip("*")) or ""
+    if module.endswith("*"):
+        state = os.stat(path)
+        return Source("", f"{int(state.st_mtime)} {state.st_size}", ())
+    with open(path, "rb") as file:
+        content = file.read()
+    version = hashlib.blake2b(content, digest_size=16).hexdigest()
+    found = set()
+    own = module.partition(".")[0]
+    for name in imports(module, os.path.basename(path) == "__init__.py", content, version):
+        top = name.partition(".")[0]
+        kind = "followed" if top in OURS or top == own else _kind(top)
+        if kind == "followed" and _file(name):
+            found.add(name)
+        elif kind == "stamped" and _file(top):
+            found.add(f"{top}*")
+    return Source(path, version, tuple(found))
+
+
+@cache
+def _reach(module: str) -> frozenset[str]:
+    """A module, all that it imports, and the packages in which they are."""
+    found, ahead = {module}, [module]
+    while ahead:
+        new = set(_source(ahead.pop()).imports) - found
+        found |= new
+        ahead += new
+    # a package's own file runs before any module in it; what it imports for others is not followed
+    parts = [name.split(".") for name in found]
+    above = {".".join(p[:n]) for p in parts for n in range(1, len(p))}
+    return frozenset(found | {name for name in above if _file(name)})
+
+
+@cache
+def _all(modules: frozenset[str]) -> frozenset[str]:
+    found: frozenset[str] = frozenset().union(*(_reach(m) for m in modules if _kind(m.partition(".")[0]) != "standard"))
+    return found
+
+
+@cache
+def _digest(modules: frozenset[str]) -> str:
+    lines = sorted(f"{name} {_source(name).digest}" for name in _all(modules))
+    return hashlib.blake2b("\n".join(lines).encode(), digest_size=16).hexdigest()
+
+
+def digest(modules: Iterable[str]) -> str:
+    """Hexadecimal digits that change with the sources of modules and of all that these import.
+
+    The standard library does not count, and of an installed package that is not this project's only its date.
+
+    Raises:
+        OSError: a module has no source, or it cannot be read.
+        SyntaxError: a source is not Python.
+    """
+    return _digest(frozenset(modules))
+
+
+def forget() -> None:
+    """Look at all sources anew: a module has been replaced by another of its name."""
+    for remembered in (_file, _folders, _entries, _kind, _source, _reach, _all, _digest):
+        remembered.cache_clear()
+
+
+def unchanged(modules: Iterable[str]) -> bool:
+    """Are these sources those that this process runs? Not so if a file has changed since it began."""
+    try:
+        states = [os.stat(path) for name in _all(frozenset(modules)) if (path := _source(name).path)]
+    except OSError:
+        return False
+    # a file that is moved here keeps its time of modification, not that of its entry
+    return all(max(state.st_mtime, state.st_ctime) < BEGAN for state in states)

@@ -1,0 +1,169 @@
+"""Values in memory as compiled code has them, put there and read from there by Python, without compiling anything.
+
+Compiled code counts who uses the memory of a cell or an array, and the last one lets it go. So memory here belongs to
+such a count from the beginning (numba's `MemInfo`), and holds a count of its own of every array and cell in it.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+import ctypes
+import struct
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python as counted
+from numba.np.numpy_support import as_dtype
+
+from lapwing.kernels.tree_flatten import leaves
+
+ARRAY, CELL = "PPqqP", "P"  # of an array before its shape and strides: count, owner, items, size of one, place; a count
+
+
+class Layout(NamedTuple):
+    """How the values of a type lie in memory."""
+
+    format: str  # of the module `struct`
+    alignment: int  # [bytes]
+    counted: tuple[int, ...]  # of the values in the format, those that are pointers to counts
+    values: int  # how many there are
+    leaves: int  # of the value
+    others: tuple[int, ...]  # of the leaves, those that are no numbers
+
+
+@cache
+def layout(kind: types.Type) -> Layout:
+    """The layout of a numba type.
+
+    Raises:
+        TypeError: Python cannot put such a value there.
+    """
+    if isinstance(kind, types.Boolean):
+        return Layout("?", 1, (), 1, 1, ())
+    if isinstance(kind, types.Integer):
+        code = {8: "b", 16: "h", 32: "i", 64: "q"}[kind.bitwidth]
+        return Layout(code if kind.signed else code.upper(), kind.bitwidth // 8, (), 1, 1, ())
+    if isinstance(kind, types.Float):
+        return Layout("d" if kind.bitwidth == 64 else "f", kind.bitwidth // 8, (), 1, 1, ())
+    if isinstance(kind, types.NoneType):
+        return Layout("P", 8, (), 1, 1, (0,))
+    if isinstance(kind, types.StructRef):
+        return Layout(CELL, 8, (0,), 1, 1, (0,))
+    if isinstance(kind, types.Array):
+        return Layout(f"{ARRAY}{2 * kind.ndim}q", 8, (0,), len(ARRAY) + 2 * kind.ndim, 1, (0,))
+    if not isinstance(kind, types.BaseTuple):
+        raise TypeError(f"compiled code is handed numbers, arrays, tuples and NamedTuples only, not {kind}")
+    parts = [layout(part) for part in kind]
+    alignment = max((part.alignment for part in parts), default=1)
+    align = {1: "", 2: "0h", 4: "0i", 8: "0q"}[alignment]
+    pointers, others, values, leaves = [], [], 0, 0
+    for part in parts:
+        pointers += [values + i for i in part.counted]
+        others += [leaves + i for i in part.others]
+        values += part.values
+        leaves += part.leaves
+    written = align + "".join(part.format for part in parts) + align
+    return Layout(written, alignment, tuple(pointers), values, leaves, tuple(others))
+
+
+@cache
+def _make_ready() -> None:
+    """Make numba's counting ready."""
+    cpu_target.target_context.refresh()
+
+
+class Memory:
+    """The memory of one value of a numba type.
+
+    Attributes:
+        pointer: to the count of its users, which is what stands for it in compiled code.
+        count: the same for numba; as long as it is there, the memory is.
+    """
+
+    def __init__(self, kind: types.Type, leaves: Sequence[Any], lies: Layout):
+        """Of the leaves of a value of a type with this layout."""
+        _make_ready()
+        self._block = _Block(kind, lies, leaves)
+        self.pointer: int = counted.meminfo_new(self._block.address, self._block)
+        self.count = counted._MemInfo(self.pointer)
+
+    def read(self) -> Any:
+        """The value, its arrays as copies."""
+        return _read(self._block.kind, iter(self._block.numbers()))
+
+    def write(self, value: Any) -> None:
+        """Put another value of the same type.
+
+        Raises:
+            TypeError: it is of another type.
+        """
+        if numba.typeof(value) != self._block.kind:
+            raise TypeError(f"expected a value of type {self._block.kind}, got {numba.typeof(value)}")
+        self._block.release()
+        self._block.put(leaves(value))
+
+
+class _Block:
+    """The memory itself; it lets go of what in it is counted when compiled code lets go of it."""
+
+    def __init__(self, kind: types.Type, lies: Layout, leaves: Sequence[Any]):
+        self.kind, self._layout = kind, lies
+        self._struct = struct.Struct(lies.format)
+        self._place = (ctypes.c_int64 * (1 + self._struct.size // 8))()
+        self.address = ctypes.addressof(self._place)
+        self.put(leaves)
+
+    def put(self, leaves: Sequence[Any]) -> None:
+        """Fill it."""
+        numbers = list(leaves)
+        for k in reversed(self._layout.others):
+            numbers[k : k + 1] = _in_memory(leaves[k])
+        self._struct.pack_into(self._place, 0, *numbers)
+
+    def numbers(self) -> tuple:
+        """What is in it now, flat."""
+        return self._struct.unpack_from(self._place)
+
+    def release(self) -> None:
+        """Let go of the arrays and cells that are in it now."""
+        if self._layout.counted:
+            numbers = self.numbers()
+            for i in self._layout.counted:
+                if numbers[i]:
+                    counted._MemInfo(numbers[i])  # takes the count over, and ends
+            self._place[:] = [0] * len(self._place)
+
+    def __del__(self) -> None:
+        self.release()
+
+
+def _in_memory(leaf: Any) -> tuple[int, ...]:
+    """What stands in memory for an array, a cell or None."""
+    if leaf is None:
+        return (0,)
+    if isinstance(leaf, np.ndarray):
+        place = leaf.ctypes.data
+        count = counted.meminfo_new(place, leaf)
+        return count, id(leaf), leaf.size, leaf.itemsize, place, *leaf.shape, *leaf.strides
+    leaf.memory.count.acquire()  # a cell's
+    return (leaf.memory.pointer,)
+
+
+def _read(kind: types.Type, numbers: Iterator[Any]) -> Any:
+    if isinstance(kind, types.BaseTuple):
+        parts = [_read(part, numbers) for part in kind.types]
+        return kind.instance_class(*parts) if isinstance(kind, types.BaseNamedTuple) else tuple(parts)
+    if isinstance(kind, types.Array):
+        _, _, items, size, data, *extents = (next(numbers) for _ in range(layout(kind).values))
+        place = (ctypes.c_char * (items * size)).from_address(data)
+        shape, strides = extents[: kind.ndim], extents[kind.ndim :]
+        return np.ndarray(shape, as_dtype(kind.dtype), place, strides=strides).copy()
+    number = next(numbers)
+    if isinstance(kind, types.StructRef):
+        raise TypeError("a cell is not read through another one")
+    return None if isinstance(kind, types.NoneType) else number

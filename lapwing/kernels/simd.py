@@ -1,0 +1,215 @@
+"""Four numbers side by side in one vector register: what is the same for four propellers is computed once for them all.
+
+Lanes exist in compiled code only. They add, subtract, multiply, divide and negate among themselves and with floats,
+lane by lane and rounded as floats are, so all of `lapwing.dynamics.vector` and the arithmetic of `lapwing.dynamics.lie` take them.
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import define, generated
+from lapwing.kernels.state_tree import NUMBERS, unroll
+
+FLOAT, INDEX = ir.DoubleType(), ir.IntType(32)
+VECTOR = ir.VectorType(FLOAT, 4)
+
+
+class LanesType(types.Type):
+    """The numba type of four floats side by side."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Lanes")
+
+
+LANES = LanesType()
+NUMBERS.append(LanesType)
+
+
+@register_model(LanesType)
+class _Model(models.PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Any):
+        super().__init__(dmm, fe_type, VECTOR)
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """The vector that holds a float in every lane; a vector as it is."""
+    if value.type == VECTOR:
+        return value
+    one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INDEX(0))
+    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(INDEX, 4), [0] * 4))
+
+
+def _binary(operation: Any, instruction: str) -> None:
+    pairs = ((LANES, LANES), (LANES, types.float64), (types.float64, LANES))
+
+    class Template(ConcreteTemplate):
+        key = operation
+        cases = [signature(LANES, *pair) for pair in pairs]  # noqa: RUF012
+
+    infer_global(operation)(Template)
+    for pair in pairs:
+
+        @lower_builtin(operation, *pair)
+        def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return getattr(builder, instruction)(*(_spread(builder, a) for a in args))
+
+
+for _operation, _instruction in (
+    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv"),
+):  # fmt: skip
+    _binary(_operation, _instruction)
+
+
+@infer_global(operator.neg)
+class _Negative(ConcreteTemplate):
+    key = operator.neg
+    cases = [signature(LANES, LANES)]  # noqa: RUF012
+
+
+@lower_builtin(operator.neg, LANES)
+def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+@intrinsic
+def lanes(context, a, b, c, d):
+    """Four floats side by side."""
+
+    def made(context, builder, sig, args):
+        vector = ir.Constant(VECTOR, ir.Undefined)
+        for k, value in enumerate(args):
+            vector = builder.insert_element(vector, value, INDEX(k))
+        return vector
+
+    return signature(LANES, *[types.float64] * 4), made
+
+
+@intrinsic
+def spread(context, x):
+    """One float in every lane."""
+    return signature(LANES, types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
+
+
+@intrinsic
+def apart(context, x):
+    """The four floats of x as a tuple."""
+
+    def taken(context, builder, sig, args):
+        parts = [builder.extract_element(args[0], INDEX(k)) for k in range(4)]
+        return context.make_tuple(builder, sig.return_type, parts)
+
+    return signature(types.UniTuple(types.float64, 4), LANES), taken
+
+
+@intrinsic
+def root(context, x):
+    """The square root of every lane."""
+
+    def taken(context, builder, sig, args):
+        kind = ir.FunctionType(VECTOR, (VECTOR,))
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.sqrt.v4f64"), args)
+
+    return signature(LANES, LANES), taken
+
+
+@intrinsic
+def where(context, flag, a, b):
+    """Lane by lane a where flag is above zero, else b; a and b lanes or floats."""
+
+    def chosen(context, builder, sig, args):
+        zero = ir.Constant(VECTOR, [0.0] * 4)
+        return builder.select(builder.fcmp_ordered(">", args[0], zero), *(_spread(builder, a) for a in args[1:]))
+
+    return signature(LANES, LANES, a, b), chosen
+
+
+@leaf
+def choose(flag, a, b):
+    """The vector a where flag is above zero, else b."""
+    return (where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]))
+
+
+@intrinsic
+def any_above(context, x):
+    """Is any lane above zero?"""
+
+    def asked(context, builder, sig, args):
+        above = builder.fcmp_ordered(">", args[0], ir.Constant(VECTOR, [0.0] * 4))
+        four = builder.bitcast(above, ir.IntType(4))
+        return builder.icmp_unsigned("!=", four, four.type(0))
+
+    return signature(types.boolean, LANES), asked
+
+
+def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> Any:
+    data = context.make_array(array)(context, builder, value).data
+    return builder.bitcast(builder.gep(data, [start]), VECTOR.as_pointer())
+
+
+@intrinsic
+def load(context, array, start):
+    """The four numbers of a contiguous array of floats from the `start`-th on, in memory order; not checked."""
+
+    def taken(context, builder, sig, args):
+        return builder.load(_place(context, builder, sig.args[0], *args), align=8)
+
+    return signature(LANES, array, types.intp), taken
+
+
+@intrinsic
+def store(context, array, start, x):
+    """Put x where `load` would take it from."""
+
+    def put(context, builder, sig, args):
+        builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)
+        return context.get_dummy_value()
+
+    return signature(types.none, array, types.intp, LANES), put
+
+
+@leaf
+def total(x):
+    """The sum of the four lanes."""
+    a, b, c, d = apart(x)
+    return (a + b) + (c + d)
+
+
+def _beside(four: Any) -> Callable:
+    paths, names = tuple(f"four[{k}]" for k in range(4)), {"lanes": lanes}
+    expression = unroll(four.types[0], paths, lambda found, p, _: None if found else f"lanes({', '.join(p)})", names)
+    return define("beside(four)", names, f"return {expression}")
+
+
+beside = generated(
+    "beside(four)",
+    _beside,
+    "The tree of lanes whose lane k holds the numbers of the k-th of four trees of one shape.",
+    inline=True,
+)
+
+
+def _separate(tree: Any) -> Callable:
+    names: dict[str, Any] = {"apart": apart}
+    parts = [
+        unroll(tree, ("tree",), lambda found, p, _, k=k: None if found else f"apart({p[0]})[{k}]", names)
+        for k in range(4)
+    ]
+    return define("separate(tree)", names, f"return ({', '.join(parts)})")
+
+
+separate = generated(
+    "separate(tree)",
+    _separate,
+    "The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `beside`.",
+    inline=True,
+)

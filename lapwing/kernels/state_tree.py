@@ -1,0 +1,193 @@
+"""Operations on states of any shape, written once: a state is a tree of tuples and NamedTuples.
+
+A leaf is a float, or an instance of a registered manifold class (`Quaternion`, `Direction`, ...). A tangent has the
+shape of the state with every manifold leaf replaced by the tuple of its tangent coordinates. Each operation is compiled
+from the *type* of the state: the tree is unrolled into straight-line code, so that it costs nothing at run time and is
+kept in the disk cache. Called from Python the same generated code runs uncompiled (slow; for tests and set-up).
+"""
+
+# numba.core.types fills itself at import
+# mypy: disable-error-code="attr-defined"
+
+import itertools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba.core import types
+from numba.core.errors import TypingError
+
+from lapwing.kernels import ByClass
+from lapwing.kernels.codegen import define, generated
+
+
+class Manifold(NamedTuple):
+    """What a manifold leaf class must know; compiled functions, u and v in its tangent coordinates.
+
+    The tangent space at every point is one Lie algebra that acts on the manifold (theory.md, section 5.1).
+    """
+
+    retract: Callable  # (x, v) -> the point that the exponential of v takes x to
+    embed: Callable  # (x, v) -> time derivative of the stored numbers of x, as a tuple
+    normalise: Callable  # (x) -> the nearest point on the manifold
+    bracket: (
+        Callable  # (u, v) -> [u, v], signed so that retract(x, u)' = v means u' = v - [u, v]/2 + [u, [u, v]]/12 - ...
+    )
+    transport: Callable  # (u, v) -> v parallel-transported from retract(x, u) back to x along the geodesic
+
+
+MANIFOLDS = ByClass()
+NUMBERS: list[type] = [types.Float]
+"""The numba types that are numbers in a tree."""
+
+
+def _leaf_class(tree: types.Type) -> type | None:
+    found = getattr(tree, "instance_class", None)
+    return found if found in MANIFOLDS else None
+
+
+def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict[str, Any]) -> str:
+    """Source of the tree whose leaves are `rule(leaf class or None for a float, paths, names)`.
+
+    A rule that gives None for a manifold class is asked for each of the numbers stored in it instead.
+    """
+    if isinstance(tree, tuple(NUMBERS)):
+        return rule(None, paths, names)
+    leaf = _leaf_class(tree)
+    if leaf and (expression := rule(leaf, paths, names)):
+        return expression
+    if isinstance(tree, types.NoneType):
+        return "None"
+    if not isinstance(tree, types.BaseTuple):
+        raise TypingError(f"a state holds floats, tuples and manifold leaves only, not {tree}")
+    parts = [unroll(part, tuple(f"{a}[{i}]" for a in paths), rule, names) for i, part in enumerate(tree.types)]
+    if isinstance(tree, types.BaseNamedTuple):
+        name = f"Node{len(names)}"
+        names[name] = tree.instance_class
+        return f"{name}({', '.join(parts)})"
+    return f"({', '.join(parts)}{',' if len(parts) == 1 else ''})"
+
+
+def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable:
+    """The generic function `signature`: its source is `body(type of the argument shape, names)`, one expression."""
+    position = signature.rstrip(")").partition("(")[2].split(", ").index(shape)
+
+    def generate(*argument_types):
+        names: dict[str, Any] = {}
+        expression = body(argument_types[position], names)
+        return define(signature, names, f"return {expression}")
+
+    return generated(signature, generate, doc)
+
+
+def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float: str) -> Callable:
+    """Body that maps a `Manifold` operation over the leaves, and the template `on_float` over the floats."""
+
+    def rule(leaf, paths, names):
+        if leaf is None:
+            return on_float.format(*paths)
+        function = f"{operation}_{leaf.__name__}"
+        names[function] = getattr(MANIFOLDS[leaf], operation)
+        return f"{function}({', '.join(paths[takes])})"
+
+    return lambda tree, names: unroll(tree, paths, rule, names)
+
+
+def _of_numbers(paths: tuple[str, ...], template: str) -> Callable:
+    """Body that maps a template over every stored number."""
+    return lambda tree, names: unroll(tree, paths, lambda leaf, p, _: None if leaf else template.format(*p), names)
+
+
+def _number_paths(tree: types.Type, path: str) -> list[str]:
+    """Expressions of all stored numbers of a tree, in order."""
+    found: list[str] = []
+
+    def rule(leaf, paths, _):
+        if leaf is None:
+            found.append(paths[0])
+        return None if leaf else paths[0]
+
+    unroll(tree, (path,), rule, {})
+    return found
+
+
+def _flatten(tree: types.Type, names: dict[str, Any]) -> str:
+    return f"({' '.join(f'{path},' for path in _number_paths(tree, 'x'))})"
+
+
+def _largest(tree: types.Type, names: dict[str, Any]) -> str:
+    return f"max(0.0, {', '.join(f'abs({path})' for path in _number_paths(tree, 'v'))})"
+
+
+def _finite(tree: types.Type, names: dict[str, Any]) -> str:
+    # NaN and infinity times zero are NaN
+    return f"{' + '.join(f'0.0 * {path}' for path in _number_paths(tree, 'x'))} == 0.0"
+
+
+def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
+    def rule(leaf, paths, _):
+        x, e = paths
+        found.append(f"abs({e}) / (1.0 + abs({x}))" if leaf is None else f"largest({e})")
+        return x
+
+    found: list[str] = []
+    unroll(tree, ("x", "e"), rule, names)
+    names["largest"] = largest
+    return f"max(0.0, {', '.join(found)})"
+
+
+def _apart(tree: types.Type, names: dict[str, Any]) -> str:
+    names["of_part"] = apart
+    found = []
+    for i, part in enumerate(tree.types):  # calls for tuples: the same ones come again and again
+        if isinstance(part, types.BaseTuple):
+            found.append(f"of_part(x[{i}], y[{i}])")
+        else:
+            found += [f"abs({n} - y{n[1:]}) / (1.0 + abs({n}))" for n in _number_paths(part, f"x[{i}]")]
+    return f"max(0.0, 0.0, {', '.join(found)})"
+
+
+def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:
+    index = itertools.count()
+    return unroll(tree, (), lambda leaf, _, __: None if leaf else f"numbers[{next(index)}]", names)
+
+
+retract = _operation(
+    "retract(x, v)", "x", _of_manifold("retract", ("x", "v"), slice(0, 2), "{0} + {1}"),
+    "The state reached from x along the tangent v: group exponential on manifold leaves, x + v on floats.",
+)  # fmt: skip
+embed = _operation(
+    "embed(x, v)", "x", _of_manifold("embed", ("x", "v"), slice(0, 2), "{1}"),
+    "Time derivative of the stored numbers of the state x that moves with tangent v.",
+)  # fmt: skip
+normalise = _operation(
+    "normalise(x)", "x", _of_manifold("normalise", ("x",), slice(0, 1), "{0}"),
+    "The state with every manifold leaf brought back onto its manifold.",
+)  # fmt: skip
+bracket = _operation(
+    "bracket(x, u, v)", "x", _of_manifold("bracket", ("x", "u", "v"), slice(1, 3), "0.0"),
+    "Lie bracket [u, v] of two tangents at x, signed as `Manifold.bracket`; zero on floats.",
+)  # fmt: skip
+transport = _operation(
+    "transport(x, u, v)", "x", _of_manifold("transport", ("x", "u", "v"), slice(1, 3), "{2}"),
+    "The tangent v at retract(x, u), parallel-transported back to x.",
+)  # fmt: skip
+axpy = _operation(
+    "axpy(a, v, y)", "y", _of_numbers(("v", "y"), "{1} + a * {0}"),
+    "y + a v number by number, for a scalar a; y a tangent, or a state with v its embedded derivative.",
+)  # fmt: skip
+scale = _operation("scale(a, v)", "v", _of_numbers(("v",), "a * {0}"), "a v for a scalar a and a tangent v.")
+flatten = _operation("flatten(x)", "x", _flatten, "Every stored number of a state or tangent, as one flat tuple.")
+largest = _operation("largest(v)", "v", _largest, "The largest absolute number of a state or tangent.")
+error_ratio = _operation(
+    "error_ratio(x, e)", "x", _error_ratio,
+    "Largest component of a tangent e at x, floats relative to 1 + |x|, manifold leaves absolute (rad, rad/s).",
+)  # fmt: skip
+apart = _operation(
+    "apart(x, y)", "x", _apart,
+    "The largest difference between stored numbers of two states, relative to 1 + |x|; not of those that are NaN.",
+)  # fmt: skip
+finite = _operation("finite(x)", "x", _finite, "True if no number of a state or tangent is NaN or infinite.")
+unflatten = _operation(
+    "unflatten(x, numbers)", "x", _unflatten,
+    "The state of the shape of x that holds `numbers` (a flat tuple or a row of an array); inverse of `flatten`.",
+)  # fmt: skip

@@ -1,0 +1,81 @@
+"""Values of one structure flattened by a function written for it: a tenth of the time of walking through each anew.
+
+Cells of a flight hold some two thousand numbers, in trees that a campaign makes for every run.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.kernels.codegen import define
+from lapwing.kernels.type_fingerprint import UnknownError, structure
+
+_BY_TYPE = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
+
+
+def leaves(value: Any) -> list[Any]:
+    """All numbers, arrays and cells of a tree of tuples and NamedTuples, in order."""
+    found: list[Any] = []
+    _walk(value, found)
+    return found
+
+
+def _walk(value: Any, found: list[Any]) -> None:
+    if not isinstance(value, tuple):
+        found.append(value)
+        return
+    for item in value:
+        if type(item) is float:
+            found.append(item)
+        else:
+            _walk(item, found)
+
+
+class Flattener:
+    """Flattens values of one structure."""
+
+    def __init__(self, example: Any):
+        """Of the structure of a value that `structure` knows."""
+        self._flatten = _written(example)
+        tuples, parts = self._flatten(example)
+        self._types = tuple(map(type, tuples)), tuple(map(type, parts))
+        # of these the class does not say all
+        self._closer = [(k, structure(part)) for k, part in enumerate(parts) if type(part) not in _BY_TYPE]
+
+    def leaves(self, value: Any) -> tuple[Any, ...] | None:
+        """The same as of the function; None of a value of another structure."""
+        try:
+            tuples, parts = self._flatten(value)
+        except (TypeError, ValueError):  # it has other tuples, or of other lengths
+            return None
+        if (tuple(map(type, tuples)), tuple(map(type, parts))) != self._types:
+            return None
+        return parts if all(_is_of(parts[k], known) for k, known in self._closer) else None
+
+
+def _is_of(value: Any, known: Any) -> bool:
+    try:
+        return structure(value) == known
+    except UnknownError:
+        return False
+
+
+def _written(example: Any) -> Any:
+    """A function that unpacks values like the example: (value) -> (its tuples, its leaves)."""
+    lines: list[str] = []
+    tuples: list[str] = []
+    parts: list[str] = []
+
+    def walk(value: Any, name: str) -> None:
+        if not isinstance(value, tuple):
+            parts.append(name)
+            return
+        tuples.append(name)
+        names = [f"v{len(lines)}_{k}" for k in range(len(value))]
+        lines.append(f"[{', '.join(names)}] = {name}")
+        for item, of in zip(value, names, strict=True):
+            walk(item, of)
+
+    walk(example, "value")
+    given = [f"({''.join(f'{name}, ' for name in names)})" for names in (tuples, parts)]
+    return define("flatten(value)", {}, *lines, f"return {', '.join(given)}")

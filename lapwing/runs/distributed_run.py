@@ -1,0 +1,143 @@
+"""A run whose services are started elsewhere: watched to its end."""
+
+import re
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.processes.interrupt import Stop
+from lapwing.cosim.processes.run_monitor import WATCHER, Watch
+from lapwing.cosim.run_errors import RunFailed
+from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENCODER
+from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.runs.multi_process_run import Clock
+from lapwing.runs.observer import Elapsed, Observer
+from lapwing.services import process_table
+from lapwing.services.process_main import Participation
+from lapwing.services.security import settings
+
+LOST = 6.0  # [s] without news after which a run counts as lost: after a cut of 2 s, TCP takes up to 4 s to send again
+GRACE = 2.0  # [s] that links of one run may differ by
+JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
+CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has failed
+
+
+def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch], None] = lambda watch: None) -> Elapsed:
+    """Watch a run whose services are started elsewhere, to its end; `live` is shown it some five times a second.
+
+    Raises:
+        RunFailed: a service does not come, or is gone before the end.
+        ValueError: not a key prefix, or its certificate cannot be used.
+        Interrupted: ended by a signal.
+    """
+    setup, peers, key_prefix = given.setup, given.peers, given.key_prefix
+    check_key_prefix(key_prefix)
+    external = given.external or {}
+    clock, participants = Clock(observer, setup), Participants(key_prefix, external=tuple(external))
+    names = set(process_table.needed(setup, external))
+    listen, connect = mesh(WATCHER, peers)
+    mark, security = participants.mark(WATCHER), settings(setup, WATCHER, key_prefix, given.keys)
+    with Stop() as stop, ZenohBus(listen, connect, mark=mark, security=security) as bus:
+        watch = Watch(bus, participants, peers, LOST, setup.services)
+        leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
+        try:
+            _follow(watch, clock, stop, names, live)
+        except RunFailed:
+            leave()  # at which the others end
+            deadline = time.monotonic() + CLOSE_TIMEOUT
+            while names <= watch.present and process_table.RECORDER not in watch.gone and time.monotonic() < deadline:
+                watch.poll(0.2)
+            raise
+    return clock.elapsed
+
+
+def _follow(watch: Watch, clock: Clock, stop: Stop, names: set[str], live: Callable[[Watch], None]) -> None:
+    """Watch the run of the participants `names` to its end; errors as of `fly_joined`."""
+    deadline = time.monotonic() + JOIN_TIMEOUT
+    while not (watch.ended and process_table.RECORDER in watch.gone):
+        live(watch)
+        watch.poll(0.2)
+        clock.observe(watch)
+        stop.check()
+        if not names <= watch.present:
+            watch.last_news = time.monotonic()
+            if time.monotonic() > deadline:
+                raise RunFailed(f"nobody answers as {', '.join(sorted(names - watch.present))}")
+        elif not watch.ended and watch.gone & names and not _comes(watch, lambda: watch.ended, GRACE):
+            raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
+        elif watch.began is None and time.monotonic() < deadline:
+            watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
+        elif culprit := watch.frozen(names):
+            raise RunFailed(culprit)
+    # After a cut, links come back one after another; whoever says how it ended stays until it is heard
+    others = names - {process_table.RECORDER}
+    _comes(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
+    live(watch)
+    if early := watch.broken_off():
+        raise RunFailed(early)
+
+
+def _comes(watch: Watch, news: Callable[[], bool], seconds: float) -> bool:
+    """Whether some news arrives within so many seconds, by other links than the news that somebody has gone."""
+    deadline = time.monotonic() + seconds
+    while not news() and time.monotonic() < deadline:
+        watch.poll(0.2)
+    return news()
+
+
+def parse_peers(text: str) -> dict[str, str]:
+    """ "name=endpoint,..." as a table. Programs of somebody else's stand first: all others connect to them.
+
+    Raises:
+        ValueError: not of this form, or no endpoint.
+    """
+    peers = dict(pair.split("=", 1) for pair in text.split(",") if "=" in pair)
+    if not peers or len(peers) != len(text.split(",")):
+        raise ValueError(f"--peers {text}: expected name=endpoint,..., for example plant=tcp/plant:7447")
+    for endpoint in peers.values():
+        check_endpoint("--peers", endpoint)
+    return {**elsewhere(peers), **peers}
+
+
+def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
+    """Refuse a table of participants that lacks one.
+
+    Raises:
+        ValueError: names those that are missing.
+    """
+    if missing := [name for name in needed if name not in peers]:
+        raise ValueError(f"--peers: no endpoint for {', '.join(missing)}")
+
+
+def elsewhere(peers: Mapping[str, str]) -> dict[str, str]:
+    """The programs of somebody else's in a table: services whose messages have a process of their own in it."""
+    return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
+
+
+def parse_external(texts: Iterable[str], setup: Setup) -> dict[str, str]:
+    """Each "name=endpoint" as a table.
+
+    Raises:
+        ValueError: not of this form, no endpoint, or no service of the lock step that could be elsewhere.
+    """
+    found = {}
+    for text in texts:
+        name, _, endpoint = text.partition("=")
+        choices = [service for service in setup.services if service != process_table.TIME_OWNER]
+        if name not in choices:
+            raise ValueError(f"--external {text}: expected NAME=ENDPOINT with one of {', '.join(choices)}")
+        check_endpoint(f"--external {name}", endpoint)
+        found[name] = endpoint
+    return found
+
+
+def check_endpoint(option: str, text: str) -> None:
+    """Refuse what is no Zenoh endpoint.
+
+    Raises:
+        ValueError: not of the form protocol/address:port, and no path of a Unix-domain socket.
+    """
+    if not re.fullmatch(r"(tcp|udp|tls|quic|ws)/[^/\s]+:\d+|unixsock-stream/\S+", text):
+        raise ValueError(f"{option} {text}: expected an endpoint protocol/address:port, for example tcp/127.0.0.1:7447")

@@ -1,0 +1,44 @@
+"""A run in processes followed while it goes on: what is new of it, and what happened, for those who show it."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.processes.run_monitor import Watch
+from lapwing.messages.topics import EVENTS
+from lapwing.runs.log_events import event_messages
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_events import Event
+from lapwing.studies.live_flight import LiveFlight, new_events
+
+Shows = Callable[[Sequence[Flight], Sequence[list[Event]]], None]
+
+
+class Following:
+    """Tells of each step of a run; events also go out on their topic, for viewers that are processes of the run."""
+
+    def __init__(self, setup: Setup, shows: Iterable[Shows] = ()):
+        """Of a run that is about to begin; each of `shows` is given a step of every vehicle and what happened in it."""
+        self._flights, self._after = [LiveFlight(member) for member in members(setup)], -1.0
+        self._services, self._shows = set(setup.services), tuple(shows)
+
+    def observe(self, watch: Watch) -> None:
+        """Take in what is new in a run that is watched."""
+        watch.listen = self._take
+        if not watch.spoken >= self._services:
+            return
+        steps = [step for flight in self._flights if (step := flight.step(watch.time_ns)) is not None]
+        if len(steps) < len(self._flights):  # the plant tells of all vehicles at once, or of none
+            return
+        happened = [new_events(step, self._after) for step in steps]
+        self._after = float(steps[0].truth.times[-1])
+        for step, events in zip(steps, happened, strict=True):
+            for time_ns, payload in event_messages(events):
+                watch.publish(EVENTS.name.format(vehicle=step.vehicle), time_ns, payload)
+        for show in self._shows:
+            show(steps, happened)
+
+    def _take(self, pages: list[Page]) -> None:
+        for flight in self._flights:
+            flight.take(pages)

@@ -1,0 +1,30 @@
+"""The events of a flight as a topic of its log, so that every viewer shows them."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from lapwing.cosim.log.append import append
+from lapwing.messages import Log, stamp
+from lapwing.messages.topics import EVENTS
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_events import Event
+
+
+def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
+    """Time [ns] and payload of each event, in order."""
+    found = []
+    for event in events:
+        time_ns = max(0, round(event.time * 1e9))
+        level = Log.WARN if KINDS[event.kind].serious else Log.INFO
+        found.append((time_ns, Log(stamp(time_ns), level, event.kind, event.text).encode()))
+    return found
+
+
+def add_events(log: Path, flight: Flight) -> None:
+    """Write the events of a recorded flight into its log, which has its end and does not tell of them.
+
+    Raises:
+        ValueError: the log cannot be written.
+    """
+    append(log, EVENTS.key(flight.vehicle), Log, event_messages(flight.events))

@@ -1,0 +1,136 @@
+"""A run with every service in a process of its own."""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO
+
+from lapwing.cosim.access.publisher_ids import Participants, new_secret
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.multi_vehicle import leading
+from lapwing.cosim.processes.child_process import Child
+from lapwing.cosim.processes.interrupt import Stop
+from lapwing.cosim.processes.launcher import launch
+from lapwing.cosim.processes.restart_policy import Restarts
+from lapwing.cosim.processes.run_monitor import Watch
+from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.messages.topics import POSE, STATUS
+from lapwing.runs.compile_notice import Stopwatch
+from lapwing.runs.observer import Elapsed, Observer
+from lapwing.services import process_table
+from lapwing.services.common.run_schema import Run
+from lapwing.services.process_main import Participation, hand_over
+
+
+def fly_processes(
+    given: Participation,
+    observer: Observer,
+    beside: Iterable[str] = (),
+    live: Callable[[Watch], None] = lambda watch: None,
+    early: dict[str, Child] | None = None,
+) -> Elapsed:
+    """Fly with every service in a process of its own.
+
+    Args:
+        given: what every process is given, but for its name and the endpoints.
+        observer: is told how far the run is, and at the end what the processes beside had to say.
+        beside: processes without which the flight goes on.
+        live: is shown the run as it is seen, some five times a second.
+        early: processes that are already started.
+
+    Raises:
+        RunFailed: a service died or froze, or the run ended before its time.
+        ValueError: not a key prefix, or a service refused what it was given.
+        Interrupted: ended by a signal.
+    """
+    check_key_prefix(given.key_prefix)
+    setup, given = given.setup, given._replace(secret=new_secret())
+    clock = Clock(observer, setup)
+    external = given.external or {}
+    again = restarted(setup)
+    if again and external:
+        raise ValueError(f"run.restart: {', '.join(external)}: a program of your own has no bundles to give again")
+    names = [*process_table.needed(setup, external), *([process_table.ROUTER] if given.open else [])]
+    core = shared_core(setup)
+
+    def give(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
+        own = given._replace(
+            name=name,
+            peers=endpoints,
+            core=core if name in setup.services else None,
+            open=given.open if name == process_table.ROUTER else (),
+            with_parent=True,
+            restarts=bool(again),
+            journal=journals.get(name, -1),
+        )
+        hand_over(own, stream)
+
+    participants = Participants(given.key_prefix, given.secret, tuple(external))
+    with Stop() as stop, ExitStack() as stack:
+        journals = {name: stack.enter_context(_journal(given.log)).fileno() for name in again}
+        restarts = Restarts(journals, observer.say)
+
+        def ended(watch: Watch) -> bool:
+            live(watch)
+            return clock.observe(watch) or stop.number is not None
+
+        services = setup.services
+        said = launch(names, give, participants, ended, beside, external, restarts, early, services)
+        for name, words in said.items():
+            for line in words.splitlines():
+                observer.say(f"{name}: {line}")
+        stop.check()
+    if clock.refused:
+        observer.say(f"refused: {clock.refused} messages that no participant of this run has sent")
+    return clock.elapsed
+
+
+def restarted(setup: Setup) -> tuple[str, ...]:
+    """The services that are started again where they are killed."""
+    return tuple(setup.resolved[Run.TABLE].get("restart", ()))
+
+
+def _journal(log: str) -> IO[bytes]:
+    """A file beside the log that has no name and is gone with the last process that has it open."""
+    try:
+        return tempfile.TemporaryFile(dir=Path(log).parent, prefix="lapwing-")
+    except OSError as error:
+        raise ValueError(f"no journal for run.restart beside {log}: {error.strerror}") from None
+
+
+class Clock:
+    """Follows a run for the observer, and measures it from its first batch to its last."""
+
+    def __init__(self, observer: Observer, setup: Setup):
+        self._observer, self._began, self._slow_disk = observer, False, False
+        self._pose, self._status = leading(setup, POSE), leading(setup, STATUS)
+        self._compiling = Stopwatch("processes", setup, observer.compiling)
+        self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
+
+    def observe(self, watch: Watch) -> bool:
+        """Show what is new; never asks to stop."""
+        self.refused = watch.refused
+        if watch.began is None:
+            if watch.compiling:
+                self._compiling.began()
+            return False
+        if not self._began:
+            self._began = True
+            self._compiling.ended()
+            self._observer.begin()
+        if watch.slow_disk and not self._slow_disk:
+            self._slow_disk = True
+            self._observer.say("the disk is slow: the run waits for its log to be written")
+        self.elapsed = Elapsed(watch.time_ns * 1e-9, watch.wall)
+        self._observer.show(watch.time_ns, watch.newest.get(self._pose), watch.newest.get(self._status))
+        return False
+
+
+def shared_core(setup: Setup) -> int | None:
+    """The core for all services of a sequential lock step, in which only one works at a time; None: leave it free."""
+    if setup.coupling != "sequential" or not hasattr(os, "sched_getaffinity"):
+        return None
+    cores = sorted(os.sched_getaffinity(0))
+    return cores[os.getpid() % len(cores)]

@@ -1,0 +1,107 @@
+"""A recorded run flown again from its log alone: its set-up, and the commands at the ticks at which they applied."""
+
+import json
+import tempfile
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from lapwing.cosim.config import user_module
+from lapwing.cosim.config.provenance import SETUP_FILE
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.serialise import from_json
+from lapwing.cosim.log import LogReader
+from lapwing.messages import OperatorInput
+from lapwing.messages.topics import OPERATOR
+from lapwing.runs.observer import Observer
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.process_table import Operator
+
+
+def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> Setup:
+    """The set-up of a run's log, which may have classes of these modules.
+
+    Raises:
+        ValueError: it carries none, or one of another version.
+    """
+    if SETUP_FILE not in read.attachments:
+        raise ValueError(f"{read.path}: carries no set-up; expected a log that `lapwing run` has written")
+    try:
+        found = from_json(read.attachments[SETUP_FILE].decode(), modules)
+    except ValueError as error:
+        raise ValueError(f"{read.path}: its set-up cannot be read: {error}; expected {read.versions}") from None
+    if not isinstance(found, Setup):
+        raise ValueError(f"{read.path}: its attachment {SETUP_FILE} is no set-up")
+    return found
+
+
+def carried_modules(read: LogReader) -> dict[str, str]:
+    """The texts of the modules that the set-up of a run's log carries, by name; none of its classes is imported."""
+    try:
+        return dict(json.loads(read.attachments.get(SETUP_FILE, b"{}"))["resolved"].get("modules", {}))
+    except (ValueError, LookupError, TypeError, AttributeError):
+        return {}
+
+
+def given_commands(read: LogReader, setup: Setup, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """The commands from outside, with the ticks at which they applied; none where nobody was listened to.
+
+    Args:
+        read: a log.
+        setup: its own.
+        vehicle: whose; "" of the first.
+
+    Raises:
+        ValueError: they are of another version.
+    """
+    topic = OPERATOR.key(vehicle or setup.vehicles[0])
+    if topic not in read.topics():
+        return
+    read.check_versions([topic])
+    for _, _, time_ns, payload in read.messages([topic]):
+        yield time_ns // setup.interval_ns, OperatorInput.decode(payload).commands
+
+
+def refly(log: Path, observer: Observer | None = None, run_code: bool = False) -> tuple[str, str]:
+    """Digests of the log, and of the run flown again up to the log's last tick.
+
+    Args:
+        log: of a run.
+        observer: is told how far the run is.
+        run_code: whether Python modules that the log carries may be run.
+
+    Raises:
+        ValueError: no log, or none of a run, it carries modules that must not be run, or a service was a program
+            of somebody else's.
+    """
+    with LogReader(log) as read:
+        modules = carried_modules(read)
+        if modules and not run_code:
+            files = ", ".join(f"modules.{name}.py" for name in modules)
+            raise ValueError(f"{log}: carries code of its author ({files}): read it, and give --run-code to run it")
+        user_module.install(modules)
+        setup = without_plan(recorded_setup(read, modules))
+        if elsewhere := read.metadata.get("external"):
+            raise ValueError(f"{log}: cannot be flown again: {elsewhere} was a program of somebody else's")
+        operators = {vehicle: _at(dict(given_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
+        times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
+        last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
+        before = read.digest()
+    with tempfile.TemporaryDirectory() as place:
+        again = Path(place) / "again.mcap"
+        fly_single(setup, again, observer=observer, operator=operators, last=last)
+        with LogReader(again) as read:
+            return before, read.digest()
+
+
+def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
+    return lambda tick: given.get(tick, ())
+
+
+def without_plan(setup: Setup) -> Setup:
+    """The set-up without the plan's commands, which a log has among those that the autopilot took."""
+    if "autopilot" not in setup.services or not setup.vehicle:  # a fleet has no plan
+        return setup
+    autopilot = setup.services["autopilot"]
+    flown = autopilot._replace(parameters=autopilot.parameters._replace(plan=()))
+    return setup._replace(services={**setup.services, "autopilot": flown})

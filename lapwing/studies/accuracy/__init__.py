@@ -1,0 +1,10 @@
+"""What accuracy costs: every integrator over its steps or tolerances, on systems whose answer is known.
+
+`lapwing accuracy TARGET`; a target is a problem of `systems/`, or a scene's file.
+"""
+
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.targets import find
+from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
+
+__all__ = ["Point", "Problem", "cheapest", "find", "measure"]

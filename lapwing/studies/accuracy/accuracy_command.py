@@ -1,0 +1,88 @@
+"""`lapwing accuracy`: a target studied, and what was found shown, written and drawn."""
+
+import sys
+import threading
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+
+from lapwing.kernels import statistics
+from lapwing.services.common.vehicle_schema import Effects
+from lapwing.studies import terminal
+from lapwing.studies.accuracy import console_output, error_budget, scenes
+from lapwing.studies.accuracy import work_precision_plot as picture
+from lapwing.studies.accuracy.error_budget import Part
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.targets import find, scene_of
+from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure
+from lapwing.studies.effects.cost import costs
+
+WIDTH = 120  # letters of a table that goes to no terminal
+SLOW = 3.0  # [s] after which the user is told why
+
+
+class Study(NamedTuple):
+    """What `lapwing accuracy` has found of a target: a system by name, or a scene."""
+
+    target: str
+    problem: Problem
+    points: list[Point]
+    chosen: Point | None  # the cheapest that meets the goal
+    parts: list[Part]  # the errors of a scene's flight
+    cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, standing
+
+
+def console() -> Console:
+    """The terminal, or a page of fixed width where the output goes elsewhere."""
+    return terminal.console(None if sys.stdout.isatty() else WIDTH)
+
+
+def study(screen: Console, target: str, overrides: list[str], goal: float | None) -> Study:
+    """Study one target.
+
+    Args:
+        screen: where the user is told why it takes long.
+        target: name of a problem, or a scene's file.
+        overrides: "key=value" of the scene.
+        goal: error whose cheapest choice is named, None for no such choice.
+
+    Raises:
+        ValueError: no such target, no sound goal, or a goal that no method meets.
+    """
+    check_target(goal)
+    scene = scene_of(target, overrides)
+    problem = scenes.problem(scene) if scene else find(target)
+    compiled = statistics().compiled
+
+    def told() -> None:
+        screen.print("compiling, and measuring ..." if statistics().compiled > compiled else "measuring ...")
+
+    notice = threading.Timer(SLOW, told)
+    notice.daemon = True
+    notice.start()
+    try:
+        points = measure(problem)
+        chosen = None if goal is None else cheapest(points, goal)
+        parts = error_budget.errors(scene) if scene else []
+        cost = costs(scene, [scene[Effects].tables])[0] if scene and error_budget.touches(scene) else None
+        return Study(target, problem, points, chosen, parts, cost)
+    finally:
+        notice.cancel()
+
+
+def show(screen: Console, found: Study) -> None:
+    """Print the table, and that of the errors of a scene's flight."""
+    console_output.show(screen, found.problem, found.points, found.chosen)
+    if found.parts:
+        console_output.show_parts(screen, found.parts, found.cost)
+
+
+def write_json(path: Path, found: Study) -> None:
+    """Write all points for other programs."""
+    console_output.write_json(path, found.target, found.problem, found.points, found.chosen, found.parts, found.cost)
+
+
+def plot(path: Path, found: Study) -> None:
+    """Draw error over time."""
+    picture.draw(path, found.problem.title, found.points, found.parts)

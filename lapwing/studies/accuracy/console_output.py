@@ -1,0 +1,99 @@
+"""The study's points as a table and as JSON."""
+
+import json
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.studies.accuracy.error_budget import Part
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.work_precision import Point, telling
+
+LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are shown
+
+
+def setting(point: Point, unit: str) -> str:
+    """The step or tolerance of a point as one reads it."""
+    return f"tol {point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.3g} {unit}"
+
+
+def sentence(point: Point, unit: str) -> str:
+    """One line about a point."""
+    what = "tolerance" if point.unit == "tol" else "step"
+    text = f"{point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.6g} {unit}"
+    cost = "" if point.evaluations is None else f", {point.evaluations} evaluations"
+    return f"{point.way}, {what} {text}: error {point.error:.1e}, {1e3 * point.time:.3g} ms{cost}"
+
+
+def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
+    """Print, of each method, its cheapest points at a few errors."""
+    console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
+    table = Table(box=None, pad_edge=False, collapse_padding=True)
+    table.add_column("method (order)\n    step")
+    drifts = ["drift of\n" + name.replace(" ", "\n") for name in _drifts(points)]
+    for name in ("error", "time\n[ms]", "evaluations", *drifts):
+        table.add_column(name, justify="right", no_wrap=True)
+    before = None
+    for point in telling(points, LEVELS):
+        if point.way != before:
+            table.add_row(f"{point.way} ({point.order})")
+        table.add_row(
+            f"    {setting(point, problem.unit)}", f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
+            "" if point.evaluations is None else str(point.evaluations),
+            *(f"{point.drift[n]:.0e}" for n in _drifts(points)),
+        )  # fmt: skip
+        before = point.way
+    console.print(table)
+    if chosen is not None:
+        console.print(f"cheapest: {sentence(chosen, problem.unit)}", highlight=False)
+
+
+def _drifts(points: list[Point]) -> list[str]:
+    return list(points[0].drift) if points else []
+
+
+def show_parts(console: Console, parts: list[Part], cost: tuple[float, float] | None) -> None:
+    """Print the errors of a flight, and what a step of the plant costs [ns]: hovering, and standing."""
+    console.print("What the flight loses to each, in closed loop without noise; nine ticks in ten are below:")
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("source", no_wrap=True)
+    table.add_column("setting", no_wrap=True)
+    table.add_column("position (m)", justify="right")
+    table.add_column("attitude (rad)", justify="right")
+    table.add_column("largest (m)", justify="right")
+    before = None
+    for part in parts:
+        source = part.source if part.source != before else ""
+        errors = (part.position, part.attitude, part.largest_position)
+        table.add_row(source, part.label, *(f"{error:.1e}" for error in errors))
+        before = part.source
+    console.print(table)
+    if cost:
+        air, ground = cost
+        console.print(f"A plant step takes {air:.0f} ns hovering, {ground:.0f} ns in contact.", highlight=False)
+
+
+def write_json(
+    path: Path,
+    target: str,
+    problem: Problem,
+    points: list[Point],
+    chosen: Point | None,
+    parts: list[Part],
+    cost: tuple[float, float] | None = None,
+) -> None:
+    """Write all points, and of a scene its errors and what a step of its plant costs, for other programs."""
+    data = {
+        "target": target,
+        "title": problem.title,
+        "duration": problem.duration,
+        "time_unit": problem.unit,
+        "reference": problem.source,
+        "points": [p._asdict() for p in points],
+        "cheapest": chosen._asdict() if chosen else None,
+        "apart": [p._asdict() for p in parts],
+        "step_ns": dict(zip(("hovering", "in contact"), cost, strict=True)) if cost else None,
+    }
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")

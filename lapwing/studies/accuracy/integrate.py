@@ -1,0 +1,108 @@
+"""The ways to solve a system of `dynamics`: every integrator that applies to it."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics import integrators
+from lapwing.dynamics.integrators import adapt, rate, record
+from lapwing.kernels import kernel, uncompiled
+from lapwing.kernels.state_tree import flatten, unflatten
+from lapwing.studies.accuracy.coordinates import coordinates, defect
+from lapwing.studies.accuracy.problem import Outcome, Way
+
+ADAPTIVE = "rkmk54"  # the method that `adapt` runs
+SAMPLES = 8  # parts of a run after which its invariants are looked at; every count of steps is a multiple
+HALVINGS = 18
+TOLERANCES = tuple(10.0**-k for k in range(1, 14))
+
+
+def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, rows: np.ndarray) -> float:
+    """Mean evaluations in a step of h, counted in the step at each of these times and states (uncompiled)."""
+    calls = 0
+
+    def counting(p: Any, t: float, state: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return rate(p, t, state)
+
+    for t, row in zip(times, rows, strict=True):
+        uncompiled(method.step)(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
+    return calls / len(times)
+
+
+# kernels of this file, so that their cache names no class but those of systems that every user of the study can import
+@kernel
+def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
+    """March from time 0 in steps of h, each `every`-th state into a row of `out`; returns how many rows are finite."""
+    return record(method, p, 0.0, x, h, every, out)
+
+
+@kernel
+def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
+    """Write the states at `times` into the rows of `out`, by steps under error control; how it ended, as of `adapt`."""
+    return adapt(p, x, times, tolerance, out)
+
+
+def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
+    """A way for each integrator, the adaptive one by tolerances.
+
+    Args:
+        p: parameters of the system (its class is in `RATES`).
+        x: state at time 0.
+        duration: of the run.
+        coarsest: steps of the coarsest run; a multiple of SAMPLES.
+    """
+    fixed = fixed_ways(p, x, duration, coarsest)
+    return [_adaptive(p, x, duration) if way.name == ADAPTIVE else way for way in fixed]
+
+
+def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
+    """A way for each integrator, all by steps."""
+    return [_fixed(name, p, x, duration, coarsest) for name in integrators.fitting(p, x)]
+
+
+def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
+    method, width = integrators.get(name), len(flatten(x))
+    token = method.Method()
+
+    def steps(h: float) -> int:
+        return round(duration / h)
+
+    def prepare(h: float) -> Callable[[], Any]:
+        out, every = np.empty((SAMPLES + 1, width)), steps(h) // SAMPLES
+        return lambda: (sampled(token, p, x, duration / steps(h), every, out), out)
+
+    def read(h: float, result: Any) -> Outcome | None:
+        rows, out = result
+        if rows < len(out):
+            return None
+        times = np.linspace(0.0, duration, SAMPLES + 1)
+        each = getattr(method, "EVALUATIONS", None) or counted(method, p, x, h, times[:-1], out[:-1])
+        evaluations = round(steps(h) * each)
+        return Outcome(times, coordinates(x, out), defect(x, out[-1]), evaluations)
+
+    settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]
+    start = np.empty((1, width))
+    return Way(name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start))
+
+
+def _adaptive(p: Any, x: Any, duration: float) -> Way:
+    method, ends = integrators.get(ADAPTIVE), np.array([0.0, duration])
+
+    def prepare(tolerance: float) -> Callable[[], Any]:
+        out = np.empty((2, len(flatten(x))))
+        return lambda: (adapted(p, x, ends, tolerance, out), out)
+
+    def read(tolerance: float, result: Any) -> Outcome | None:
+        (status, _, _, steps, rejected), out = result
+        if status != 0:
+            return None
+        # the first stage is the last of the step before
+        evaluations = 1 + (method.EVALUATIONS - 1) * (steps + rejected)
+        return Outcome(ends, coordinates(x, out), defect(x, out[-1]), evaluations)
+
+    start = np.empty((1, len(flatten(x))))
+    return Way(ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapted(p, x, ends[:1], 1.0, start))

@@ -1,0 +1,135 @@
+"""The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics import integrators
+from lapwing.dynamics.integrators import rkmk54
+from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.noise import Key, stream_key
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor import advance, observe
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import each
+from lapwing.kernels.state_tree import flatten
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.plant import models
+from lapwing.studies.accuracy.coordinates import coordinates, defect
+from lapwing.studies.accuracy.integrate import SAMPLES
+from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+
+DURATION = 2.0  # [s], about
+HEIGHT = 20.0  # [m] clear of the ground
+FINEST = 64  # steps in an exchange interval, of the reference; the runs that are compared have half as many at most
+TICK = 1000  # of the first exchange, so that random effects have begun
+
+
+@leaf
+def _wave(t: float, volts: float, phase: float) -> float:
+    return volts * (1.0 + 0.02 * math.sin(3.0 * t + phase))
+
+
+@kernel
+def flight(
+    method: Any,
+    p: MultirotorParameters,
+    key: Key,
+    state: MultirotorState,
+    volts: tuple[float, ...],
+    phase: tuple[float, ...],
+    h: float,
+    n: int,
+    every: int,
+    out: np.ndarray,
+) -> None:
+    """Fly exchanges of n steps of h [s] under waving voltages; a row of `out` for each `every` of them."""
+    tick = TICK
+    for row in range(out.shape[0]):
+        if row > 0:
+            for _ in range(every):
+                state = advance(method, p, key, tick, state, each(_wave, tick * n * h, volts, phase), h, n)
+                tick += 1
+        numbers = flatten(seen(p.layout, state.motion))
+        for i in range(len(numbers)):
+            out[row, i] = numbers[i]
+
+
+def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
+    """(parameters, start) of a scene with a multirotor of one or several bodies: in the air, moving and turning."""
+    form, p = model(scene).described(scene)
+    start = ((0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p), (3.0, 1.0, -0.5), (0.4, -0.6, 0.3))
+    return p, form.initial_state(p, *start)
+
+
+def model(scene: Scene) -> Any:
+    """The module of the scene's plant model."""
+    return models.get(scene[Vehicle].model)
+
+
+def longest_step(scene: Scene) -> float:
+    """The longest step [s] that the scene's model accepts."""
+    found = getattr(model(scene), "longest_step", None)
+    return found(scene) if found else math.inf
+
+
+def problem(scene: Scene) -> Problem:
+    """The plant of such a scene, and the ways to integrate it."""
+    exchange = scene[Exchange]
+    (p, state), longest = physics(scene), longest_step(scene)
+    motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
+    volts = (hover_speed(p) / p.layout.speed_per_volt,) * len(motion.rotor_speed)
+    phase = tuple(2.4 * i for i in range(len(volts)))
+    every = max(1, round(DURATION * exchange.rate / SAMPLES))
+    duration = SAMPLES * every * exchange.interval
+    key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
+
+    def flown(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+        out = np.empty((rows, len(flatten(motion))))
+        token, h = method.Method(), exchange.interval / steps
+        return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
+
+    def way(name: str) -> Way:
+        method = integrators.get(name)
+
+        def read(step: float, out: np.ndarray) -> Outcome | None:
+            if not np.isfinite(out).all():
+                return None
+            each_step = getattr(method, "EVALUATIONS", None)
+            evaluations = each_step and SAMPLES * every * round(exchange.interval / step) * each_step
+            times = np.linspace(0.0, duration, SAMPLES + 1)
+            return Outcome(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
+
+        settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
+        return Way(
+            name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
+            flown(method, 1, rows=1),
+        )  # fmt: skip
+
+    return Problem(
+        f"{scene.name}: its multirotor in the air under prescribed voltages",
+        "s",
+        duration,
+        [way(name) for name in integrators.fitting(p, state.motion)],
+        lambda: coordinates(motion, flown(rkmk54, FINEST)())[-1],
+        f"rkmk54 with {FINEST} steps in an exchange interval",
+        {},
+    )
+
+
+def hover_speed(p: MultirotorParameters) -> float:
+    """Speed of all rotors [rad/s] that carries the weight."""
+    low, high = 0.0, p.layout.speed_per_volt * p.layout.max_voltage
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        state = multirotor.initial_state(p, (0.0, 0.0, HEIGHT), rotor_speed=middle)
+        volts = (middle / p.layout.speed_per_volt,) * len(p.layout.x_body)
+        rises = observe(p, TICK, 1e-3, state, volts).acceleration_world[2] > 0.0
+        low, high = (low, middle) if rises else (middle, high)
+    return 0.5 * (low + high)

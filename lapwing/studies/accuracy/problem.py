@@ -1,0 +1,44 @@
+"""What a system offers to the study: a problem with a known answer, and the ways to solve it."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Outcome(NamedTuple):
+    """What one run of a way gives."""
+
+    times: np.ndarray  # of the samples, shape (k,), the first the start, the last the end
+    samples: np.ndarray  # coordinates (lapwing/studies/accuracy/coordinates.py) at these times, shape (k, n)
+    defect: float  # how far the end is off its manifold
+    evaluations: int | None  # of the right-hand side; None where they are not known
+
+
+class Way(NamedTuple):
+    """One method, for one problem.
+
+    A setting is its step or its tolerance. `prepare(setting)` gives what is timed, a call that does all the work and
+    nothing else; `read(setting, result of that call)` its Outcome, or None where the run failed; `idle()` is the same
+    call without a single step, whose time is taken off.
+    """
+
+    name: str
+    order: int
+    unit: str  # of the settings: "s", or "tol" for a tolerance
+    settings: Sequence[float]  # coarse to fine
+    prepare: Callable[[float], Callable[[], Any]]
+    read: Callable[[float, Any], Outcome | None]
+    idle: Callable[[], Any]
+
+
+class Problem(NamedTuple):
+    """A system from a start to an end."""
+
+    title: str
+    unit: str  # of time
+    duration: float
+    ways: Sequence[Way]
+    reference: Callable[[], np.ndarray]  # coordinates at the end, shape (n,)
+    source: str  # what the reference is
+    invariants: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]  # (times, samples) -> values, shape (k, ...)

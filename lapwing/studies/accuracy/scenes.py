@@ -1,0 +1,75 @@
+"""Scenes as problems: the plant that a scene flies, and the exchange interval that its steps divide."""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.integrators import get
+from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
+from lapwing.kernels.state_tree import flatten
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.studies.accuracy import plant
+from lapwing.studies.accuracy.coordinates import coordinates
+from lapwing.studies.accuracy.integrate import SAMPLES, fixed_ways, sampled
+from lapwing.studies.accuracy.problem import Problem
+
+FINEST = 64  # steps in an exchange interval, of the reference
+
+
+def problem(scene: Scene) -> Problem:
+    """What integrators are compared on for a scene.
+
+    Raises:
+        ValueError: its model is none that this study knows how to integrate.
+    """
+    if hasattr(plant.model(scene), "described"):
+        return plant.problem(scene)
+    return _marched(scene, *physics(scene))
+
+
+def physics(scene: Scene) -> tuple[Any, Any]:
+    """(parameters, start) of the scene's plant.
+
+    Raises:
+        ValueError: its model is none that this study knows how to integrate.
+    """
+    model = plant.model(scene)
+    if hasattr(model, "described"):
+        return plant.physics(scene)
+    if not hasattr(model, "system"):
+        name = scene[Vehicle].model
+        raise ValueError(f"{scene.path}: vehicle.model: the integrators of {name} cannot be compared")
+    return model.system(scene)
+
+
+def _marched(scene: Scene, p: Any, x: Any) -> Problem:
+    interval = scene[Exchange].interval
+    ticks = SAMPLES * max(1, round(scene[Run].duration / interval / SAMPLES))
+    p = lifted(p)
+
+    def reference() -> np.ndarray:
+        out = np.empty((2, len(flatten(x))))
+        sampled(get("rkmk54").Method(), p, x, interval / FINEST, FINEST * ticks, out)
+        return coordinates(x, out)[-1]
+
+    return Problem(
+        f"{scene.name}: its plant",
+        "s",
+        ticks * interval,
+        fixed_ways(p, x, ticks * interval, ticks),
+        reference,
+        f"rkmk54 with {FINEST} steps in an exchange interval",
+        {},
+    )
+
+
+def lifted(p: Any) -> Any:
+    """The parameters; of a carried load with thrusts that carry the weight, and some turning."""
+    if not isinstance(p, CooperativeLoadParameters):
+        return p
+    n = len(p.quad_mass)
+    thrust = tuple(p.gravity * (m + p.load_mass / n) for m in p.quad_mass)
+    return p._replace(drive=LiftCommand(thrust, ((0.01, -0.02, 0.01),) * n))

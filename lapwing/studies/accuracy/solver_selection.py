@@ -1,0 +1,92 @@
+"""`[solver] accuracy`: the cheapest integrator and step for a scene, measured once and remembered."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from lapwing.cosim.scene import Scene, SceneError, Source
+from lapwing.dynamics import integrators
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.kernels import cache_folder, source_digest
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Effects, Vehicle
+from lapwing.services.plant.schema import Solver
+from lapwing.studies.accuracy import scenes
+from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
+
+
+def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
+    """What is to be set so that the scene's accuracy is met at the least cost; nothing where a step is given.
+
+    Args:
+        scene: any scene.
+        say: told of a measurement before it begins.
+
+    Raises:
+        SceneError: no integrator meets the accuracy on this plant.
+    """
+    solver = scene[Solver]
+    if not solver.undecided:
+        return []
+    assert solver.accuracy is not None
+    points = _points(scene, say)
+    if "integrator" in solver.model_fields_set:
+        points = [p for p in points if p.way == solver.integrator]
+    try:
+        chosen = cheapest(points, solver.accuracy)
+    except KeyedError as error:
+        message = f"{solver.accuracy:g}: {error.message}"
+        raise SceneError("solver.accuracy", message, source=Source(scene.path)) from None
+    # the step that `Solver.check` takes for a divisor of the interval
+    return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
+
+
+def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
+    """The points of the scene's plant: from the user's cache, so that every later run flies the same."""
+    path = _file(scene)
+    if path and (known := _read(path)):
+        return known
+    say("measuring the integrators on this plant for solver.accuracy (first time only; minutes if they are compiled)")
+    points = measure(scenes.problem(scene))
+    if path is not None:
+        with suppress(OSError):  # where nothing can be kept, they are measured again
+            path.parent.mkdir(parents=True, exist_ok=True)
+            complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
+            complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
+            complete.replace(path)
+    return points
+
+
+def _read(path: Path) -> list[Point]:
+    """What has been measured before; nothing where it is not there or damaged."""
+    with suppress(OSError, ValueError, TypeError):
+        return [Point(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+    return []
+
+
+def _file(scene: Scene) -> Path | None:
+    """Named by the sources and by all that the plant is made of, but for its solution; None without a cache."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    modules = [
+        f"lapwing.services.plant.models.{scene[Vehicle].model}",
+        *(f"lapwing.dynamics.integrators.{name}" for name in integrators.names()),
+        *(f"lapwing.dynamics.effects.{name}" for name in scene[Effects].tables),
+    ]
+    digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
+    run = scene[Run]
+    for part in (
+        run.seed,
+        scene[Vehicle].name,
+        run.duration,
+        scene[Exchange].rate,
+        dict(scene[Effects].tables),
+        scenes.physics(scene),
+    ):
+        digest.update(repr(part).encode())
+    return folder / "accuracy" / f"{scene.name}-{digest.hexdigest()}.json"

@@ -1,0 +1,166 @@
+"""The delivery drone tumbling with its propellers at a steady speed: one rigid body, and five in every description.
+
+The ways are models and stabilisations, all by RK4 at the same steps, as `vehicle.model` flies them. What is left of the
+error of a reduced model at small steps is what it leaves out: "mean" has the propellers' inertia averaged over a turn,
+the other the frame's alone, as the paper has it.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from lapwing.dynamics import effects, integrators
+from lapwing.dynamics.effects._types import Motion, body_of
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp, rotation_matrix
+from lapwing.dynamics.multibody import five_body_stabilisation
+from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies
+from lapwing.dynamics.multibody.five_bodies import machine as five_bodies_machine
+from lapwing.dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.multirotor import advance
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, seen
+from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import unloaded
+from lapwing.kernels import kernel
+from lapwing.kernels.codegen import implements
+from lapwing.kernels.state_tree import flatten
+from lapwing.studies.accuracy.coordinates import coordinates
+from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.reference import TOLERANCE, turning
+
+AIRFRAME = Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml"
+DURATION, SAMPLES, COARSEST, HALVINGS = 2.0, 8, 64, 10
+SPEED = 100.0  # [rad/s] of the propellers: slow, so that their uneven inertia shows most
+ATTITUDE, OMEGA = exp((0.2, -0.4, 0.1)), (1.0, -0.7, 0.4)
+METHOD = integrators.get("rk4_renormalised")
+STILL = (0.0, 0.0, 0.0)
+
+
+def gap(p: Any, x: Any) -> float:
+    """How far the state is off its constraints [m, -]."""
+    raise NotImplementedError("compiled code only")
+
+
+@kernel
+def _of_one(p: Any, x: Any) -> float:
+    q = x.attitude
+    return abs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1.0)
+
+
+@kernel
+def _of_five(p: Any, x: Any) -> float:
+    drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
+    return five_body_stabilisation.violation(unloaded(drive, seen(p.layout, x)), x)[0]
+
+
+@kernel
+def _of_euler(p: Any, x: Any) -> float:
+    return _of_five(p, multirotor_euler.five(x))
+
+
+@implements(gap)
+def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
+    found = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
+    return lambda p, x: found(p, x)
+
+
+@kernel
+def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, n: int, out: np.ndarray) -> float:
+    """Fly intervals of n steps of h [s]; a row of `out` for each, and how far the end is off its constraints."""
+    for row in range(out.shape[0]):
+        if row > 0:
+            state = advance(method, p, (0, 0), row - 1, state, volts, h, n)
+        numbers = flatten(seen(p.layout, state.motion))
+        for i in range(len(numbers)):
+            out[row, i] = numbers[i]
+    return gap(p, state.motion)
+
+
+def problems() -> dict[str, Problem]:
+    """The problem of this file: the delivery drone, in the air and tumbling, as one rigid body and as five."""
+    frame = load_airframe(AIRFRAME)
+    gyro = effects.from_scene({"gyroscopic_torque": {}}, frame)
+    volts = (SPEED * frame.motor.rotor_constant,) * 4
+    plain = multirotor.parameters(frame, gyro)
+    start = multirotor.initial_state(plain, STILL, ATTITUDE, SPEED)
+    start = start._replace(motion=start.motion._replace(omega_body=OMEGA))
+    mean = plain._replace(body=body_of(frame.mass.total, tuple(np.diag(inertia(frame, None)).tolist())))
+    ways = [_way("reduced, frame only", plain, start, volts), _way("reduced, mean", mean, start, volts)]
+    for name, form in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
+        for held in multirotor_multibody.STABILISATIONS:
+            p = form.parameters(frame, (), "speed", held)
+            x = thrown(p, frame)
+            state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
+            ways.append(_way(f"{name}, {held}", p, state, volts))
+    problem = Problem(
+        "delivery drone of one and of five bodies, tumbling",
+        "s",
+        DURATION,
+        ways,
+        lambda: reference(frame),
+        f"SciPy DOP853 at {TOLERANCE:g} on the kept angular momentum of five bodies, written apart",
+        {},
+    )
+    return {"delivery_drone": problem}
+
+
+def thrown(p: Any, frame: Any) -> FiveBodies:
+    """The five bodies at the start, blades along x."""
+    speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
+    machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
+    return five_body_stabilisation.together(machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds)
+
+
+def _way(name: str, p: Any, state: Any, volts: tuple) -> Way:
+    def flown(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+        motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
+        out = np.empty((rows, len(flatten(motion))))
+        each = max(1, steps // SAMPLES)
+        return lambda: (flight(METHOD.Method(), p, state, volts, DURATION / steps, each, out), out)
+
+    def read(step: float, result: Any) -> Outcome | None:
+        defect, out = result
+        if not np.isfinite(out).all():
+            return None
+        times = np.linspace(0.0, DURATION, SAMPLES + 1)
+        motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
+        return Outcome(times, coordinates(motion, out)[:, :18], defect, round(DURATION / step) * METHOD.EVALUATIONS)
+
+    settings = [DURATION / (COARSEST * 2**k) for k in range(HALVINGS)]
+    return Way(name, METHOD.ORDER, "s", settings, lambda h: flown(round(DURATION / h)), read, flown(1, rows=1))
+
+
+def inertia(frame: Any, angles: Any) -> np.ndarray:
+    """Inertia of frame and propellers at these angles [rad] in the body, shape (3, 3); None: averaged over a turn."""
+    rotors, total = frame.rotors, np.diag(frame.mass.inertia).astype(float)
+    along, across = rotors.blade_inertia
+    for k, hub in enumerate(np.array(rotors.position)):
+        half = 0.0 if angles is None else 0.5 * (along - across)
+        c, s = (0.0, 0.0) if angles is None else (half * np.cos(2 * angles[k]), half * np.sin(2 * angles[k]))
+        mean = 0.5 * (along + across)
+        total += np.array([[mean + c, s, 0.0], [s, mean - c, 0.0], [0.0, 0.0, rotors.inertia]])
+        total += rotors.mass * (hub @ hub * np.eye(3) - np.outer(hub, hub))
+    return total
+
+
+def reference(frame: Any) -> np.ndarray:
+    """(position, R, velocity, omega) at the end: without torque from outside the angular momentum keeps its direction
+    in the world, R' = R hat(omega) with J(angles) omega + h = R^T L (theory.md, eq. (8.50)); shape (18,)."""
+    spin = -np.array(frame.rotors.reaction_sign) * SPEED
+    own = np.array([0.0, 0.0, frame.rotors.inertia * spin.sum()])
+    start = np.array(rotation_matrix(ATTITUDE)).reshape(3, 3)
+    momentum = start @ (inertia(frame, 0.0 * spin) @ OMEGA + own)
+
+    def omega(t: float, y: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(inertia(frame, spin * t), y.reshape(3, 3).T @ momentum - own)
+
+    found = solve_ivp(
+        lambda t, y: turning(y, omega(t, y)), (0.0, DURATION), start.ravel(), method="DOP853",
+        rtol=TOLERANCE, atol=0.1 * TOLERANCE,
+    )  # fmt: skip
+    end = found.y[:, -1]
+    # the hubs surround the centre of mass: it stays where it is
+    return np.concatenate([STILL, end, STILL, omega(DURATION, end)])

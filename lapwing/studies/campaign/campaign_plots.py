@@ -1,0 +1,272 @@
+"""The plots of a campaign's report."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.campaign.results import Results
+from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
+from lapwing.studies.metrics import FIGURES
+from lapwing.studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
+from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
+from lapwing.studies.tracking import DEGREE
+
+ACROSS = 3  # panels beside each other
+BINS = 10  # of a parameter
+KEYS = 9  # parameters that have a panel each
+MATTERS = ("max_distance", "touchdown.speed", "energy")  # what a parameter may matter for, besides success
+PARALLEL = 300  # runs drawn as lines over all parameters
+LETTERS = 12  # of a line below an axis
+ENOUGH, MOST = 50, 10_000  # runs for Sobol indices: at least, and as many as are looked at
+_LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
+
+
+def shown(name: str) -> tuple[str, float]:
+    """Label of a figure and the factor to its unit there: angles in degrees, shares in per cent."""
+    unit = FIGURES[name]
+    if unit == "rad":
+        return f"{name} [°]", 1.0 / DEGREE
+    return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
+
+
+def required(found: Results) -> dict[str, float]:
+    """The limits of figures that the scene's `[success]` sets."""
+    texts = found.folder.about["success"]
+    return {match[1]: float(match[2]) for text in texts if (match := _LIMIT.fullmatch(text.strip()))}
+
+
+def errors(found: Results) -> Plot:
+    """Root-mean-square errors, beside what is published."""
+    caption = "Share of the runs with a smaller root-mean-square error of the reference against the truth."
+    return _distributions(found, [name for name in found.figures if name.startswith("rmse.")], caption)
+
+
+def others(found: Results) -> Plot:
+    """All other figures that differ between runs."""
+    names = [name for name in found.figures if not name.startswith("rmse")]
+    return _distributions(found, names, "Share of the runs with a smaller value.")
+
+
+def _distributions(found: Results, names: list[str], caption: str) -> Plot:
+    if not names:
+        raise NotRecordedError("every run has the same")
+    limits, panels = required(found), []
+    for k, name in enumerate(names):
+        label, scale = shown(name)
+        marks: list[Mark] = []
+        for legend, column, colour in _each(found, name):
+            values = scale * np.sort(column[np.isfinite(column)])
+            marks.append(Line(values, np.arange(1, len(values) + 1) / len(values), legend, colour))
+        if name in found.published:
+            marks.append(_upright(scale * found.published[name], found.source, REFERENCE))
+        if name in limits:
+            marks.append(_upright(scale * limits[name], "required", BOUND))
+        place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS}
+        panels.append(Panel(tuple(marks), "share" if k % ACROSS == 0 else "", label, timed=False, **place))
+    return _grid(panels, caption)
+
+
+def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
+    """(legend, figure of the runs, colour) of each vehicle of a fleet; of the run where there is one vehicle, or more
+    than can be told apart."""
+    own = found.of_vehicles(name)
+    if not 0 < len(own) <= len(COLOURS):
+        return [("the worst vehicles" if own else "runs", found[name], FLOWN)]
+    return [(vehicle, own[vehicle], colour) for vehicle, colour in zip(own, COLOURS, strict=False)]
+
+
+def touchdown(found: Results) -> Plot:
+    """Where the vehicles touch down; of one also the ellipses of a normal distribution."""
+    if found.vehicles:
+        return _touchdowns(found)
+    points = np.column_stack([found["touchdown.x"], found["touchdown.y"]])
+    good = found["success"].astype(bool)[np.isfinite(points).all(axis=1)]
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) < 3:
+        raise NotRecordedError("fewer than three runs touch down")
+    if not np.ptp(points, axis=0).any():
+        raise NotRecordedError("every run touches down at the same place")
+    marks = [_dots(points[good], "success", FLOWN), _dots(points[~good], "failure", BOUND)]
+    for share, dash in ((0.5, "dash"), (0.95, "solid")):
+        x, y = ellipse(points, share).T
+        marks.append(Line(x, y, f"{share:.0%} of a normal distribution", REFERENCE, 1.1, dash))
+    half = np.median(np.linalg.norm(points - points.mean(axis=0), axis=1))
+    (x, y), (dx, dy) = points.mean(axis=0), points.std(axis=0, ddof=1)
+    caption = (
+        f"Last touch-down of {len(points)} runs: mean ({x:.3f}, {y:.3f}) m, standard deviation "
+        f"{dx:.3f} m along x and {dy:.3f} m along y; half of them within {half:.3f} m of the mean."
+    )
+    drawn = tuple(mark for mark in marks if len(mark.x))
+    return Plot((Panel(drawn, "y [m]", "x [m]", timed=False, equal=True),), caption, 5.0)
+
+
+def _touchdowns(found: Results) -> Plot:
+    """Those of each vehicle of a fleet."""
+    marks = []
+    for (vehicle, x, colour), (_, y, _) in zip(_each(found, "touchdown.x"), _each(found, "touchdown.y"), strict=True):
+        there = np.isfinite(x) & np.isfinite(y)
+        if there.any():
+            marks.append(_dots(np.column_stack([x, y])[there], vehicle, colour))
+    if not marks:
+        raise NotRecordedError("no vehicle touches down, or there are too many to tell apart")
+    panel = Panel(tuple(marks), "y [m]", "x [m]", timed=False, equal=True)
+    return Plot((panel,), "Last touch-down of each vehicle in each run.", 5.0)
+
+
+def success(found: Results) -> Plot:
+    """Probability of success over each parameter."""
+    panels, good = [], found["success"].astype(bool)
+    keys, rest = _most(found)
+    for k, key in enumerate(keys):
+        x, middles, groups = found.number(key), [], []
+        for inside in _bins(x):
+            middles.append(float(x[inside].mean()))
+            groups.append(interval(int(good[inside].sum()), int(inside.sum())))
+        at, rows = np.array(middles), np.array(groups).T
+        marks: tuple[Mark, ...] = (
+            Band(at, rows[1], rows[2], "95 % interval", FLOWN),
+            Line(at, rows[0], "successes", marker="circle"),
+        )
+        label = "probability of success" if k % ACROSS == 0 else ""
+        place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS, "y_range": (-0.02, 1.02)}
+        panels.append(Panel(marks, label, key, x_ticks=_texts(found, key), timed=False, **place))
+    caption = "Share of successes among the runs of each part of a parameter's range, of equal counts."
+    return _grid(panels, caption + rest)
+
+
+def matters(found: Results) -> Plot:
+    """Which parameter matters: rank correlations, and Sobol indices where they can be had."""
+    keys = _parameters(found)
+    aims = ["success"] if np.ptp(found["success"].astype(float)) > 0.0 else []
+    aims += [name for name in MATTERS if name in found.figures]
+    if not aims:
+        raise NotRecordedError("every run came to the same")
+    x = np.column_stack([found.number(key) for key in keys])
+    independent = not found.folder.plan.sweep  # which Sobol indices suppose
+    with_sobol = has_sobol() and len(x) >= ENOUGH and independent
+    kinds = ["rank correlation", *(["first-order Sobol index"] if with_sobol else [])]
+    panels = []
+    for row, aim in enumerate(aims):
+        y = found[aim].astype(float)
+        there = np.isfinite(y)
+        correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
+        told = np.flatnonzero(there)[_some(there.sum(), MOST)]
+        indices = sobol(x[told], y[told], keys) if with_sobol and len(told) >= ENOUGH else []
+        for column, values in enumerate([correlated, indices][: len(kinds)]):
+            bars = tuple(
+                Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
+                for key, v in zip(keys, values, strict=True)
+                if np.isfinite(v.value)
+            )
+            place: dict[str, Any] = {
+                "row": row,
+                "column": column,
+                "x_range": (-1.05, 1.05) if column == 0 else (-0.05, 1.05),
+            }
+            panels.append(Panel(bars, "", kinds[column], title=aim, timed=False, **place))
+    caption = f"How each parameter goes with what {len(x)} runs came to: Spearman's rank correlation"
+    caption += (
+        "; beside it the share of the variance that the parameter explains alone (SALib, RBD-FAST)."
+        if with_sobol
+        else f". Sobol indices need {ENOUGH} runs and SALib: pip install lapwing[campaign]."
+        if independent
+        else ". Sobol indices need parameters that are drawn independently, which those of a sweep are not."
+    )
+    height = len(aims) * (1.1 + 0.26 * len(keys)) + 0.6
+    return Plot(tuple(panels), caption, height, (1.0,) * len(aims), (1.0,) * len(kinds))
+
+
+def parallel(found: Results) -> Plot:
+    """Every run as a line over all parameters and what matters, each scaled to its range."""
+    keys, rest = _most(found)
+    names = [*keys, *(name for name in MATTERS if name in found.figures)]
+    columns, ticks = [], []
+    for name in names:
+        values, (label, scale) = found.number(name), shown(name) if name in FIGURES else (name, 1.0)
+        low, high = np.nanmin(values), np.nanmax(values)
+        columns.append((values - low) / (high - low if high > low else 1.0))
+        texts = _texts(found, name)
+        ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
+        ticks.append(f"{_broken(label)}\n{ends[0]}\nto {ends[1]}")
+    rows, good = np.column_stack(columns), found["success"].astype(bool)
+    marks = []
+    for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
+        if chosen.any():
+            lines = rows[chosen][_some(chosen.sum(), PARALLEL)]
+            broken = np.column_stack([lines, np.full(len(lines), np.nan)])
+            x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
+            marks.append(Line(x, broken.ravel(), name, colour, 0.7))
+    panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
+    caption = f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures."
+    return Plot((panel,), caption + rest, 4.2)
+
+
+def _some(n: int, most: int) -> np.ndarray:
+    """Indices of at most so many of n runs, at random: every k-th would fall in step with the runs of a grid."""
+    return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
+
+
+def _parameters(found: Results) -> list[str]:
+    """The parameters that differ between the runs."""
+    keys = [key for key in found.folder.plan.keys if len(np.unique(found[key])) > 1]
+    if not keys:
+        raise NotRecordedError("no parameter varies; --vary KEY=DISTRIBUTION lets one")
+    return keys
+
+
+def _most(found: Results) -> tuple[list[str], str]:
+    """The parameters that go most with what matters, as many as have a panel, and a sentence about the others."""
+    keys = _parameters(found)
+    if len(keys) <= KEYS:
+        return keys, ""
+    aims = [found[name].astype(float) for name in ("success", *MATTERS) if name == "success" or name in found.figures]
+
+    def strength(key: str) -> float:
+        x = found.number(key)
+        every = (abs(rank_correlation(x[there], y[there]).value) for y in aims if (there := np.isfinite(y)).any())
+        return max((value for value in every if np.isfinite(value)), default=0.0)
+
+    chosen = set(sorted(keys, key=strength, reverse=True)[:KEYS])
+    left = [key for key in keys if key not in chosen]
+    return [key for key in keys if key in chosen], f" Left out, as they go least with it: {', '.join(left)}."
+
+
+def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
+    """Runs of each part of a parameter's range, shape (n,) of bool: of each value, or parts of equal counts."""
+    values = np.unique(x)
+    if len(values) <= BINS:
+        yield from (x == value for value in values)
+        return
+    edges = np.quantile(x, np.linspace(0.0, 1.0, BINS + 1))
+    place = np.searchsorted(edges[1:-1], x, side="right")
+    yield from (place == k for k in np.unique(place))
+
+
+def _texts(found: Results, name: str) -> tuple[str, ...]:
+    """The values of a parameter of texts, in the order of their numbers."""
+    return tuple(np.unique(found[name])) if found[name].dtype == object else ()
+
+
+def _broken(key: str) -> str:
+    """A dotted key on several lines, so that it stands beside others."""
+    lines = [""]
+    for part in re.findall(r"[^.]+\.?", key):
+        if len(lines[-1] + part) > LETTERS and lines[-1]:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
+
+
+def _dots(points: np.ndarray, name: str, colour: str) -> Line:
+    return Line(points[:, 0], points[:, 1], name, colour, marker="circle", size=3.0, joined=False)
+
+
+def _upright(x: float, name: str, colour: str) -> Line:
+    return Line(np.array([x, x]), np.array([0.0, 1.0]), name, colour, 1.1, "dash")
+
+
+def _grid(panels: list[Panel], caption: str) -> Plot:
+    rows = -(-len(panels) // ACROSS)
+    return Plot(tuple(panels), caption, 0.9 + 2.3 * rows, (1.0,) * rows, (1.0,) * min(len(panels), ACROSS))

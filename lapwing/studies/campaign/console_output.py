@@ -1,0 +1,120 @@
+"""A campaign in the terminal, and as JSON."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.studies.campaign.fleet_columns import NEAREST
+from lapwing.studies.campaign.results import Results
+from lapwing.studies.tracking import AXES, shown
+
+VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
+VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success")
+VEHICLES = "The vehicles: worst run of each, and in how many runs it did not fail"
+LISTED = 10  # failures, refusals
+
+
+def show(console: Console, found: Results) -> None:
+    """Print the campaign for people."""
+    if len(found) == 0:
+        console.print(f"{found.scene}: the scene has refused every run", highlight=False)
+        _list(console, "refused", found.refused["run"], found.refused["told"])
+        return
+    _table(console, "Root-mean-square error of the reference against the truth", "rmse", found)
+    if found.on_estimate:
+        _table(console, "The same against the vehicle's own estimate", "rmse_estimate", found)
+        shares = ", ".join(f"{axis} {found[f'inside.{axis}'].mean():.2%}" for axis in "xyz")
+        console.print(f"Truth within 3 sigma of the estimate: {shares} of the time", highlight=False)
+        least = {axis: found.spread(f"inside.{axis}") for axis in "xyz"}
+        text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
+        console.print(f"Least of a flight: {text}", highlight=False)
+    if found.vehicles:
+        _vehicles(console, found)
+    if len(found) > 1 and not found.figures:
+        console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
+    console.print(f"{found.scene}: {len(found) + len(found.refused['run'])} runs: {found.told}", highlight=False)
+    p = found.failure
+    share = f"{p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
+    console.print(f"Failures: {share} (success: {' and '.join(found.folder.about['success']) or 'always'})")
+    failed = ~found["success"].astype(bool)
+    if late := int((found["verdict"][~failed] == "timed out").sum()):
+        console.print(
+            f"{late} of the successes timed out: [success] require = [\"verdict == 'landed'\"] lets them fail"
+        )
+    _list(console, "run", found["run"][failed], found["told"][failed])
+    _list(console, "refused: run", found.refused["run"], found.refused["told"])
+
+
+def _vehicles(console: Console, found: Results) -> None:
+    table = Table(title=VEHICLES, title_justify="left")
+    table.add_column("vehicle", no_wrap=True)
+    for column in VEHICLE_COLUMNS:
+        table.add_column(column, justify="right", no_wrap=True)
+    for vehicle, cells in vehicle_cells(found).items():
+        table.add_row(vehicle, *cells)
+    console.print(table)
+    console.print(f"Nearest of any two vehicles: {nearest_of(found)}", highlight=False)
+
+
+def vehicle_cells(found: Results) -> dict[str, list[str]]:
+    """What `VEHICLE_COLUMNS` say of each vehicle of a fleet."""
+    return {vehicle: _cells(found, vehicle) for vehicle in found.vehicles}
+
+
+def _cells(found: Results, vehicle: str) -> list[str]:
+    spreads = [found.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
+    share = f"{found[f'{vehicle}.success'].astype(bool).mean():.1%}"
+    return [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+
+
+def nearest_of(found: Results) -> str:
+    """How near two vehicles of a fleet came to one another."""
+    least = found.spread(NEAREST)
+    if least is None:
+        return "unknown"
+    return f"{least.worst:.2f} m apart (run {least.run}), in half of the runs below {least.median:.2f} m"
+
+
+def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str]) -> None:
+    for run, text in list(zip(runs, told, strict=True))[:LISTED]:
+        console.print(f"  {what} {run}: {text}", highlight=False)
+    if len(runs) > LISTED:
+        console.print(f"  and {len(runs) - LISTED} more: the table has all of them", highlight=False)
+
+
+def _table(console: Console, title: str, kind: str, found: Results) -> None:
+    table = Table(title=title, title_justify="left")
+    table.add_column("axis", no_wrap=True)
+    for column in ("5 %", "median", "95 %", "worst", "of run"):
+        table.add_column(column, justify="right", no_wrap=True)
+    if found.published:
+        table.add_column(found.source, justify="right")
+        table.add_column("worst / that", justify="right")
+    for axis in AXES:
+        s, (unit, scale) = found.spread(f"{kind}.{axis}"), shown(axis)
+        if s is None:
+            continue
+        row = [f"{axis} [{unit}]", *(f"{scale * v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.run)]
+        if published := found.published.get(f"rmse.{axis}"):
+            row += [f"{scale * published:.4f}", f"{s.worst / published:.3f}"]
+        table.add_row(*row)
+    console.print(table)
+
+
+def write_json(path: Path, found: Results, digest: str) -> None:
+    """Write what the campaign came to for other programs; the table has the single runs."""
+    spreads = {name: found.spread(name) for name in found.figures}
+    data = {
+        "scene": found.scene,
+        "runs": len(found) + len(found.refused["run"]),
+        "told": found.told,
+        "failure": found.failure._asdict(),
+        "figures": {name: s._asdict() for name, s in spreads.items() if s},
+        "failed": found["run"][~found["success"].astype(bool)].tolist(),
+        "refused": found.refused["run"].tolist(),
+        "digest": digest,
+    }
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,133 @@
+"""How a key of a scene varies from run to run: distributions given by their quantile functions."""
+
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from inspect import signature
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from lapwing.cosim.scene.overrides import value_of
+
+
+class Distribution(NamedTuple):
+    """A distribution of the values of a key; `str` gives the text that `parse` reads."""
+
+    name: str
+    arguments: tuple[Any, ...]
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(map(_shown, self.arguments))})"
+
+    @property
+    def values(self) -> tuple[Any, ...]:
+        """Its values where there are finitely many, each as likely; () otherwise."""
+        return _VALUES[self.name](*self.arguments) if self.name in _VALUES else ()
+
+    def at(self, u: float) -> Any:
+        """The value below which the share u of the distribution lies, 0 < u < 1."""
+        if values := self.values:
+            return values[min(int(u * len(values)), len(values) - 1)]
+        return float(_QUANTILES[self.name](u, *self.arguments))
+
+
+def normal(mean: float, deviation: float) -> Distribution:
+    """A normal distribution with this mean and standard deviation, in the unit of the key.
+
+    Raises:
+        ValueError: the deviation is below 0.
+    """
+    return _made("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
+
+
+def uniform(low: float, high: float) -> Distribution:
+    """A uniform distribution over [low, high], in the unit of the key.
+
+    Raises:
+        ValueError: high is below low.
+    """
+    return _made("uniform", low, high, sound=high >= low, expected="low <= high")
+
+
+def loguniform(low: float, high: float) -> Distribution:
+    """A value whose logarithm is uniform: each decade between low and high is as likely.
+
+    Raises:
+        ValueError: high is below low, or low is not above 0.
+    """
+    return _made("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
+
+
+def linspace(low: float, high: float, count: int) -> Distribution:
+    """One of `count` values from low to high, equally far apart, each as likely.
+
+    Raises:
+        ValueError: the count is no whole number from 1 to 1 000 000.
+    """
+    sound = isinstance(count, int) and 0 < count <= MOST
+    expected = f"a whole number of values, up to {MOST}, as third argument"
+    return _made("linspace", low, high, count, sound=sound, expected=expected)
+
+
+def choice(*values: Any) -> Distribution:
+    """One of these values, each as likely.
+
+    Raises:
+        ValueError: there are none.
+    """
+    if not values:
+        raise ValueError("choice: expected at least one value")
+    return Distribution("choice", values)
+
+
+KINDS: dict[str, Callable[..., Distribution]] = {f.__name__: f for f in (normal, uniform, loguniform, linspace, choice)}
+_QUANTILES: dict[str, Callable[..., float]] = {
+    "normal": lambda u, mean, deviation: mean + deviation * ndtri(u),
+    "uniform": lambda u, low, high: low + u * (high - low),
+    "loguniform": lambda u, low, high: low * (high / low) ** u,
+}
+_VALUES: dict[str, Callable[..., tuple]] = {
+    "choice": lambda *values: values,
+    "linspace": lambda low, high, count: tuple(np.linspace(low, high, count).tolist()),
+}
+MOST = 1_000_000  # values of a linspace
+_FORM = re.compile(r"(\w+)\s*\((.*)\)", re.DOTALL)
+_SPLIT = re.compile(r"""((?:"[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|[^,])+)(?:,|$)""")
+
+
+def parse(text: str) -> Distribution:
+    """The distribution of a text: "normal(10.4, 0.2)", "choice(rtk, standard)".
+
+    Raises:
+        ValueError: no such distribution, or wrong arguments.
+    """
+    found = _FORM.fullmatch(text.strip())
+    if not found or found[1] not in KINDS:
+        raise ValueError(f"expected a distribution, {', '.join(KINDS)}: normal(10.4, 0.2), got {text!r}")
+    arguments = _arguments(found[2])
+    try:
+        return KINDS[found[1]](*arguments)
+    except TypeError:
+        wanted = ", ".join(signature(KINDS[found[1]]).parameters)
+        raise ValueError(f"{found[1]}: got {found[2]!r}, expected {found[1]}({wanted}) with numbers") from None
+
+
+def _arguments(text: str) -> list[Any]:
+    """Values of TOML between commas, bare words among them. ValueError for anything else."""
+    try:
+        return tomllib.loads(f"values = [{text}]")["values"]
+    except tomllib.TOMLDecodeError:
+        return [value_of(part.strip()) for part in _SPLIT.findall(text)]
+
+
+def _made(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
+    if not sound or not all(abs(number) <= sys.float_info.max for number in numbers):
+        raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
+    return Distribution(name, numbers)
+
+
+def _shown(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)

@@ -1,0 +1,58 @@
+"""A run of a fleet in a campaign's table: the worst of its vehicles in the columns of a run, and each by its name."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from lapwing.services.common.success_criteria import Success
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.metrics import FIGURES
+from lapwing.studies.separation import nearest
+
+NEAREST = "nearest"  # [m] least distance between two vehicles
+BAD = ("diverged", "crashed", "broken off", "timed out", "landed", "flown")  # kinds of verdicts, the worst first
+PLACES = ("touchdown.x", "touchdown.y")  # which of several has no meaning
+Row = dict[str, Any]
+
+
+def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
+    """The columns that the table of a fleet has besides those of a run: `left.rmse.x`, by name and type."""
+    each = {f"{name}.success": bool for name in vehicles}
+    figures = {
+        f"{v}.{name}": str if name == "verdict" else float for v in vehicles for name in FIGURES if name != "told"
+    }
+    return {NEAREST: float, **each, **figures} if vehicles else {}
+
+
+def joined(flights: Mapping[str, Flight], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
+    """The columns of a run besides what it draws.
+
+    Args:
+        flights: by the vehicle's name.
+        of_each: its figures.
+        required: its `[success]`.
+    """
+    found: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in FIGURES}
+    unmet = {name: required[name].unmet(row) for name, row in of_each.items()}
+    texts = [
+        f"{name}: {of_each[name]['told']}; not {', not '.join(missed)}" for name, missed in unmet.items() if missed
+    ]
+    found |= {"success": not texts, "told": "; ".join(texts)}
+    found[NEAREST] = nearest({name: flight.truth for name, flight in flights.items()}).distance
+    for name, row in of_each.items():
+        found |= {f"{name}.{key}": value for key, value in row.items() if key != "told"}
+        found[f"{name}.success"] = not unmet[name]
+    return found
+
+
+def _worst(name: str, values: list[Any]) -> Any:
+    if name == "verdict":
+        return min(values, key=BAD.index)
+    if name == "told" or name in PLACES:
+        return "" if name == "told" else math.nan
+    known = [value for value in values if not math.isnan(value)]
+    if not known:
+        return math.nan
+    if name == "energy":
+        return math.fsum(known)
+    return min(known) if name.startswith("inside.") else max(known)

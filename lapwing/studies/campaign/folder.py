@@ -1,0 +1,211 @@
+"""The folder of a campaign: what is flown (`campaign.json`), the shards that are done, and at the end the table.
+
+campaign.json      the plan, the scene's texts, versions; a campaign is its hash
+shards/00007.csv   the rows of one shard, written whole or not at all
+last_shard         where the table ends that `--until-ci` has ended; shards after it stay for a command without
+runs.parquet       all rows in their order (runs.csv without pyarrow)
+report.html
+"""
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import platform
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.run_errors import RunFailed
+from lapwing.services.common.run_schema import Published
+from lapwing.services.common.success_criteria import Success
+from lapwing.studies.campaign import run_table
+from lapwing.studies.campaign.distributions import parse
+from lapwing.studies.campaign.plan import Plan
+from lapwing.studies.campaign.runs import Reference, Row, columns, scene_of, sources, vehicles
+
+MANIFEST = "campaign.json"
+LAST = "last_shard"
+SHARDS = 32  # of a small campaign
+MOST = 250  # runs in a shard
+
+
+class Folder:
+    """A campaign on disk."""
+
+    def __init__(self, path: Path, plan: Plan, about: dict[str, Any]):
+        """Use `begin` or `read`; `about` is the manifest."""
+        self.path, self.plan, self.about = path, plan, about
+
+    @cached_property
+    def kinds(self) -> dict[str, type]:
+        """Type of each column of the table."""
+        return columns(self.plan, self.about["vehicles"])
+
+    @cached_property
+    def shards(self) -> list[range]:
+        """The runs of each shard, which their count alone decides."""
+        size = min(math.ceil(self.plan.runs / SHARDS), MOST)
+        return [range(start, min(start + size, self.plan.runs)) for start in range(0, self.plan.runs, size)]
+
+    def missing(self) -> list[int]:
+        """The shards that are still to be flown."""
+        return [k for k in range(len(self.shards)) if not self._shard(k).exists()]
+
+    def write(self, shard: int, rows: list[Row]) -> None:
+        """Keep the rows of a shard: whole, or not at all. RunFailed where they cannot be written."""
+        with _kept(self._shard(shard)) as file:
+            run_table.write_csv(file, self.kinds, [rows])
+
+    def rows(self, shard: int) -> list[Row]:
+        """The rows of a shard that is done."""
+        return run_table.read_csv(self._shard(shard), self.kinds)
+
+    def pages(self) -> Iterator[list[Row]]:
+        """The rows of the runs in their order, a shard at a time, up to the first shard that is missing or the last of
+        the table."""
+        last = self._last()
+        for shard in range(len(self.shards)):
+            if not self._shard(shard).exists() or (last is not None and shard > last):
+                return
+            yield self.rows(shard)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The columns of the table, shape (n,) each."""
+        return run_table.arrays(self.kinds, self.pages())
+
+    def end_after(self, shard: int | None) -> None:
+        """The table ends with this shard, None: with the last; shards after it are kept, and left out.
+
+        Raises:
+            RunFailed: it cannot be written.
+        """
+        if shard is None:
+            (self.path / LAST).unlink(missing_ok=True)
+            return
+        with _kept(self.path / LAST) as file:
+            file.write_text(f"{shard}\n", encoding="utf-8")
+
+    def _last(self) -> int | None:
+        try:
+            return int((self.path / LAST).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+
+    def finish(self, csv: bool = False) -> str:
+        """Write the table, with `csv` as CSV too; its digest, which no number, kind or order of workers changes.
+
+        Raises:
+            RunFailed: it cannot be written.
+        """
+        digest = hashlib.blake2b(digest_size=16)
+        for page in self.pages():
+            for line in run_table.bits(self.kinds, page):
+                digest.update(line)
+        if run_table.has_parquet():
+            about = {name: v if isinstance(v, str) else json.dumps(v) for name, v in self.about.items()}
+            with _kept(self.path / "runs.parquet") as file:
+                run_table.write_parquet(file, self.kinds, self.pages(), about | {"digest": digest.hexdigest()})
+        if csv or not run_table.has_parquet():
+            with _kept(self.path / "runs.csv") as file:
+                run_table.write_csv(file, self.kinds, self.pages())
+        return digest.hexdigest()
+
+    def _shard(self, shard: int) -> Path:
+        return self.path / "shards" / f"{shard:05}.csv"
+
+
+def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
+    """What a campaign is, as plain data."""
+    scene = scene_of(plan)
+    said: dict[str, Any] = {
+        "scene": scene.name,
+        **plan._asdict(),
+        "vary": {key: str(distribution) for key, distribution in plan.vary},
+        "sources": sources(plan),
+        "vehicles": vehicles(plan),
+        "published": {} if scene.vehicles else scene[Published].resolved(),
+        "success": list(dict.fromkeys(text for each in scene.vehicles or (scene,) for text in each[Success].require)),
+        **reference._asdict(),
+    }
+    return json.loads(json.dumps(said))
+
+
+def default_path(about: dict[str, Any]) -> Path:
+    """Where a campaign goes if nobody says: the same for the same command."""
+    digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=4).hexdigest()
+    return Path("campaigns") / f"{about['scene']}_{digest}"
+
+
+def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
+    """The folder of a campaign, made or gone on with.
+
+    Raises:
+        ValueError: it holds another campaign, or something else, or cannot be written.
+    """
+    if not (path / MANIFEST).exists():
+        _make(path, about)
+    there = read(path).about  # perhaps that of another machine, which has begun meanwhile
+    differing = [name for name in about if name != "path" and there.get(name) != about[name]]
+    if differing:
+        raise ValueError(f"{path}: holds another campaign ({', '.join(differing)} differ); expected a new folder")
+    return Folder(path, plan, about)
+
+
+def _make(path: Path, about: dict[str, Any]) -> None:
+    """Make the folder of a campaign."""
+    if path.exists() and (not path.is_dir() or any(not _begun(file) for file in path.iterdir())):
+        raise ValueError(f"{path}: holds something else; expected a new folder, or one of a campaign")
+    try:
+        (path / "shards").mkdir(parents=True, exist_ok=True)
+        with _whole(path / MANIFEST) as file:
+            file.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    except OSError as fault:
+        raise ValueError(f"{path}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
+
+
+def _begun(file: Path) -> bool:
+    """Whether a file may be that of a campaign which another machine begins at this moment."""
+    return file.name in ("shards", MANIFEST) or file.name.startswith(f".{MANIFEST}.")
+
+
+def read(path: Path) -> Folder:
+    """The folder of a campaign that was begun.
+
+    Raises:
+        ValueError: it is none.
+    """
+    try:
+        about = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+        vary = tuple((key, parse(text)) for key, text in about["vary"].items())
+        given = {name: about[name] for name in Plan._fields}
+        plan = Plan(**given | {"vary": vary, "overrides": tuple(about["overrides"]), "sweep": tuple(about["sweep"])})
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise ValueError(f"{path}: no campaign there; expected the folder of one, with {MANIFEST}") from None
+    return Folder(path, plan, about)
+
+
+@contextlib.contextmanager
+def _kept(path: Path) -> Iterator[Path]:
+    """`_whole` of what was flown; RunFailed where it cannot be written."""
+    try:
+        with _whole(path) as file:
+            yield file
+    except OSError as fault:
+        reason = (fault.strerror or str(fault)).lower()
+        raise RunFailed(f"{path}: cannot be written: {reason}; the same command goes on where it stopped") from None
+
+
+@contextlib.contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A file to write that takes this path's place when all of it is there."""
+    new = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}")  # several machines may share the folder
+    try:
+        yield new
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)

@@ -1,0 +1,101 @@
+"""The results of a campaign: its table in memory, and what is asked of it."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.campaign.fleet_columns import NEAREST
+from lapwing.studies.campaign.folder import Folder
+from lapwing.studies.campaign.runs import REFUSED
+from lapwing.studies.campaign.statistics import Interval, Spread, interval, spread
+from lapwing.studies.metrics import FIGURES
+from lapwing.studies.outcome import KINDS
+from lapwing.studies.tracking import AXES
+
+LEAST_IS_WORST = (NEAREST, *(f"inside.{axis}" for axis in "xyz"))  # of all other figures the greatest is the worst
+
+
+class Results:
+    """The runs of a campaign as columns, shape (n,) each.
+
+    Attributes:
+        folder: of the campaign.
+        columns: by name, those of refused runs left out.
+        refused: of the refused runs.
+    """
+
+    def __init__(self, folder: Folder):
+        self.folder, everything = folder, folder.arrays()
+        taken = everything["verdict"] != REFUSED
+        self.columns = {name: values[taken] for name, values in everything.items()}
+        self.refused = {name: values[~taken] for name, values in everything.items()}
+
+    def __len__(self) -> int:
+        """How many runs were flown."""
+        return len(self.columns["run"])
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A column of the runs that were flown."""
+        return self.columns[name]
+
+    @property
+    def scene(self) -> str:
+        """Its name."""
+        return str(self.folder.about["scene"])
+
+    @property
+    def vehicles(self) -> list[str]:
+        """The names of the vehicles of a fleet, whose columns are named `left.rmse.x`; [] of a scene of one."""
+        return list(self.folder.about["vehicles"])
+
+    @property
+    def published(self) -> dict[str, float]:
+        """Published figures by the names of ours: "rmse.x"."""
+        return {f"rmse.{axis}": value for axis, value in self.folder.about["published"].get("rmse", {}).items()}
+
+    @property
+    def source(self) -> str:
+        """Where they are from."""
+        return str(self.folder.about["published"].get("source", "published"))
+
+    @cached_property
+    def failure(self) -> Interval:
+        """Probability of a failure."""
+        return interval(int((~self["success"].astype(bool)).sum()), len(self))
+
+    @cached_property
+    def told(self) -> str:
+        """How many runs ended how: "97 landed, 3 crashed, 1 refused"."""
+        kinds = [(kind, int((self["verdict"] == kind).sum())) for kind in KINDS] + [(REFUSED, len(self.refused["run"]))]
+        return ", ".join(f"{n} {kind}" for kind, n in kinds if n)
+
+    @cached_property
+    def figures(self) -> list[str]:
+        """The figures that are numbers and differ between runs."""
+        numbers = [name for name in FIGURES if self.folder.kinds[name] is float]
+        return [name for name in numbers if len(np.unique(self[name][np.isfinite(self[name])])) > 1]
+
+    @property
+    def on_estimate(self) -> bool:
+        """Whether the autopilot flew on something else than the truth."""
+        return any(not np.array_equal(self[f"rmse.{a}"], self[f"rmse_estimate.{a}"], equal_nan=True) for a in AXES)
+
+    def spread(self, name: str) -> Spread | None:
+        """How a figure is distributed."""
+        return spread(self[name], self["run"], least=name in LEAST_IS_WORST)
+
+    def of_vehicles(self, name: str) -> dict[str, np.ndarray]:
+        """A figure of each vehicle of a fleet, by the vehicle's name; {} of a scene of one."""
+        return {vehicle: self[f"{vehicle}.{name}"] for vehicle in self.vehicles}
+
+    def number(self, key: str) -> np.ndarray:
+        """A parameter as numbers: texts by their place in alphabetical order."""
+        values = self[key]
+        return np.unique(values, return_inverse=True)[1].astype(float) if values.dtype == object else values
+
+    def worst(self, count: int) -> list[dict[str, Any]]:
+        """The worst runs: failures first, then those farthest from their reference."""
+        away = np.nan_to_num(self["max_distance"], nan=np.inf)
+        order = np.lexsort((self["run"], -away, self["success"].astype(bool)))[:count]
+        return [{name: values[k] for name, values in self.columns.items()} for k in order]

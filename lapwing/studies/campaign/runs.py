@@ -1,0 +1,219 @@
+"""Flies runs of a campaign: from their numbers to the rows of its table. What every worker calls, wherever it is."""
+
+import contextlib
+import hashlib
+import math
+import platform
+import re
+from collections.abc import Iterator, Sequence
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import lapwing.services
+from lapwing.cosim.config.provenance import package_version
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.scene import Scene, SceneError
+from lapwing.services.common.success_criteria import Success
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.scene_resolver import load, reseed
+from lapwing.studies.campaign import fleet_columns
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
+from lapwing.studies.campaign.plan import Plan
+from lapwing.studies.metrics import FIGURES, check_success, figures, joint_end_state
+from lapwing.studies.simulate import fly_each
+
+REFUSED = "refused"  # the verdict on a run whose values the scene refuses
+TRIED = 16  # first runs, of which the scene has to take one at least, or else of as many all over the campaign
+_FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # of an absolute path
+_OURS = ("cosim", "dynamics", "messages", "services", "studies")
+_NUMBERS_OF = ("llvmlite", "numba", "numpy", "scipy")
+
+Row = dict[str, Any]  # values by column
+
+
+class Reference(NamedTuple):
+    """What a worker has to agree on before it flies."""
+
+    versions: dict[str, str]
+    run: int
+    end_state: str  # of that run
+
+
+@cache
+def versions() -> dict[str, str]:
+    """What the numbers of a flight depend on."""
+    folder, digest = Path(lapwing.services.__file__).parents[1], hashlib.blake2b(digest_size=8)
+    for path in sorted(path for name in _OURS for path in (folder / name).rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    found = {"lapwing": package_version(), "sources": digest.hexdigest(), "python": platform.python_version()}
+    return found | {name: version(name) for name in _NUMBERS_OF}
+
+
+def vehicles(plan: Plan) -> tuple[str, ...]:
+    """The names of the vehicles of a fleet; () of a scene of one."""
+    return tuple(vehicle[Vehicle].name for vehicle in scene_of(plan).vehicles)
+
+
+def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
+    """Name and type of every column of the table; `vehicles` of a fleet."""
+    found: dict[str, type] = {"run": int, "seed": int}
+    for key in plan.keys:
+        drawn = next((d for k, d in plan.vary if k == key), None)
+        values = [entry[key] for entry in plan.sweep if key in entry] if drawn is None else drawn.values
+        found[key] = float if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values) else str
+    found |= {"success": bool, **{name: str if name in ("verdict", "told") else float for name in FIGURES}}
+    return {**found, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
+
+
+def first_setup(plan: Plan) -> tuple[int, Setup]:
+    """The first run that the scene takes, and its set-up.
+
+    Raises:
+        SceneError: the scene is not sound, or refuses what each of `TRIED` first runs draws and of as many others.
+    """
+    refusal = None
+    others = np.linspace(0, plan.runs - 1, TRIED, dtype=int).tolist()  # of a grid the first runs are much alike
+    for run in dict.fromkeys([*range(min(plan.runs, TRIED)), *others]):
+        try:
+            return run, setup_of(plan, run)
+        except SceneError as error:
+            refusal = refusal or error
+    assert refusal is not None
+    raise refusal
+
+
+def reference(run: int, setup: Setup) -> Reference:
+    """What a run comes to here; flies it."""
+    return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
+
+
+def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Row]:
+    """The rows of the runs from `start` to before `stop`.
+
+    Raises:
+        ValueError: this worker is of another version, or its numbers are others.
+    """
+    _check(plan, reference)
+    rows: dict[str, np.ndarray] = {}
+    return [row_of(plan, run, rows) for run in range(start, stop)]
+
+
+def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> Row:
+    """The row of a run, flown; one that the scene refuses is told so.
+
+    Args:
+        plan: of the campaign.
+        run: its number.
+        rows: memory for the flights of one run after the other.
+    """
+    row: Row = {"run": run, "seed": plan.seed_of(run), **plan.values(run), "success": False}
+    try:
+        setup = setup_of(plan, run)
+    except SceneError as error:
+        return {**row, **_of_refused(vehicles(plan)), "told": _refusal(error)}
+    flights = fly_each(setup, TOPICS, rows)
+    row["end_state"] = joint_end_state(flights)
+    scene = scene_of(plan)
+    if scene.vehicles:
+        by_name = {flight.vehicle: flight for flight in flights}
+        required = {vehicle[Vehicle].name: vehicle[Success] for vehicle in scene.vehicles}
+        return row | fleet_columns.joined(
+            by_name, {name: figures(flight) for name, flight in by_name.items()}, required
+        )
+    found = figures(flights[0])
+    unmet = scene[Success].unmet(found)
+    told = f"{found['told']}; not {', not '.join(unmet)}" if unmet else ""
+    return {**row, **found, "success": not unmet, "told": told}
+
+
+def _refusal(error: SceneError) -> str:
+    """What was refused, in the same words wherever Lapwing's own files lie: the table is the same for all workers."""
+    source = error.source
+    if source.path is not None:
+        source = source._replace(path=Path(source.path.name))
+    return _FOLDER.sub("", str(SceneError(error.key, error.message, error.expected, source)))
+
+
+def _of_refused(names: tuple[str, ...]) -> Row:
+    found: Row = dict.fromkeys(FIGURES, math.nan)
+    for name, kind in fleet_columns.columns(names).items():
+        found[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
+    return {**found, "verdict": REFUSED, "end_state": ""}
+
+
+def setup_of(plan: Plan, run: int) -> Setup:
+    """The set-up of a run.
+
+    Raises:
+        SceneError: what the run draws does not fit the scene.
+    """
+    if not plan.keys:
+        return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
+    with located(plan):
+        return campaign_setup(load(scene_of(plan), plan.given(run)))
+
+
+@contextlib.contextmanager
+def located(plan: Plan) -> Iterator[None]:
+    """What is found wrong with a key that a run draws is told with the option that lets it vary."""
+    try:
+        yield
+    except SceneError as error:
+        override = (error.source.override or "").partition("=")[0]
+        if option := plan.option(override):
+            source = error.source._replace(option=option)
+            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
+        raise
+
+
+def scene_of(plan: Plan) -> Scene:
+    """The scene of a campaign."""
+    return _scene(plan.path, plan.overrides)
+
+
+def sources(plan: Plan) -> dict[str, str]:
+    """The texts that a campaign is made of: of the scene, of what it names, and of what runs may name instead."""
+    found = {name: text.decode() for name, text in scene_of(plan).sources.items()}
+    for key, distribution in plan.vary:
+        for value in distribution.values:
+            if isinstance(value, str):
+                with contextlib.suppress(SceneError):  # such a run is refused
+                    named = load(scene_of(plan), {key: value}).sources
+                    found |= {f"{key}={value}: {n}": t.decode() for n, t in named.items() if found.get(n) != t.decode()}
+    return dict(sorted(found.items()))
+
+
+@cache
+def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
+    found = load(scene, overrides)
+    for vehicle in found.vehicles or (found,):
+        check_success(vehicle)
+    return found
+
+
+@cache
+def _resolved(scene: str, overrides: tuple[str, ...]) -> Setup:
+    return campaign_setup(_scene(scene, overrides))
+
+
+_agreed: set[str] = set()  # end states of references that this process has flown
+
+
+def _check(plan: Plan, reference: Reference) -> None:
+    """Refuse to fly where the first run goes another way than where the campaign was begun."""
+    where = f"worker on {platform.node()}"
+    try:
+        scene_of(plan)
+    except SceneError as error:
+        raise ValueError(f"{where}: {error}") from None
+    for name, wanted in reference.versions.items():
+        if (found := versions().get(name)) != wanted:
+            raise ValueError(f"{where}: has {name} {found}; the campaign was begun with {wanted}")
+    if reference.end_state not in _agreed:
+        if (found := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
+            raise ValueError(f"{where}: run {reference.run} goes another way there than where the campaign was begun")
+        _agreed.add(reference.end_state)

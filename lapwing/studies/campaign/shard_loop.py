@@ -1,0 +1,122 @@
+"""Flies a campaign, shard by shard, and counts."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from lapwing.studies.campaign.folder import Folder
+from lapwing.studies.campaign.runs import REFUSED, Reference, Row, fly_runs
+from lapwing.studies.campaign.statistics import Interval, interval
+from lapwing.studies.outcome import KINDS
+
+Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]
+"""(call, tasks) -> (place of a task, call(*task)), as soon as they are there."""
+
+
+class Count(NamedTuple):
+    """What some runs came to."""
+
+    runs: int = 0
+    successes: int = 0
+    kinds: tuple[tuple[str, int], ...] = ()  # how many ended how
+
+    @property
+    def flown(self) -> int:
+        """Runs that the scene took."""
+        return self.runs - dict(self.kinds).get(REFUSED, 0)
+
+    @property
+    def failures(self) -> int:
+        """Runs that were flown without success."""
+        return self.flown - self.successes
+
+    @property
+    def failure(self) -> Interval:
+        """Probability of a failure."""
+        return interval(self.failures, self.flown)
+
+    def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
+        kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REFUSED)}
+        seen = tuple((kind, n) for kind, n in kinds.items() if n)
+        return Count(self.runs + other.runs, self.successes + other.successes, seen)
+
+    def __str__(self) -> str:
+        return ", ".join(f"{n} {kind}" for kind, n in self.kinds)
+
+
+def count(rows: Iterable[Row]) -> Count:
+    """Of some rows."""
+    kept = list(rows)
+    kinds = Counter(row["verdict"] for row in kept)
+    return Count() + Count(len(kept), sum(row["success"] for row in kept), tuple(kinds.items()))
+
+
+def campaign(
+    folder: Folder,
+    reference: Reference,
+    workers: Workers,
+    progress: Callable[[Count], None] = lambda count: None,
+    until: float | None = None,
+    part: Iterable[int] | None = None,
+) -> Count:
+    """Fly what is missing.
+
+    Args:
+        folder: of the campaign.
+        reference: what each worker has to agree on.
+        workers: who flies.
+        progress: is told what the runs so far came to, those of before among them.
+        until: end as soon as the probability of a failure is known to this on either side; which run is the last does
+            not depend on the workers.
+        part: the shards to fly, None for all.
+
+    Returns:
+        What all runs of the table came to.
+
+    Raises:
+        RunFailed: what was flown cannot be written, or a worker is lost.
+    """
+    folder.end_after(None)
+    absent = set(folder.missing())
+    missing = sorted(absent if part is None else absent.intersection(part))
+    done = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in absent}
+    total, ending = sum(done.values(), Count()), Ending(until)
+    if not ending.reached(done):
+        progress(total)
+        plan = folder.plan.anywhere()
+        tasks = [(plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
+        results = workers(fly_runs, tasks)
+        for place, rows in results:
+            folder.write(missing[place], rows)
+            done[missing[place]] = count(rows)
+            total += done[missing[place]]
+            progress(total)
+            if ending.reached(done):
+                break
+        results.close()  # type: ignore[attr-defined]
+    if ending.reached(done):
+        folder.end_after(ending.shard)
+        return ending.total
+    return total
+
+
+class Ending:
+    """When enough is known: at the first shard up to which, all before it being done, it is.
+
+    Attributes:
+        shard: this one, or the next to be looked at; each is looked at once.
+        total: what the runs up to it came to.
+    """
+
+    def __init__(self, until: float | None):
+        """`until`: how well the probability of a failure is to be known; None for never well enough."""
+        self.shard, self.total = 0, Count()
+        self._until, self._reached = until, False
+
+    def reached(self, done: Mapping[int, Count]) -> bool:
+        """Whether enough is known by these shards."""
+        while self._until is not None and not self._reached and self.shard in done:
+            self.total += done[self.shard]
+            self._reached = self.total.flown > 0 and self.total.failure.half_width <= self._until
+            self.shard += not self._reached
+        return self._reached

@@ -1,0 +1,41 @@
+"""A run of a campaign, to be flown again by itself."""
+
+from pathlib import Path
+
+from lapwing.cosim.scene import Scene
+from lapwing.services.scene_resolver import load
+from lapwing.studies.campaign.folder import read
+from lapwing.studies.campaign.runs import REFUSED, located, scene_of, sources
+
+
+def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
+    """The scene of a run, with all that it has drawn.
+
+    Args:
+        scene: that the campaign has flown.
+        run: its number.
+        folder: of the campaign.
+
+    Raises:
+        ValueError: no such run, or the scene is not what was flown.
+    """
+    found = read(folder)
+    if not 0 <= run < found.plan.runs:
+        raise ValueError(f"--run {run}: expected a run of {folder}, 0 to {found.plan.runs - 1}")
+    plan = found.plan._replace(path=str(scene))
+    there, here = found.about["sources"], sources(plan)
+    for name in sorted({*there, *here}):
+        if there.get(name) != here.get(name):
+            raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
+    with located(plan):
+        return load(scene_of(plan), plan.given(run))
+
+
+def end_state_of(run: int, folder: Path) -> str:
+    """The end state that a run came to in its campaign; "" where it has not been flown."""
+    found = read(folder)
+    shard = next(k for k, runs in enumerate(found.shards) if run in runs)
+    if shard in found.missing():
+        return ""
+    row = next(row for row in found.rows(shard) if row["run"] == run)
+    return "" if row["verdict"] == REFUSED else row["end_state"]

@@ -1,0 +1,104 @@
+"""The study as a table, as JSON and as a plot."""
+
+import json
+import math
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.studies.effects.influence import Influence
+from lapwing.studies.effects.procedure import Row, Study
+from lapwing.studies.report.matplotlib_figure import styled
+from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
+
+LEAST = 1e-6  # [m] shorter bars are drawn as long as this
+
+
+def show(console: Console, found: Study) -> None:
+    """Print the study for people."""
+    head = f"{found.scene}: a plant step takes {found.airborne:.0f} ns hovering, {found.standing:.0f} ns standing"
+    console.print(head, highlight=False)
+    _table(console, "Effects of the scene, and what leaving one out changes", found, active=True)
+    _table(console, "Effects that the scene leaves out, and what adding one changes", found, active=False)
+    saved = 1.0 - found.smallest_airborne / found.airborne, 1.0 - found.smallest_standing / found.standing
+    console.print(
+        f"Smallest set within {found.within:g} m: {', '.join(found.smallest) or 'none'} ({found.apart:.2g} m off; "
+        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} standing)",
+        highlight=False,
+    )
+    names = ", ".join(row.name for row in found.missing)
+    console.print(f"Left out, and worth more than {found.within:g} m: {names or 'none'}", highlight=False)
+
+
+def _table(console: Console, title: str, found: Study, active: bool) -> None:
+    console.print(title)
+    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
+    table.add_column("effect", no_wrap=True)
+    for column in ("hovering\n[ns]", "share", "standing\n[ns]", "path [m]", "end [m]", "energy"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in _of(found, active):
+        if row.influence is None:
+            continue
+        share = f"{row.airborne / found.airborne:.0%}"
+        table.add_row(row.name, f"{row.airborne:.1f}", share, f"{row.standing:.0f}", *_changes(row.influence))
+    console.print(table)
+    for row in _of(found, active):
+        if row.remark:
+            console.print(f"  not flown: {row.remark}", highlight=False, soft_wrap=True)
+
+
+def _changes(i: Influence) -> tuple[str, str, str]:
+    if i.failure:
+        return "ends early", "", ""
+    return f"{i.trajectory:.2g}", f"{i.final:.2g}", f"{100.0 * i.energy:+.2g} %"
+
+
+def _of(found: Study, active: bool) -> list[Row]:
+    rows = [row for row in found.rows if row.active == active]
+    return sorted(rows, key=lambda r: -r.influence.trajectory if r.influence else math.inf)
+
+
+def write_json(path: Path, found: Study) -> None:
+    """Write the study for other programs; what is infinite or not known is null."""
+    rows = []
+    for row in found.rows:
+        changes = row.influence._asdict() if row.influence else None
+        rows.append({**row._asdict(), "influence": changes})
+    data = {**found._asdict(), "rows": rows, "missing": [row.name for row in found.missing]}
+    path.write_text(json.dumps(_plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def plot(path: Path, found: Study) -> None:
+    """Influence of every effect over the tolerance, and beside it what it costs."""
+    rows = [r for r in (*_of(found, False)[::-1], *_of(found, True)[::-1]) if r.influence]
+    names = [row.name if row.active else f"({row.name})" for row in rows]
+    with styled():
+        figure = Figure(figsize=(WIDTH, 1.1 + 0.27 * len(rows)), dpi=DPI, layout="constrained")
+        influence, cost = figure.subplots(1, 2, sharey=True)
+        ends = [row.influence.trajectory for row in rows if row.influence]
+        most = max([e for e in ends if math.isfinite(e)] + [10.0 * found.within])
+        lengths = [min(max(e, LEAST), 3.0 * most) for e in ends]
+        colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
+        influence.barh(names, lengths, color=colours)
+        influence.axvline(found.within, color=BOUND, linewidth=1.2, label=f"tolerance {found.within:g} m")
+        influence.set_xscale("log")
+        influence.set_xlabel("largest change of the trajectory [m]")
+        influence.legend(loc="lower right")
+        cost.barh(names, [row.airborne for row in rows], color=colours)
+        cost.set_xlabel("cost of a plant step, hovering [ns]")
+        for axis in (influence, cost):
+            axis.grid(visible=False, axis="y")
+            axis.margins(y=0.01)
+        figure.suptitle(f"{found.scene}: effects of the scene, and (in brackets) those it leaves out", fontsize=10)
+        figure.savefig(path)

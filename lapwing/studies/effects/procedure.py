@@ -1,0 +1,111 @@
+"""The whole study: every effect left out or added once, and the smallest set that keeps the flight."""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics import effects
+from lapwing.dynamics.effects._vehicle_interaction import INTERACT
+from lapwing.services.autopilot.schema import Autopilot
+from lapwing.services.common.vehicle_schema import Effects, Vehicle
+from lapwing.studies.effects.cost import costs
+from lapwing.studies.effects.influence import Influence, influence
+from lapwing.studies.effects.variants import Hangar, Tables, hangar, refusal
+from lapwing.studies.flight_data import Flight
+
+
+class Row(NamedTuple):
+    """One effect: of the scene, or of the catalogue and left out."""
+
+    name: str
+    active: bool
+    influence: Influence | None  # of leaving it out, or of adding it; None where that cannot be
+    airborne: float  # [ns] that it adds to a plant step while hovering
+    standing: float  # [ns] that it adds to a plant step on the ground
+    remark: str = ""
+
+
+class Study(NamedTuple):
+    """What `lapwing effects` has found."""
+
+    scene: str
+    within: float  # [m]
+    airborne: float  # [ns] of a plant step with the scene's effects, hovering
+    standing: float  # [ns] of one on the ground
+    rows: tuple[Row, ...]
+    smallest: tuple[str, ...]  # effects that keep the trajectory within the tolerance
+    apart: float  # [m] largest distance of the flight with these only
+    smallest_airborne: float  # [ns] of a plant step with these
+    smallest_standing: float  # [ns]
+
+    @property
+    def missing(self) -> list[Row]:
+        """Effects that the scene leaves out and that would change it by more than the tolerance."""
+        return [r for r in self.rows if not r.active and r.influence and r.influence.trajectory > self.within]
+
+
+def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> Study:
+    """Fly the scene without each of its effects, with each of the others, and with fewer and fewer.
+
+    Args:
+        scene: of a multirotor.
+        within: [m] how far the flight with the smallest set may be from the scene's own at any time.
+        say: told what has been flown or is being done, how many flights are done, and of how many.
+
+    Raises:
+        ValueError: the scene's model knows no effects, or the scene itself comes to no end.
+    """
+    if not scene.has(Autopilot):
+        raise ValueError(f"{scene.path}: the model {scene[Vehicle].model} knows no effects; expected a multirotor")
+    tables = scene[Effects].tables
+    fewer = {name: _without(tables, name) for name in tables}
+    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACT]  # nobody to meet
+    more = {name: {**tables, name: {}} for name in alone if name not in tables}
+    refused = {name: why for name, v in (fewer | more).items() if (why := refusal(scene, v))}
+    flying = {name: v for name, v in (fewer | more).items() if name not in refused}
+    found: dict[str, Influence] = {}
+    with hangar(scene) as crew:
+        flights = crew.fly([tables, *flying.values()])
+        count = len(flying) + 1
+        say("flying the scene as it is", 0, count)
+        flown = next(flights)
+        if flown.failure:
+            raise ValueError(f"{scene.path}: {flown.failure}")
+        for i, (name, flight) in enumerate(zip(flying, flights, strict=True), 1):
+            say(f"{'without' if name in tables else 'with'} {name}", i + 1, count)
+            found[name] = influence(flown, flight)
+        out = sorted((n for n in fewer if n in found), key=lambda n: found[n].trajectory)
+        out = [n for n in out if found[n].trajectory <= within]
+        kept, apart = _smallest(crew, tables, flown, out, within, lambda text: say(text, count, count + 1))
+    say("timing the plant's steps", count + 1, count + 1)
+    names = list(flying)
+    full, least, *each = costs(scene, [tables, kept, *flying.values()])
+    rows = []
+    for name in sorted(fewer) + sorted(more):
+        sign = 1.0 if name in fewer else -1.0
+        taken = each[names.index(name)] if name in flying else (math.nan, math.nan)
+        airborne, standing = (sign * (a - b) for a, b in zip(full, taken, strict=True))
+        rows.append(Row(name, name in fewer, found.get(name), airborne, standing, refused.get(name, "")))
+    return Study(scene.name, within, *full, tuple(rows), tuple(kept), apart, *least)
+
+
+def _without(tables: Tables, *names: str) -> dict[str, Any]:
+    return {name: table for name, table in tables.items() if name not in names}
+
+
+def _smallest(
+    crew: Hangar, tables: Tables, flown: Flight, out: list[str], within: float, say: Callable[[str], None]
+) -> tuple[dict[str, Any], float]:
+    """The effects left, and how far off that is, when all of `out` go that can go together.
+
+    Each of `out` alone is within the tolerance; while all together are not, the one of most influence comes back.
+    """
+    while out:
+        kept = _without(tables, *out)
+        say(f"without {', '.join(out)} together")
+        apart = influence(flown, next(iter(crew.fly([kept])))).trajectory
+        if apart <= within:
+            return kept, apart
+        out = out[:-1]
+    return dict(tables), 0.0

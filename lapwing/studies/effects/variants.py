@@ -1,0 +1,55 @@
+"""The same scene with other effects, flown on as many cores as there are."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics import effects
+from lapwing.messages.topics import TRUTH
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.simulate import fly
+from lapwing.studies.workers import workers
+
+Tables = Mapping[str, Any]  # the table of each effect that a variant has
+
+
+def variant(scene: Scene, tables: Tables) -> Scene:
+    """`scene` with these effects instead of its own."""
+    return scene.replaced(Effects.model_validate(dict(tables)))
+
+
+def refusal(scene: Scene, tables: Tables) -> str:
+    """Why a scene cannot have these effects, "" if it can."""
+    try:
+        effects.from_scene(tables, airframe(scene), environment(scene))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def truth_of(scene: Scene) -> Flight:
+    """The scene flown to its end, with the true state alone."""
+    return fly(scene, (TRUTH,))
+
+
+class Hangar:
+    """Flies variants of one scene side by side; each set of effects is compiled once and kept on disk."""
+
+    def __init__(self, scene: Scene, pool: ProcessPoolExecutor):
+        self._scene, self._pool = scene, pool
+
+    def fly(self, variants: Iterable[Tables]) -> Iterator[Flight]:
+        """The flight of each variant, in order, as they come."""
+        return self._pool.map(truth_of, [variant(self._scene, tables) for tables in variants])
+
+
+@contextmanager
+def hangar(scene: Scene) -> Iterator[Hangar]:
+    """A hangar whose processes end with the block, at once where it ends with an error, and with this process."""
+    with workers(os.cpu_count() or 1) as pool:
+        yield Hangar(scene, pool)

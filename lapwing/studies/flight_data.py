@@ -1,0 +1,264 @@
+"""A flight, recorded or flown in memory: what every topic said by time, and its figures of merit."""
+
+from collections.abc import Collection, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from lapwing.cosim.config.provenance import DIVERGED, FAILURE, RESTARTS
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.log import LogReader
+from lapwing.messages import TYPES
+from lapwing.messages.topics import (
+    ACTUATORS,
+    BODIES,
+    CONTACT,
+    ESTIMATE,
+    EVENTS,
+    LIFT,
+    SETPOINT,
+    STATUS,
+    TRUTH,
+    Topic,
+    of_all,
+)
+from lapwing.studies import tracking
+from lapwing.studies.flight_events import Event, events, ordered, restarts, slack
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.flight_topics import FlightTopics
+from lapwing.studies.outcome import Verdict, judge
+from lapwing.studies.port_columns import columns_of
+from lapwing.studies.topic_view import TopicView
+
+AXES = tuple(tracking.AXES)
+IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
+
+
+SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which verdict, events, figures and report are made
+
+
+class Flight(FlightTopics):
+    """What was said in a flight, topic by topic, and what that comes to.
+
+    `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
+
+    Attributes:
+        origin: where it comes from, with the log's metadata.
+        vehicle: name.
+        fleet: what is true of every vehicle that flew, "truth" by name; this one among them.
+        others: the other vehicles that flew, each a flight with what is shown of it in space.
+        failure: why it ended before its time; "" where it did not, or where a log does not say.
+        diverged: whether that is a state that was no longer finite.
+    """
+
+    def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
+        """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        super().__init__(topics, origin)
+        self.failure, self.diverged = failure, diverged
+        self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
+        self.others: tuple[Flight, ...] = ()
+
+    @classmethod
+    def read(cls, path: str | Path, vehicle: str | None = None, only: Collection[Topic] | None = None) -> Self:
+        """A recorded flight.
+
+        Args:
+            path: of the MCAP log.
+            vehicle: its name; by default that of the first topic /NAME/truth.
+            only: the topics wanted, None for all.
+
+        Raises:
+            ValueError: no such file, no MCAP log, no flight in it, or a damaged message.
+        """
+        with LogReader(path) as log:
+            known = [name for name, kind in log.topics().items() if kind in TYPES]
+            fleet = _vehicles(known, log.metadata)
+            named = vehicle or next(iter(fleet), None)
+            if named is None or named not in fleet:
+                raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
+            others = {topic.key(name) for name in fleet for topic in IN_SPACE}
+            own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
+            return cls._of_log(log, str(path), log.histories(_wanted(own, only, fleet)), named, fleet)
+
+    @classmethod
+    def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
+        """The recorded flights of all vehicles of a log, which is read once.
+
+        Args:
+            path: of the MCAP log.
+            only: the topics wanted, of every vehicle, None for all.
+
+        Raises:
+            ValueError: as of `read`.
+        """
+        with LogReader(path) as log:
+            known = [name for name, kind in log.topics().items() if kind in TYPES]
+            fleet = _vehicles(known, log.metadata)
+            if not fleet:
+                raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
+            histories = log.histories(_wanted(known, only, fleet))
+            return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
+
+    @classmethod
+    def _of_log(cls, log: LogReader, source: str, histories: Mapping[str, Any], vehicle: str, fleet: list[str]) -> Self:
+        failure, diverged = log.metadata.get(FAILURE, ""), log.metadata.get(DIVERGED) == "yes"
+
+        def of(name: str, keys: Collection[str]) -> Any:
+            views = {key.removeprefix(f"/{name}").removeprefix("/"): TopicView(*histories[key]) for key in keys}
+            return cls(views, Origin.of_log(source, name, log.metadata, log.attachments), failure, diverged)
+
+        found: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
+        shown = {name: [key for topic in IN_SPACE if (key := topic.key(name)) in histories] for name in fleet}
+        found.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
+        truths = {other.vehicle: other.truth for other in found.others}
+        found.fleet = {name: truths.get(name, found.truth) for name in fleet}
+        return found
+
+    @classmethod
+    def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False) -> Self:
+        """A flight that was flown in this process.
+
+        Args:
+            graph: at the end; its rows keep all ticks of what these topics are made of.
+            only: the topics wanted, None for all that are recorded.
+            failure: why it ended before its time.
+            diverged: whether that is a state that was no longer finite.
+        """
+        said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
+        return cls(said, Origin.of_setup(graph.setup), failure, diverged)
+
+    @classmethod
+    def of_each(
+        cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
+    ) -> list[Self]:
+        """The flights of all vehicles of a run; arguments as of `of`."""
+        if graph.setup.vehicle:
+            return [cls.of(graph, only, failure, diverged)]
+        said = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
+        found = []
+        for own in members(graph.setup):
+            views = {_short(of_all(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
+            found.append(cls(views, Origin.of_setup(own), failure, diverged))
+        truths = {flight.vehicle: flight.truth for flight in found if flight.has("truth")}
+        for flight in found:
+            flight.fleet, flight.others = truths, tuple(other for other in found if other is not flight)
+        return found
+
+    def __repr__(self) -> str:
+        said = str(self.verdict) if len(self.truth) else "nothing was flown"
+        return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {said}>"
+
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "truth", shape (n, 6).
+
+        The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
+        The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
+        """
+        if not self._tracked:
+            return np.empty((0, len(AXES)))
+        position, roll_pitch, yaw = self._reference
+        return np.column_stack([position, roll_pitch, yaw])
+
+    @cached_property
+    def _tracked(self) -> int:
+        """The count of times of `reference`."""
+        if not (self.has("setpoint") and self.has("actuators")):
+            return 0
+        return min(len(self.truth), len(self.setpoint), len(self.actuators))
+
+    @property
+    def _reference(self) -> tracking.Reference:
+        n, setpoint = self._tracked, self.setpoint
+        return tracking.Reference(setpoint.position[:n], self.actuators.attitude_reference[:n, :2], setpoint.yaw[:n])
+
+    @cached_property
+    def armed(self) -> np.ndarray:
+        """Whether the motors are armed, at the times of `reference`, shape (n,) of bool."""
+        n = self._tracked
+        return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
+
+    @cached_property
+    def errors(self) -> dict[str, np.ndarray]:
+        """Reference minus truth of each axis [m], [rad] while the motors are armed; empty without a reference."""
+        n = len(self.reference)
+        if n == 0:
+            return {}
+        found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
+        return dict(zip(AXES, found.T, strict=True))
+
+    def rmse_of(self, pose: TopicView) -> dict[str, float]:
+        """Root-mean-square error of each axis [m], [rad] of the pose of a topic; of a flight with a reference."""
+        n = self._tracked
+        return tracking.rmse(self._reference, pose.position[:n], pose.attitude[:n], self.armed)
+
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """Greatest distance from the reference, and how far beyond its extremes [m]; for a flight with a reference."""
+        n = self._tracked
+        return tracking.reach(self.setpoint.position[:n], self.truth.position[:n], self.armed)
+
+    @cached_property
+    def rmse(self) -> dict[str, float]:
+        """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
+        return self.rmse_of(self.truth) if self._tracked else {}
+
+    @property
+    def energy(self) -> float:
+        """Electrical energy that the motors have taken [J]."""
+        return tracking.total(self.truth.motor_power) * self.setup.interval
+
+    @cached_property
+    def finished(self) -> bool:
+        """Whether the autopilot says that the mission is over."""
+        return self.has("status") and bool(self.status.finished[-1])
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """How it ended: `kind` is "landed", "crashed", "timed out", "diverged", "broken off" or "flown"."""
+        no_end = self.origin.recorded and not self.digest
+        failure = self.failure or ("the log has no end" if no_end else "")
+        return judge(self.truth, self.status if self.has("status") else None, failure, self.diverged)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """What happened, in order; an `Event` says what kinds there are."""
+        if self.has("events"):
+            said = self.topic("events")
+            return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
+        status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
+        found = events(self.truth, status, setpoint, self.armed, self.origin.scene)
+        load = self.origin.scene.get("cooperative_load")
+        if load and self.has("bodies") and self.has("lift"):  # nobody steers: no other kind of event is told
+            found += slack(self.topic("bodies"), self.topic("lift"), load)
+        if RESTARTS in self.metadata:
+            found = ordered([*found, *restarts(self.metadata[RESTARTS])])
+        return found
+
+    @property
+    def landed(self) -> bool:
+        """Whether the mission has ended on the ground: as the autopilot says, and upright, slow and in contact."""
+        return self.verdict.kind == "landed"
+
+
+def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
+    """Of the names in a log those of the topics that are wanted."""
+    if only is None:
+        return names
+    wanted = {topic.key(name) for topic in only for name in fleet}
+    return [name for name in names if name in wanted]
+
+
+def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
+    """The vehicles whose truth is among the topics of a log, in the order of its scene."""
+    found = [name.split("/")[1] for name in topics if name.endswith("/truth")]
+    said = metadata.get("vehicle", "").split(", ")
+    return sorted(found, key=lambda name: said.index(name) if name in said else len(said))
+
+
+def _short(topic: Topic) -> str:
+    """The topic's name without the vehicle's."""
+    return topic.name.removeprefix("{vehicle}/")

@@ -1,0 +1,139 @@
+"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, slack links, saturation, contact; and
+which services were started again."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.studies.ground_contacts import touches
+from lapwing.studies.model_validity import warnings
+from lapwing.studies.planned_faults import planned
+from lapwing.studies.saturation import saturation, stretches
+from lapwing.studies.tension import pushes, told
+from lapwing.studies.topic_view import TopicView
+
+BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
+ORDER = tuple(KINDS)  # at the same time
+
+
+class Event(NamedTuple):
+    """Something that happened."""
+
+    time: float  # [s]
+    kind: str  # of lapwing.services.common.event_kinds.KINDS
+    text: str
+
+
+def events(
+    truth: TopicView, status: TopicView | None, setpoint: TopicView | None, armed: np.ndarray, scene: dict[str, Any]
+) -> list[Event]:
+    """All events of a flight in their order.
+
+    Args:
+        truth: the true state.
+        status: of the autopilot; None where nobody steers: then only planned faults are told.
+        setpoint: that was followed, if any.
+        armed: whether the motors are armed, at the first n times of `truth`, shape (n,).
+        scene: its tables.
+    """
+    end = float(truth.times[-1]) if len(truth) else 0.0
+    found = [Event(time, "fault", text) for time, text in planned(scene) if time <= end]
+    if status is not None and len(status):
+        found += _said(status)
+        found += _contacts(truth)
+        found += [Event(doubt.start, "warning", doubt.text) for doubt in warnings(truth, scene)]
+        highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+        if highest is not None and len(armed):
+            found += _saturations(truth, armed, highest)
+    if setpoint is not None and len(setpoint):
+        phases = changes(setpoint.times, setpoint.phase)
+        found += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
+    found = [event._replace(time=round(event.time, 9)) for event in found]  # nanoseconds, as the log counts
+    return ordered(found)
+
+
+def ordered(found: Iterable[Event]) -> list[Event]:
+    """Events in their order."""
+    return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
+
+
+def restarts(told: str) -> list[Event]:
+    """Where services were started again, from what the log's metadata tells of it (`lapwing.cosim.processes.restart_policy`)."""
+    return [Event(round(time, 9), "restart", text) for time, text in json.loads(told)]
+
+
+def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:
+    """Where a link pushes: a rigid one can, a cable would be slack, and the flight is not one on cables.
+
+    Args:
+        bodies: the load and the quadrotors.
+        lift: their thrusts.
+        load: the scene's table [cooperative_load].
+    """
+    every = told(bodies, lift, load)
+    found = []
+    for k in range(every.shape[1]):
+        for push in pushes(bodies.times[: len(every)], every[:, k]):
+            text = f"link {k + 1} pushes until {push.stop:.3f} s with up to {push.most:.3g} N: a cable would be slack"
+            found.append(Event(round(push.start, 9), "slack", text))
+    return sorted(found)
+
+
+def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
+    """Time [s] and value at the beginning and wherever the value becomes another."""
+    rows = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
+    return ((float(t[k]), values[k]) for k in rows)
+
+
+def _said(status: TopicView) -> Iterator[Event]:
+    """What the autopilot said of itself."""
+    t, known = status.times, set(status.fields)
+    if "armed" in known:
+        for time, armed in list(changes(t, status.armed)):
+            if armed or time > t[0]:
+                yield Event(time, "arming", "armed" if armed else "disarmed")
+    if "mode" in known:
+        yield from (Event(time, "mode", str(mode)) for time, mode in changes(t, status.mode) if mode)
+    if {"failsafe", "text"} <= known:
+        before = ""
+        for time, reason in changes(t, np.where(status.failsafe, status.text.astype(object), "")):
+            if reason or before:
+                yield Event(time, "failsafe", str(reason) or f"{before}: over")
+            before = reason
+    if "failed_motor" in known:
+        yield from (
+            Event(time, "fault", f"motor {k} noticed to have failed")
+            for time, k in changes(t, status.failed_motor)
+            if k
+        )
+    if "battery_warning" in known:
+        for time, level in changes(t, status.battery_warning):
+            if level:
+                yield Event(time, "battery", BATTERY[min(int(level), len(BATTERY) - 1)])
+
+
+def _contacts(truth: TopicView) -> Iterator[Event]:
+    t = truth.times
+    for touch in touches(truth):
+        if touch.start > 0:
+            yield Event(float(t[touch.start]), "contact", f"touches the ground at {touch.speed:.2f} m/s")
+        if touch.stop < len(t):
+            yield Event(float(t[touch.stop]), "contact", "leaves the ground")
+
+
+def _saturations(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
+    found, t = saturation(truth, armed, highest), truth.times
+    for first, stop in stretches(found.any, t):
+        some = slice(first, stop)
+        low, high = (np.flatnonzero(at[some].any(axis=0)) + 1 for at in (found.low, found.high))
+        where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
+        lasted = float(found.step[some][found.any[some]].sum())
+        share = 100.0 * found.share(lasted)
+        yield Event(float(t[first]), "motors", f"{', '.join(where)} for {lasted:.2f} s, {share:.2g} % of the flight")
+
+
+def _motors(numbers: np.ndarray) -> str:
+    return f"motor{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"

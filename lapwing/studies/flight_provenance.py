@@ -1,0 +1,87 @@
+"""Where a flight comes from: the set-up that was flown, and what its log says about itself."""
+
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, Self
+
+from lapwing.cosim.config import provenance
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.serialise import from_json
+from lapwing.cosim.diagram.multi_vehicle import member
+
+
+class Origin:
+    """A log, or a set-up that was flown in memory.
+
+    Attributes:
+        source: the log's path or the scene's name, for messages to people.
+        vehicle: name.
+        recorded: whether it is a log.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        vehicle: str,
+        setup: Setup | None,
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes],
+    ):
+        self.source, self.vehicle, self.recorded = source, vehicle, setup is None
+        self._setup, self._metadata, self._attachments = setup, metadata, attachments
+
+    @classmethod
+    def of_log(cls, source: str, vehicle: str, metadata: Mapping[str, str], attachments: Mapping[str, bytes]) -> Self:
+        """The origin of a recorded flight."""
+        return cls(source, vehicle, None, dict(metadata), dict(attachments))
+
+    @classmethod
+    def of_setup(cls, setup: Setup) -> Self:
+        """The origin of a flight in memory."""
+        return cls(setup.scene, setup.vehicle, setup, {}, {})
+
+    @cached_property
+    def setup(self) -> Setup:
+        """What was flown.
+
+        Raises:
+            ValueError: the log carries no set-up, or one that this version cannot read.
+        """
+        if self._setup is not None:
+            return self._setup
+        if provenance.SETUP_FILE not in self._attachments:
+            raise ValueError(f"{self.source}: has no attachment {provenance.SETUP_FILE}")
+        try:
+            return member(from_json(self._attachments[provenance.SETUP_FILE].decode()), self.vehicle)
+        except ValueError as fault:
+            raise self._unreadable(fault) from None
+
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """The tables of the scene with all that its files say; empty where the log carries none.
+
+        Raises:
+            ValueError: they cannot be read.
+        """
+        if self._setup is not None:
+            return self._setup.resolved
+        try:  # the tables alone: they can be read even when classes of the set-up have changed
+            tree = json.loads(self._attachments.get(provenance.SETUP_FILE, b"{}")).get("resolved", {})
+            found = from_json(json.dumps(tree))
+        except ValueError as fault:
+            raise self._unreadable(fault) from None
+        if not isinstance(found.get("vehicle"), list):
+            return found
+        own: dict[str, Any] = next(
+            (entry for entry in found["vehicle"] if entry["vehicle"]["name"] == self.vehicle), {}
+        )
+        return {**found, **own}
+
+    @cached_property
+    def metadata(self) -> dict[str, str]:
+        """Scene, seed, mode, version, digest and more, as a log has them."""
+        return provenance.metadata(self._setup, "memory") if self._setup is not None else dict(self._metadata)
+
+    def _unreadable(self, fault: ValueError) -> ValueError:
+        return ValueError(f"{self.source}: its attachment {provenance.SETUP_FILE} cannot be read: {fault}")

@@ -1,0 +1,127 @@
+"""What was said in a flight, topic by topic."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.messages.digest import Digest
+from lapwing.messages.topics import Topic, topic_named
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.topic_view import TopicView
+
+
+class FlightTopics:
+    """The topics of one vehicle's flight, by their names without the vehicle's.
+
+    Attributes:
+        origin: where the flight comes from, with the log's metadata.
+        vehicle: name.
+    """
+
+    def __init__(self, topics: Mapping[str, TopicView], origin: Origin):
+        """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        self.origin, self.vehicle = origin, origin.vehicle
+        self._topics = dict(topics)
+
+    @property
+    def setup(self) -> Setup:
+        """What was flown.
+
+        Raises:
+            ValueError: the log carries no set-up, or one that this version cannot read.
+        """
+        return self.origin.setup
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """What the log says about its making: scene, seed, mode, version, digest and more."""
+        return self.origin.metadata
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest over the deterministic messages: as the log states it ("": it has no end), or of the topics here."""
+        if self.origin.recorded:
+            return self.metadata.get("digest", "")
+        digest = Digest()
+        for name in self.topics:
+            topic = topic_of(name)
+            if topic.recorded and topic.deterministic:
+                for time_ns, payload in self.topic(name).payloads():
+                    digest.update(topic.key(self.vehicle), time_ns, payload)
+        return digest.hexdigest()
+
+    @property
+    def truth(self) -> TopicView:
+        """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
+        return self.topic("truth")
+
+    @property
+    def setpoint(self) -> TopicView:
+        """Where the vehicle ought to be, as the autopilot follows it: position, velocity, acceleration, yaw, phase."""
+        return self.topic("setpoint")
+
+    @property
+    def actuators(self) -> TopicView:
+        """What the autopilot commands: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
+        return self.topic("actuators")
+
+    @property
+    def estimate(self) -> TopicView:
+        """What the estimator tells, and its standard deviations: position, position_std, velocity, ..."""
+        return self.topic("estimate")
+
+    @property
+    def status(self) -> TopicView:
+        """What the autopilot is doing: phase, armed, landed, finished, warnings."""
+        return self.topic("status")
+
+    @property
+    def topics(self) -> list[str]:
+        """The names of all topics."""
+        return sorted(self._topics)
+
+    def topic(self, name: str) -> TopicView:
+        """A topic by its name without the vehicle's, for example "gps/fix".
+
+        Raises:
+            ValueError: it is not there; names those that are.
+        """
+        if name not in self._topics:
+            raise ValueError(f"{self.origin.source}: has no topic {name}; it has {', '.join(self.topics)}")
+        return self._topics[name]
+
+    def has(self, topic: str) -> bool:
+        """Whether there is this topic."""
+        return topic in self._topics
+
+    def times(self, topic: str) -> np.ndarray:
+        """Simulation times of a topic [s], shape (n,)."""
+        return self.topic(topic).times
+
+    def column(self, topic: str, field: str) -> np.ndarray:
+        """A field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
+        return self.topic(topic)[field]
+
+    def to_dataframe(self, topic: str = "truth") -> Any:
+        """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
+        view = self.topic(topic)
+        return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def topic_of(name: str) -> Topic:
+    """The topic whose name without the vehicle's is given; ValueError if there is none."""
+    try:
+        return topic_named(f"{{vehicle}}/{name}")
+    except ValueError:
+        return topic_named(name)

@@ -1,0 +1,32 @@
+"""When a vehicle touches the ground, how hard, and when it leaves it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.topic_view import TopicView
+
+BOUNCE = 0.5  # [s] without contact that still belong to the same touch
+
+
+class Touch(NamedTuple):
+    """A stretch on the ground, its bounces included."""
+
+    start: int  # row of the truth with the first contact
+    stop: int  # row after the last contact
+    speed: float  # [m/s] downwards just before the hardest contact; 0 where the vehicle stands there from the beginning
+
+
+def touches(truth: TopicView) -> list[Touch]:
+    """All stretches on the ground, in order; empty for a plant that tells of no contact."""
+    contact = truth.ground_contact
+    changed = (np.flatnonzero(contact[1:] != contact[:-1]) + 1).tolist()
+    edges = [0] * bool(contact[0]) + changed + [len(contact)] * bool(contact[-1]) if len(contact) else []
+    found: list[Touch] = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        speed = max(-float(truth.velocity[start - 1, 2]), 0.0) if start else 0.0
+        if found and truth.times[start] - truth.times[found[-1].stop - 1] < BOUNCE:
+            found[-1] = Touch(found[-1].start, stop, max(found[-1].speed, speed))
+        else:
+            found.append(Touch(start, stop, speed))
+    return found

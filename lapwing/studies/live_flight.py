@@ -1,0 +1,57 @@
+"""A vehicle's flight while it goes on: what is new, as a flight of its own, and the events in it."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.messages.topic_columns import history
+from lapwing.messages.topics import STATUS, Topic, of_all
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.studies.flight_data import IN_SPACE, Flight
+from lapwing.studies.flight_events import Event
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.topic_view import TopicView
+
+TAKEN = (*IN_SPACE, STATUS)
+
+
+class LiveFlight:
+    """Takes the messages of a run as its services hand them over, in whatever order they come."""
+
+    def __init__(self, setup: Setup):
+        """Of a run that is about to begin; of a fleet the set-up of one vehicle (`lapwing.cosim.diagram.multi_vehicle.members`)."""
+        self._setup = setup
+        self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
+
+    def take(self, pages: Iterable[Page]) -> None:
+        """What a service has handed over."""
+        interval = self._setup.interval_ns
+        for page in pages:
+            topic = of_all(page.topic)
+            if topic in self._said and page.topic.vehicle in ("", self._setup.vehicle):
+                rows = zip(page.ticks, page.payloads, strict=True)
+                self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
+
+    def step(self, until_ns: int) -> Flight | None:
+        """What has come up to an instant since the step before, begun with the newest message before it.
+
+        None where the truth tells nothing new.
+        """
+        views: dict[str, TopicView] = {}
+        for topic, said in self._said.items():
+            now = [message for message in said if message[0] <= until_ns]
+            if now:
+                times, payloads = zip(*now, strict=True)
+                columns = history(topic.message, payloads)
+                views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
+                del said[: len(now) - 1]  # the newest begins the next step
+        if "truth" not in views or len(views["truth"]) < 2:
+            return None
+        return Flight(views, Origin.of_setup(self._setup))
+
+
+def new_events(flight: Flight, after: float) -> list[Event]:
+    """What happened in a step after the time `after` [s]."""
+    return [event for event in flight.events if event.time > after and not KINDS[event.kind].afterwards]

@@ -1,0 +1,130 @@
+"""Where two logs begin to differ, and how the difference grows from there."""
+
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.log import LogReader
+from lapwing.messages import TYPES
+from lapwing.messages.message_diff import first_difference
+
+AFTER = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # [s] at which growth is told, and at the end
+ABOUT = ("scene", "seed", "setup", "version", "commit")  # of the metadata: why logs may differ
+
+
+class Growth(NamedTuple):
+    """How far a field of two logs is apart, some time after the first difference."""
+
+    after: float  # [s]
+    apart: float  # Euclidean distance of the two values
+    position: float | None  # [m] distance of the true positions then; None where a log has none at that time
+
+
+class Difference(NamedTuple):
+    """The first message at which two logs differ."""
+
+    topic: str
+    time_ns: int
+    field: str  # dotted; "" where the message itself is in one log only, or its type is not known
+    values: tuple[Any, Any]  # in the one log and in the other
+    growth: tuple[Growth, ...]  # empty where the field holds no numbers
+
+
+class Comparison(NamedTuple):
+    """What two logs have in common and what not."""
+
+    about: dict[str, tuple[str, str]]  # what they say of themselves, where that differs
+    only: tuple[tuple[str, ...], tuple[str, ...]]  # topics that one of them has alone
+    first: Difference | None
+
+    @property
+    def same(self) -> bool:
+        """Whether they hold the same deterministic messages."""
+        return self.first is None and not any(self.only)
+
+
+def compare(one: str | Path, other: str | Path) -> Comparison:
+    """Compare the deterministic messages of two logs.
+
+    Raises:
+        ValueError: one of them cannot be read, or is of another version.
+    """
+    with LogReader(one) as a, LogReader(other) as b:
+        keys = [key for key in ABOUT if a.metadata.get(key) != b.metadata.get(key)]
+        about = {key: (a.metadata.get(key, ""), b.metadata.get(key, "")) for key in keys}
+        topics = a.deterministic_topics(), b.deterministic_topics()
+        a.check_versions(topics[0])
+        b.check_versions(topics[1])
+        only = tuple(sorted(topics[0] - topics[1])), tuple(sorted(topics[1] - topics[0]))
+        return Comparison(about, only, _first(a, b, topics[0] & topics[1]))
+
+
+def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
+    types = a.topics()
+    one, other = _instants(a, topics), _instants(b, topics)
+    here, there = next(one, None), next(other, None)
+    while here or there:
+        if here == there:
+            here, there = next(one, None), next(other, None)
+            continue
+        time_ns = min(instant[0] for instant in (here, there) if instant)
+        said = [instant[1] if instant and instant[0] == time_ns else {} for instant in (here, there)]
+        for topic in {**said[0], **said[1]}:  # in the order of the log
+            payloads = [s.get(topic, []) for s in said]
+            if payloads[0] != payloads[1]:
+                return _difference(a, b, topic, types[topic], time_ns, *payloads)
+    return None
+
+
+def _instants(log: LogReader, topics: set[str]) -> Iterator[tuple[int, dict[str, list[bytes]]]]:
+    """Time [ns] and the payloads of each topic, instant by instant."""
+    for time_ns, group in groupby(log.messages(topics), key=lambda message: message[2]):
+        said: dict[str, list[bytes]] = {}
+        for topic, _, _, payload in group:
+            said.setdefault(topic, []).append(payload)
+        yield time_ns, said
+
+
+def _difference(
+    a: LogReader, b: LogReader, topic: str, kind: str, time_ns: int, one: list[bytes], other: list[bytes]
+) -> Difference:
+    if len(one) != len(other) or kind not in TYPES:
+        told = (f"{len(one)} messages", f"{len(other)} messages") if len(one) != len(other) else ("", "")
+        return Difference(topic, time_ns, "", told, ())
+    pair = next((x, y) for x, y in zip(one, other, strict=True) if x != y)
+    found = first_difference(TYPES[kind], *pair)
+    assert found
+    return Difference(topic, time_ns, found.field, (found.one, found.other), _growth(a, b, topic, found.field, time_ns))
+
+
+def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -> tuple[Growth, ...]:
+    """Of the whole vector that the field is a part of, wherever both logs have a message at the same time."""
+    times, apart = _apart(a, b, topic, (field.rpartition(".")[0], field))
+    if not len(times):
+        return ()
+    truth = next((name for name in a.topics() if name.endswith("/truth") and name in b.topics()), None)
+    instants, moved = _apart(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
+    position = dict(zip(instants.tolist(), moved.tolist(), strict=True))
+    after = (times - first_ns) * 1e-9
+    wanted = [seconds for seconds in AFTER if seconds < after[-1]] + [float(after[-1])]
+    rows = dict.fromkeys(int(np.searchsorted(after, seconds - 1e-9)) for seconds in wanted)
+    return tuple(Growth(float(after[k]), float(apart[k]), position.get(int(times[k]))) for k in rows)
+
+
+def _apart(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Times [ns] and distances (n,) of the first of some fields that has numbers in both logs; empty where none has."""
+    (times_a, one), (times_b, other) = a.history(topic), b.history(topic)
+    name = next((name for name in names if name in one and name in other), "")
+    values = [np.asarray(columns[name]) if name else np.empty(0, object) for columns in (one, other)]
+    if (
+        values[0].dtype.kind not in "biuf"
+        or values[0].dtype != values[1].dtype
+        or values[0].shape[1:] != values[1].shape[1:]
+    ):
+        return np.empty(0, np.int64), np.empty(0)
+    times, here, there = np.intersect1d(times_a, times_b, return_indices=True)
+    difference = values[1][there].astype(float) - values[0][here].astype(float)
+    return times, np.linalg.norm(difference.reshape(len(times), -1), axis=1)

@@ -1,0 +1,99 @@
+"""A log as tables for other programs: one for each topic, a column for each number or text, units in the names."""
+
+import csv
+import re
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.log import LogReader
+from lapwing.messages import TYPES
+from lapwing.messages.units import unit
+from lapwing.studies.topic_view import TopicView
+
+Table = dict[str, tuple[str, np.ndarray]]  # unit and values (n,) by the name of the column
+
+
+def tables(log: LogReader, topics: Collection[str] | None = None) -> dict[str, Table]:
+    """The topics of a log, all or those that are named, by name; the first column is the time [s].
+
+    Raises:
+        ValueError: the log has no such topic, or a type that is not known here.
+    """
+    known = log.topics()
+    found = {}
+    for topic, (times_ns, columns) in log.histories(topics).items():
+        view, kind = TopicView(times_ns, columns), TYPES[known[topic]].type_name
+        flat = {name: (unit(kind, name), values) for name, values in view.flat().items()}
+        found[topic] = {"time": ("s", view.times)} | flat
+    return found
+
+
+def write_csv(found: dict[str, Table], folder: Path) -> list[Path]:
+    """A file for each topic; the first line has names and units: "velocity.x [m/s]"."""
+    paths = []
+    for topic, table in found.items():
+        path = folder / f"{_file_name(topic)}.csv"
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow([f"{name} [{of}]" if of else name for name, (of, _) in table.items()])
+            writer.writerows(zip(*(_plain(values) for _, values in table.values()), strict=True))
+        paths.append(path)
+    return paths
+
+
+def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
+    """A file for each topic; each column's unit is in its field's metadata, key "unit".
+
+    Raises:
+        ValueError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ValueError("--parquet: pyarrow is not installed; pip install lapwing[parquet]") from None
+    paths = []
+    for topic, table in found.items():
+        arrays = {name: pyarrow.array(_plain(values)) for name, (_, values) in table.items()}
+        units = {name: {"unit": of} if of else None for name, (of, _) in table.items()}
+        fields = [pyarrow.field(name, array.type, metadata=units[name]) for name, array in arrays.items()]
+        path = folder / f"{_file_name(topic)}.parquet"
+        pyarrow.parquet.write_table(pyarrow.table(list(arrays.values()), pyarrow.schema(fields)), path)
+        paths.append(path)
+    return paths
+
+
+def write_mat(found: dict[str, Table], path: Path) -> list[Path]:
+    """One MATLAB file: for each topic a struct of columns, whose field `units` is a struct of the same names."""
+    from scipy.io import savemat
+
+    structs: dict[str, Any] = {}
+    for topic, table in found.items():
+        columns = {_identifier(name): _matlab(values) for name, (_, values) in table.items()}
+        structs[_identifier(topic)] = columns | {"units": {_identifier(name): of for name, (of, _) in table.items()}}
+    savemat(path, structs, long_field_names=True, oned_as="column")
+    return [path]
+
+
+def _plain(values: np.ndarray) -> list[Any]:
+    """Python's own numbers and texts; of what is several texts or numbers one text."""
+    if values.dtype != object:
+        return values.tolist()
+    return [value if isinstance(value, str) else "; ".join(map(str, value)) for value in values]
+
+
+def _matlab(values: np.ndarray) -> np.ndarray:
+    return np.array(_plain(values), object) if values.dtype.kind in "OU" else values
+
+
+def _file_name(topic: str) -> str:
+    return topic.strip("/").replace("/", ".")
+
+
+def _identifier(name: str) -> str:
+    """A name that MATLAB takes: letters, digits and underscores, a letter first."""
+    found = re.sub(r"\W", "_", name.strip("/"))
+    return found if found[:1].isalpha() else f"x{found}"

@@ -1,0 +1,133 @@
+"""The performance card of a vehicle: what its models give, beside what others state (theory.md, chapter 2)."""
+
+import json
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.dynamics.vehicles import performance
+from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
+from lapwing.services.autopilot.allocation import demand_effects, effectiveness, tables, tilted_effectiveness
+from lapwing.services.common.vehicle_schema import airframe, rotor_constants
+from lapwing.services.scene_resolver import load
+
+
+class Row(NamedTuple):
+    """One figure of the card, in the unit that it is shown in."""
+
+    name: str
+    unit: str
+    computed: float | None  # None: the vehicle lacks what it needs
+    published: float | None
+    source: str
+    reason: str  # why the two differ, or why nothing is computed
+
+
+def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Rotor) -> float:
+    """With the rotor lost whose loss leaves least, by the autopilot's allocation in hover (theory.md, eq. (4.27)).
+
+    Raises:
+        ValueError: the rotors cannot lose one.
+    """
+    rotors, count = airframe.about_centre.rotors, len(airframe.rotors.position)
+    reaction = tuple(sign * rotor.torque / rotor.thrust for sign in rotors.reaction_sign)
+    if rotors.tilted_axis:
+        B = tilted_effectiveness(rotors.position, rotors.tilted_axis, reaction)
+    else:
+        x, y, _ = zip(*rotors.position, strict=True)
+        B = effectiveness(x, y, reaction)
+    _, *lost = tables(B)
+    if not lost:
+        raise ValueError(f"the {count} rotors cannot lose one")
+    most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] of a rotor
+    lifts = (most / max(collective for collective, *_ in shares) for shares in lost)
+    return float(demand_effects(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
+
+
+# name of the figure, and of what is published of it: (what computes it, unit shown, SI units in one of it)
+_SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
+    "thrust over weight": (performance.thrust_over_weight, "-", 1.0),
+    "the same without a rotor": (thrust_over_weight_without_a_rotor, "-", 1.0),
+    "hover time": (performance.hover_time, "min", 60.0),
+    "maximum payload": (performance.maximum_payload, "kg", 1.0),
+    "maximum range": (performance.maximum_range, "km", 1000.0),
+    "ceiling": (performance.ceiling, "km", 1000.0),
+    "maximum tilt": (performance.maximum_tilt, "deg", math.pi / 180.0),
+    "maximum speed": (performance.maximum_speed, "m/s", 1.0),
+}
+
+
+def card(subject: Path) -> list[Row]:
+    """The figures of a vehicle.
+
+    Args:
+        subject: an airframe's file, or a scene, whose vehicle is taken.
+
+    Raises:
+        ValueError: neither of the two, or nothing says what the rotors give.
+    """
+    vehicle, rotor = _vehicle(subject)
+    rows = []
+    for name, (figure, unit, size) in _SHOWN.items():
+        stated = getattr(vehicle.published, name.replace(" ", "_"), None)
+        computed, reason = None, stated.reason if stated else ""
+        try:
+            value = figure(vehicle, rotor=rotor)
+            computed = (value[0] if isinstance(value, tuple) else value) / size
+        except ValueError as lacking:
+            reason = str(lacking)
+        rows.append(
+            Row(
+                name,
+                unit,
+                computed,
+                stated.value / size if stated else None,
+                vehicle.published.source if vehicle.published else "",
+                reason,
+            )
+        )
+    return rows
+
+
+def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
+    try:
+        tables = tomllib.loads(subject.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        tables = {}
+    if "rotors" in tables:  # what no scene has
+        alone = load_airframe(subject).loaded
+        try:
+            return alone, performance.rotor_of(alone)
+        except ValueError as lacking:
+            raise ValueError(f"{subject}: {lacking}") from None
+    scene = load(subject)
+    frame, rotor = airframe(scene), rotor_constants(scene)
+    return frame, performance.rotor_of(frame) if rotor.with_density else performance.Rotor(*rotor)
+
+
+def show(console: Console, rows: list[Row]) -> None:
+    """Print the card."""
+    source = rows[0].source
+    table = Table(show_lines=bool(source))
+    table.add_column("figure")
+    table.add_column("computed", justify="right")
+    if source:
+        table.add_column(source, justify="right")
+    if any(row.reason for row in rows):
+        table.add_column("why they differ" if source else "why not")
+    for row in rows:
+        cells = [f"{row.name} [{row.unit}]", "" if row.computed is None else f"{row.computed:.3g}"]
+        if source:
+            cells.append("" if row.published is None else f"{row.published:.3g}")
+        table.add_row(*cells, *([row.reason] if len(table.columns) > len(cells) else []))
+    console.print(table)
+
+
+def write_json(path: Path, rows: list[Row]) -> None:
+    """Write the card for other programs."""
+    path.write_text(json.dumps([row._asdict() for row in rows], indent=2) + "\n", encoding="utf-8")

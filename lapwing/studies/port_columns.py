@@ -1,0 +1,113 @@
+"""The messages of a topic as columns, straight from the rows of its port, as far as these have them."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.topic_encoder import Wire, due_ticks, encode
+from lapwing.kernels.row_packing import columns
+from lapwing.messages.topic_columns import History, history, history_of_pages
+from lapwing.messages.topics import Topic, of_all
+
+
+def columns_of(
+    graph: Graph, only: Collection[Topic] | None = None
+) -> Iterator[tuple[Topic, np.ndarray, Mapping[str, Any]]]:
+    """Topic, times [ns] (n,) and columns of all that was said in a graph that has come to its end.
+
+    Args:
+        graph: has kept all rows of what these topics are made of.
+        only: the topics wanted, of every vehicle, None for all that are recorded.
+    """
+    interval = graph.setup.interval_ns
+    for service in graph.services:
+        for wire in service.wires:
+            if graph.tick and (wire.topic.recorded if only is None else of_all(wire.topic) in only):
+                columns = PortColumns(graph, wire)
+                yield wire.topic, columns.ticks * interval, columns
+        for topic in service.spoken:
+            said = [(tick, payload) for of, tick, payload in service.messages if of is topic]
+            if said and (only is None or of_all(topic) in only):
+                ticks = np.array([tick for tick, _ in said], np.int64)
+                yield topic, ticks * interval, history(topic.message, [payload for _, payload in said])
+
+
+class PortColumns(Mapping[str, Any]):
+    """The same mapping as the `History` of the topic's messages, which are encoded only when that is asked for more.
+
+    Encoding takes half as long as flying; who looks at many flights wants numbers that stand in the rows anyhow.
+    """
+
+    def __init__(self, graph: Graph, wire: Wire):
+        """Of a topic of a graph that has come to its end and has kept all rows of its port."""
+        self._graph, self._wire = graph, wire
+        self.ticks = due_ticks(0, graph.tick, wire.period)
+        self._rows = graph.all_rows(wire.port, wire.period)
+        tree = columns(graph.ports[wire.port].like, self._rows)
+        self._fields = wire.fields(tree, self.ticks * graph.setup.interval_ns)
+        self._texts = () if wire.texts is None else wire.texts(tree)
+        first = tuple(int(column[0]) for column in self._texts)
+        self._shapes = _shapes(wire.topic.message, wire.sample(*first).encode())
+        self._columns: dict[str, np.ndarray] = {}
+
+    @cached_property
+    def _names(self) -> dict[str, None]:
+        """What every message has, of one with each of the texts that occur."""
+        keys = _distinct(self._texts) if self._texts else [()]
+        shapes = [_shapes(self._wire.topic.message, self._wire.sample(*key).encode()) for key in keys]
+        return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
+
+    @cached_property
+    def messages(self) -> History:
+        """The encoded messages."""
+        port = self._graph.ports[self._wire.port]
+        pages = list(encode(self._wire, port, self._graph.setup, self.ticks, self._rows))
+        places = [np.searchsorted(self.ticks, page.ticks) for page in pages]
+        parts = [(place, page.payloads) for place, page in zip(places, pages, strict=True)]
+        return history_of_pages(self._wire.topic.message, parts)
+
+    def payloads(self) -> list[bytes]:
+        """The messages in their order, as CDR."""
+        return self.messages.payloads()
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._fields:
+            return self.messages[name]
+        if name not in self._columns:
+            (kind, shape), values = self._shapes[name], self._fields[name]
+            column = np.asarray(values() if callable(values) else values).astype(kind, copy=False)
+            self._columns[name] = np.broadcast_to(column, (len(self.ticks), *shape))
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._shapes and (name in self._fields or name in self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.messages.__reduce__()
+
+
+@lru_cache(maxsize=256)
+def _shapes(message: Any, payload: bytes) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    """Type and shape of each field of a message, without its time; the flights of a campaign share theirs."""
+    found = {name: np.asarray(column) for name, column in history(message, [payload]).items()}
+    return {name: (column.dtype, column.shape[1:]) for name, column in found.items()}
+
+
+def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:
+    """The different rows of some columns of whole numbers that change seldom."""
+    changed = np.zeros(len(texts[0]), bool)
+    changed[0] = True
+    for column in texts:
+        changed[1:] |= column[1:] != column[:-1]
+    at = np.flatnonzero(changed)
+    keys = np.stack([np.asarray(column[at], np.int64) for column in texts], axis=1)
+    return list(dict.fromkeys(map(tuple, keys.tolist())))

@@ -1,0 +1,40 @@
+"""Of a long line only what can be seen: the extremes of short stretches, so no peak is lost."""
+
+import numpy as np
+
+from lapwing.studies.report.plot import Line
+from lapwing.studies.report.style import POINTS
+
+
+def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """At most `points` and a few of the samples of a line without gaps, shapes (n,); its ends and extremes are kept."""
+    if len(y) <= points:
+        return x, y
+    kept = extremes(y, points)
+    return x[kept], y[kept]
+
+
+def extremes(y: np.ndarray, points: int = POINTS) -> np.ndarray:
+    """Indices of the least and largest sample of each of points / 2 stretches, and of both ends, in order."""
+    length = -(-2 * len(y) // points)
+    stretches = np.pad(y, (0, -len(y) % length), mode="edge").reshape(-1, length)
+    starts = length * np.arange(len(stretches))
+    kept = np.concatenate([[0], starts + stretches.argmin(axis=1), starts + stretches.argmax(axis=1), [len(y) - 1]])
+    return np.unique(kept.clip(max=len(y) - 1))
+
+
+def every(values: np.ndarray, points: int = POINTS) -> np.ndarray:
+    """Every k-th sample and the last, shape (m, ...), of what is no function of time: a path, a cloud of points."""
+    step = max(1, -(-len(values) // points))
+    kept = values[::step]
+    return kept if (len(values) - 1) % step == 0 else np.concatenate([kept, values[-1:]])
+
+
+def drawn(mark: Line, of_x: bool) -> Line:
+    """The line as it is drawn, of a function of x (else of a path); one with gaps stays whole."""
+    if len(mark.x) <= POINTS or np.isnan(mark.y).any():
+        return mark
+    if of_x:
+        x, y = thin(mark.x, mark.y)
+        return mark._replace(x=x, y=y)
+    return mark._replace(x=every(mark.x), y=every(mark.y), z=None if mark.z is None else every(mark.z))

@@ -1,0 +1,79 @@
+"""What flew, for the head of the page."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from lapwing.cosim.executors.deadlines import MISSED, WORST
+from lapwing.studies.flight_data import Flight
+
+LONG = 60  # letters of a value or of an effect's keys that are still listed
+MANY = 12  # keys in which two scenes differ that are listed
+
+
+def facts(flight: Flight) -> dict[str, str]:
+    """What flew, and how it was computed, by name; what the log does not say is left out."""
+    said, scene = flight.metadata, flight.origin.scene
+    t = flight.truth.times
+    vehicle, autopilot = scene.get("vehicle", {}), scene.get("autopilot", {})
+    kind = vehicle.get("airframe") or vehicle.get("model", "")
+    mass = scene.get("airframe", {}).get("mass", {}).get("total")
+    steered = "autopilot" in flight.origin.scene and flight.has("actuators")
+    found = {
+        "scene": said.get("scene", ""),
+        "log": flight.origin.source if flight.origin.recorded else "",
+        "vehicle": ", ".join(filter(None, (flight.vehicle, kind, f"{mass:g} kg" if mass else ""))),
+        "effects": "; ".join(_with_keys(name, keys) for name, keys in scene.get("effects", {}).items()),
+        "sensors": "; ".join(_with_keys(name, keys) for name, keys in scene.get("sensors", {}).items()),
+        "estimator": str(autopilot.get("estimator", "")) if steered else "",
+        "gains": _gains(scene) if steered else "",
+        "duration": f"{t[-1] - t[0]:.2f} s",
+        "landed": "yes" if flight.landed else "no" if flight.has("status") else "",
+        "seed": said.get("seed", ""),
+        "mode": said.get("mode", ""),
+        "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
+        "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
+        "deadlines missed": f"{said[MISSED]} ticks; at most {said[WORST]} late" if MISSED in said else "",
+        "version": said.get("version", ""),
+        "commit": said.get("commit", ""),
+        "digest": flight.digest or "none: the log has no end",
+    }
+    return {name: value for name, value in found.items() if value}
+
+
+def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """The keys of two scenes whose values differ, and both values; of many the first, and how many more."""
+    first, second = dict(_leaves(one)), dict(_leaves(other))
+    keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
+    found = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
+    if len(keys) > MANY:
+        found[f"{len(keys) - MANY} more"] = ("", "")
+    return found
+
+
+def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted key and value of all that is no table; an empty table, such as an effect without keys, is "yes"."""
+    for key, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", "yes" if isinstance(value, dict) else value
+
+
+def _gains(scene: dict[str, Any]) -> str:
+    name, told = str(scene["autopilot"].get("gains", "")), scene.get("gains", {}).get("description", "")
+    return f"{name}: {told}" if name and told else name
+
+
+def _with_keys(name: str, keys: dict[str, Any]) -> str:
+    told = ", ".join(f"{key} {_short(value)}" for key, value in keys.items())
+    return f"{name} ({told if len(told) <= LONG else f'{len(keys)} keys'})" if told else name
+
+
+def _cut(value: Any) -> str:
+    """A value in at most so many letters: a module's text or a mesh has thousands."""
+    text = _short(value)
+    return text if len(text) <= LONG else f"{text[:LONG]}…"
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

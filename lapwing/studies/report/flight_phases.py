@@ -1,0 +1,63 @@
+"""What every plot takes of a flight: its span, its phases, what it followed."""
+
+import numpy as np
+
+from lapwing.studies.flight_data import AXES, Flight
+from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
+
+DEGREES = 180.0 / np.pi  # of 1 rad
+
+
+def over(flight: Flight) -> dict:
+    """Span and phases of a flight, as arguments of a `Plot`."""
+    t = flight.truth.times
+    return {"span": (float(t[0]), float(max(t[-1], t[0] + 1e-9))), "phases": tuple(phases(flight))}
+
+
+def phases(flight: Flight) -> list[tuple[str, float, float]]:
+    """Name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
+    if not flight.has("setpoint"):
+        return []
+    return [run for run in runs(flight.setpoint.times, flight.setpoint.phase) if run[0]]
+
+
+def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
+    """Value as text, start and end [s] of each stretch in which it stays the same."""
+    starts = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
+    ends = [*t[starts[1:]], t[-1]]
+    return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
+
+
+def three_axes(flight: Flight, first: int, flown: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
+    """Three axes over time, a row each; where something was followed, beside each its error.
+
+    Args:
+        flight: of the vehicle.
+        first: 0 for the position, 3 for the angles.
+        flown: in `unit`, shape (n, 3).
+        unit: of the plots.
+        scale: of 1 m or 1 rad in `unit`.
+        caption: of the plot.
+
+    Raises:
+        NotRecordedError: nothing to be seen, they stay as they are.
+    """
+    if len(flown) > 1 and not np.ptp(flown, axis=0).any():
+        raise NotRecordedError("it never changes")
+    t, n, panels = flight.truth.times, len(flight.reference), []
+    followed = bool(flight.armed.any())
+    for row, name in enumerate(AXES[first : first + 3]):
+        marks = [Line(t, flown[:, row], "flown", width=1.5)]
+        if n:
+            marks.append(reference(t[:n], scale * flight.reference[:, first + row], hidden=followed))
+        panels.append(Panel(tuple(marks), f"{name} [{unit}]", row=row))
+        if followed:
+            rmse = scale * flight.rmse[name]
+            error = Line(t[:n][flight.armed], scale * flight.errors[name], width=1.0)
+            bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
+            said = f"RMSE {rmse:.4f} {unit}"
+            panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=said, row=row, column=1))
+    if followed:
+        caption += " On the right reference minus truth while the motors are armed."
+    widths = (1.0, 1.0) if followed else (1.0,)
+    return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, widths, **over(flight))

@@ -1,0 +1,187 @@
+"""Plots on paper: drawn by matplotlib, as PDF or PNG."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+from matplotlib.image import imsave
+from matplotlib.ticker import MaxNLocator
+
+from lapwing.studies.report.downsampling import drawn, extremes
+from lapwing.studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch, cube, lowest
+from lapwing.studies.report.style import DPI, SHADE, WIDTH
+
+_PARAMETERS: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.labelcolor": "#222222",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#D9DDE1",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "figure.facecolor": "white",
+}
+NUMBERS = 14  # along the width of a plot, of five digits each
+STEPS = (1, 2, 2.5, 5, 10)  # between them
+_DASHES: dict[str, Any] = {"solid": "-", "dash": (0, (4, 3)), "dot": (0, (1, 1.5)), "dashdot": (0, (6, 2, 1, 2))}
+_MARKERS = {"": "", "circle": "o", "open": "o", "square": "s"}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw within this, so that nothing else in the process changes its looks."""
+    with matplotlib.rc_context(_PARAMETERS):
+        yield
+
+
+def write_pdf(path: Path, plots: Sequence[Plot]) -> None:
+    """A page for each plot."""
+    with styled(), PdfPages(path, metadata={"CreationDate": None}) as pages:
+        for plot in plots:
+            pages.savefig(figure(plot))
+
+
+def write_png(path: Path, plots: Sequence[Plot]) -> None:
+    """All plots below each other in one picture."""
+    with styled():
+        pictures = []
+        for plot in plots:
+            canvas = FigureCanvasAgg(figure(plot))
+            canvas.draw()
+            pictures.append(np.asarray(canvas.buffer_rgba()))
+        imsave(path, np.concatenate(pictures), format="png", metadata={"Software": ""})
+
+
+def figure(plot: Plot) -> Figure:
+    """The plot as a figure of `WIDTH`; to be called, and saved, within `styled`."""
+    made = Figure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
+    grid = made.add_gridspec(len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths)
+    named: dict[str, Any] = {}
+    first: Axes | None = None
+    for index, panel in enumerate(plot.panels):
+        place = grid[panel.row : panel.row + panel.rows, panel.column : panel.column + panel.columns]
+        if panel.z_label:
+            axes = made.add_subplot(place, projection="3d")
+            _space(axes, panel)
+        else:
+            axes = made.add_subplot(place, sharex=first if panel.timed else None)
+            _flat(axes, plot, panel)
+        handles, names = axes.get_legend_handles_labels()
+        named = dict(zip(names, handles, strict=True)) | named
+        if panel.timed and not panel.z_label:
+            first = first or axes
+            bottom = index in lowest(plot)
+            axes.tick_params(labelbottom=bottom)
+            axes.set_xlabel(f"time [{plot.unit}]" if bottom else "")
+            _over_time(axes, plot, panel)
+    if named:
+        made.legend(named.values(), named.keys(), loc="outside upper left", ncols=min(len(named), 6), fontsize=8.5)
+    return made
+
+
+def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
+    lanes = list(dict.fromkeys(m.lane for m in panel.marks if isinstance(m, Stretch)))
+    for mark in panel.marks:
+        _draw(axes, mark, plot, panel, lanes)
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label, title=panel.title)
+    if panel.log_x:
+        axes.set_xscale("log")
+    elif not panel.timed:
+        axes.xaxis.set_major_locator(MaxNLocator(NUMBERS // len(plot.widths), steps=STEPS))
+    if panel.log_y:
+        axes.set_yscale("log")
+    else:
+        axes.ticklabel_format(axis="y", useOffset=False)
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="box" if panel.x_range else "datalim")
+    if panel.x_range:
+        axes.set_xlim(panel.x_range)
+    if panel.y_range:
+        axes.set_ylim(panel.y_range)
+    if panel.x_ticks:
+        axes.set_xticks(range(len(panel.x_ticks)), panel.x_ticks)
+    if lanes:
+        axes.set_yticks(range(len(lanes)), lanes)
+        axes.set_ylim(len(lanes) - 0.5, -0.5)
+    if panel.note:
+        looks: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "color": "#555555"}
+        axes.text(0.02, 0.97, panel.note, transform=axes.transAxes, **looks)
+
+
+def _draw(axes: Axes, mark: Mark, plot: Plot, panel: Panel, lanes: list[str]) -> None:
+    name = getattr(mark, "name", "") or None
+    if isinstance(mark, Level):
+        axes.axhline(mark.y, color=mark.colour, linewidth=mark.width, linestyle=_DASHES[mark.dash], label=name)
+    elif isinstance(mark, Band):
+        kept = extremes(mark.high)
+        x, low, high = mark.x[kept], mark.low[kept], mark.high[kept]
+        axes.fill_between(x, low, high, color=mark.colour, alpha=0.16, linewidth=0, label=name)
+    elif isinstance(mark, Stretch):
+        lane = lanes.index(mark.lane)
+        axes.broken_barh([(mark.start, mark.end - mark.start)], (lane - 0.4, 0.8), color=mark.colour, alpha=0.6)
+        if _fits(mark.text, mark.end - mark.start, plot, panel):
+            axes.text((mark.start + mark.end) / 2, lane, mark.text, ha="center", va="center", fontsize=8)
+    else:
+        line = drawn(mark, panel.timed)
+        if line.fill:
+            axes.fill(line.x, line.y, color=line.fill, linewidth=0)
+        axes.plot(line.x, line.y, label=name, **_looks(line))
+
+
+def _space(axes: Any, panel: Panel) -> None:
+    for line in (drawn(mark, False) for mark in panel.marks if isinstance(mark, Line)):
+        axes.plot(line.x, line.y, line.z, label=line.name or None, **_looks(line))
+    low, high = cube(panel)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect((1, 1, 1), zoom=0.88)
+    axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axes.zaxis.set_rotate_label(False)  # it would stand on its head
+    axes.set_zlabel(panel.z_label, rotation=90)
+    axes.view_init(elev=24, azim=-128)
+
+
+def _looks(line: Line) -> dict[str, Any]:
+    return {
+        "color": line.colour,
+        "linewidth": line.width,
+        "linestyle": _DASHES[line.dash] if line.joined else "none",
+        "marker": _MARKERS[line.marker],
+        "markersize": line.size,
+        "markerfacecolor": "white" if line.marker == "open" else line.colour,
+        "zorder": 2.5 if line.dash == "dash" else 2,
+    }
+
+
+def _over_time(axes: Axes, plot: Plot, panel: Panel) -> None:
+    """Shade every other phase, and name the phases over the panels of the first row where there is room."""
+    span = plot.span or axes.get_xlim()
+    for index, (name, start, end) in enumerate(plot.phases):
+        if index % 2:
+            axes.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
+        if panel.row == 0 and not panel.title and _fits(name, end - start, plot, panel):
+            looks: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 8, "color": "#555555"}
+            axes.text((start + end) / 2, 1.02, name, transform=axes.get_xaxis_transform(), **looks)
+    axes.set_xlim(span)
+    axes.grid(visible=False, axis="x")
+
+
+def _fits(text: str, lasts: float, plot: Plot, panel: Panel) -> bool:
+    """Whether there is room for a text over a stretch of time: about 115 letters a figure."""
+    start, end = plot.span or (0.0, lasts)
+    return len(text) <= 115 * panel.columns / len(plot.widths) * lasts / (end - start)

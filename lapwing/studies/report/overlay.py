@@ -1,0 +1,78 @@
+"""Two flights in one plot: the second in other colours, its names with the flight's own."""
+
+import numpy as np
+
+from lapwing.studies.report.plot import Band, Mark, Panel, Plot, Stretch
+from lapwing.studies.report.style import BOUND, COLOURS, FLOWN
+
+# Colours of the first and of the second flight, by those of one alone; what is not here keeps its colour.
+FIRST = {BOUND: FLOWN}
+SECOND = {FLOWN: BOUND, **dict(zip(COLOURS[1:4], ("#7A5200", "#66C2A5", "#7B3F61"), strict=True))}
+LANE = 0.32  # [inch] of a timeline
+
+
+def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
+    """Two plots in one; a panel of the first alone stays as it is, one of the second alone is named, not shown."""
+    others = {_key(panel): panel for panel in second.panels}
+    panels = []
+    for panel in first.panels:
+        other = others.pop(_key(panel), None)
+        panels.append(panel if other is None else _both(panel, other, labels))
+    spans = [plot.span for plot in (first, second) if plot.span]
+    span = (min(s for s, _ in spans), max(e for _, e in spans)) if spans else None
+    if first.caption == second.caption:
+        caption = first.caption
+    else:
+        caption = f"{labels[0]}: {first.caption} {labels[1]}: {second.caption}"
+    if first.phases:
+        caption += f" Phases are those of {labels[0]}."
+    if others:
+        caption += f" Only in {labels[1]}, and not shown: {', '.join(p.y_label for p in others.values())}."
+    added = sum(len(_lanes(panel)) for panel in panels) - sum(len(_lanes(panel)) for panel in first.panels)
+    height = max(first.height, second.height) + LANE * added
+    return first._replace(panels=tuple(panels), span=span, caption=caption, height=height)
+
+
+def _key(panel: Panel) -> tuple:
+    return panel.row, panel.column, panel.y_label
+
+
+def _both(panel: Panel, other: Panel, labels: tuple[str, str]) -> Panel:
+    ours, others = _lanes(panel), _lanes(other)
+    shared = [mark for mark in other.marks if any(_same(mark, own) for own in panel.marks)]
+    shared = [m for m in shared if not isinstance(m, Stretch) or ours[m.lane] == others[m.lane]]
+    mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid") for m in panel.marks]
+    theirs = [_of(m, labels[1], SECOND, "dot") for m in other.marks if not any(m is s for s in shared)]
+    ranges = [p.y_range for p in (panel, other) if p.y_range]
+    y_range = (min(low for low, _ in ranges), max(high for _, high in ranges)) if len(ranges) == 2 else None
+    title, note = (
+        a if a == b else between.join(f"{label}: {text}" for label, text in zip(labels, (a, b), strict=True) if text)
+        for a, b, between in ((panel.title, other.title, "; "), (panel.note, other.note, "\n"))
+    )
+    return panel._replace(marks=(*mine, *theirs), y_range=y_range, title=title, note=note)
+
+
+def _same(one: Mark, other: Mark) -> bool:
+    """Whether two marks show the same: limits, a reference that both followed."""
+    return type(one) is type(other) and all(
+        np.array_equal(a, b) if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) else a is b or a == b
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
+    """The bars of each lane of a timeline."""
+    found: dict[str, list[Stretch]] = {}
+    for mark in panel.marks:
+        if isinstance(mark, Stretch):
+            found.setdefault(mark.lane, []).append(mark)
+    return found
+
+
+def _of(mark: Mark, label: str, colours: dict[str, str], dash: str) -> Mark:
+    """The mark with its flight's name and looks; whose lines are dashed stay so."""
+    if isinstance(mark, Stretch):
+        return mark._replace(lane=f"{mark.lane}, {label}")
+    mark = mark._replace(name=f"{mark.name}, {label}" if mark.name else label)
+    mark = mark._replace(colour=colours.get(mark.colour, mark.colour))
+    return mark if isinstance(mark, Band) or mark.dash != "solid" else mark._replace(dash=dash)

@@ -1,0 +1,142 @@
+"""What a plot of the report is: data, labels with units, and where each panel stands; `browser` and `paper` draw it."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.report.style import BOUND, FLOWN, REFERENCE
+
+
+class Line(NamedTuple):
+    """A curve, or points; x and y have shape (n,), NaN interrupts it. In a panel in space z is its height."""
+
+    x: np.ndarray
+    y: np.ndarray
+    name: str = ""  # in the legend; "": not there
+    colour: str = FLOWN
+    width: float = 1.3  # [point]
+    dash: str = "solid"  # or "dash", "dot", "dashdot"
+    marker: str = ""  # or "circle", "open", "square"
+    size: float = 5.0  # [point] of the marker
+    joined: bool = True  # False: markers alone
+    fill: str = ""  # colour inside of a closed line
+    hidden: bool = False  # in a browser: until a click on its name in the legend
+    z: np.ndarray | None = None
+
+
+class Band(NamedTuple):
+    """What lies between two curves, shape (n,) each."""
+
+    x: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    name: str = ""
+    colour: str = BOUND
+
+
+class Level(NamedTuple):
+    """A horizontal line through the whole panel: a limit, a mean."""
+
+    y: float
+    name: str = ""
+    colour: str = BOUND
+    dash: str = "dash"
+    width: float = 1.1  # [point]
+
+
+class Stretch(NamedTuple):
+    """A bar in a lane of a timeline [s]."""
+
+    lane: str
+    start: float
+    end: float
+    text: str
+    colour: str = FLOWN
+
+
+Mark = Line | Band | Level | Stretch
+
+
+class Panel(NamedTuple):
+    """One pair of axes, or three in space, at a place of the plot's grid."""
+
+    marks: tuple[Mark, ...]
+    y_label: str = ""
+    x_label: str = ""  # of a panel over time: given by the plot
+    z_label: str = ""  # given: a panel in space
+    title: str = ""
+    note: str = ""  # in its upper left corner
+    row: int = 0
+    column: int = 0
+    rows: int = 1  # of the grid that it covers
+    columns: int = 1
+    timed: bool = True  # x is the simulation time [s]
+    log_x: bool = False
+    log_y: bool = False
+    equal: bool = False  # one scale for x and y
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None  # what is cut off by it the caption says
+    x_ticks: tuple[str, ...] = ()  # what stands at x = 0, 1, 2, ... in the place of numbers
+
+
+class Plot(NamedTuple):
+    """Panels on a grid, with one caption."""
+
+    panels: tuple[Panel, ...]
+    caption: str
+    height: float  # [inch] of the whole
+    heights: tuple[float, ...] = (1.0,)  # of the rows, relative
+    widths: tuple[float, ...] = (1.0,)  # of the columns, relative
+    span: tuple[float, float] | None = None  # [s] that panels over time show
+    phases: tuple[tuple[str, float, float], ...] = ()  # name, start, end [s], shaded in turn in panels over time
+    unit: str = "s"  # of time
+
+
+class NotRecordedError(Exception):
+    """A plot cannot be drawn from this log; the text says what is missing."""
+
+
+def column(panels: Iterable[Panel], height: float = 1.7, **looks: object) -> dict:
+    """Panels over time one below the other, `height` [inch] each, as arguments of a `Plot`."""
+    placed = tuple(panel._replace(row=row) for row, panel in enumerate(panels))
+    return {"panels": placed, "height": 0.9 + height * len(placed), "heights": (1.0,) * len(placed), **looks}
+
+
+def reference(x: np.ndarray, y: np.ndarray, hidden: bool = False, name: str = "reference") -> Line:
+    """The dashed line by which a reference is drawn; x and y have shape (n,)."""
+    return Line(x, y, name, REFERENCE, 1.1, "dash", hidden=hidden)
+
+
+def in_hours(plot: Plot) -> Plot:
+    """The plot with its time in hours instead of seconds."""
+
+    def scaled(mark: Mark) -> Mark:
+        if isinstance(mark, Stretch):
+            return mark._replace(start=mark.start / 3600.0, end=mark.end / 3600.0)
+        return mark if isinstance(mark, Level) else mark._replace(x=mark.x / 3600.0)
+
+    panels = tuple(p._replace(marks=tuple(map(scaled, p.marks))) if p.timed else p for p in plot.panels)
+    span = plot.span and (plot.span[0] / 3600.0, plot.span[1] / 3600.0)
+    phases = tuple((name, start / 3600.0, end / 3600.0) for name, start, end in plot.phases)
+    return plot._replace(panels=panels, span=span, phases=phases, unit="h")
+
+
+def lowest(plot: Plot) -> set[int]:
+    """The indices of the panels with none below: they name what x is."""
+    ends = [(p.row + p.rows, p.column, p.column + p.columns) for p in plot.panels]
+    return {
+        i
+        for i, (end, left, right) in enumerate(ends)
+        if not any(p.row >= end and p.column < right and p.column + p.columns > left for p in plot.panels)
+    }
+
+
+def cube(panel: Panel) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner of the cube, shape (3,) each, in which a panel in space is drawn to one scale."""
+    lines = [m for m in panel.marks if isinstance(m, Line) and m.z is not None]
+    points = np.column_stack([np.concatenate([getattr(line, axis) for line in lines]) for axis in ("x", "y", "z")])
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    half, middle = 0.55 * max((high - low).max(), 0.5), 0.5 * (low + high)
+    corner = np.append(middle[:2] - half, min(low[2], 0.0))
+    return corner, corner + 2.0 * half

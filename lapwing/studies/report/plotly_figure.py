@@ -1,0 +1,184 @@
+"""Plots in a browser: the figures of plotly.js as JSON. The library's script is all that is taken of its package."""
+
+import json
+import math
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.report.plot import Panel, Plot, Stretch, cube, lowest
+from lapwing.studies.report.plotly_traces import in_legend, text_of, traces
+from lapwing.studies.report.style import SHADE
+
+PIXELS = 100  # an inch on the page
+_GAP_X, _GAP_Y = 78.0, 26.0  # [pixel] between panels, for the labels of the right one and the title of the lower one
+_GAP_X_LABEL = 30.0  # [pixel] more below a panel that names its own x
+_PAGE = 900.0  # [pixel] typical width of the panels together
+_LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
+_MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
+_FONT = {"family": "system-ui, sans-serif", "size": 12, "color": "#333"}
+_GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
+
+
+def script() -> str:
+    """The text of plotly.js, as its Python package carries it; that package is not imported.
+
+    Raises:
+        ValueError: the package is not installed.
+    """
+    found = find_spec("plotly")
+    for folder in (found.submodule_search_locations or ()) if found else ():
+        path = Path(folder) / "package_data" / "plotly.min.js"
+        if path.exists():
+            return path.read_text(encoding="utf-8")
+    raise ValueError("the report needs plotly's script, which is not there: pip install plotly")
+
+
+def to_json(plot: Plot) -> str:
+    """Figure of a plot: `{"data", "layout", "timed"}`, safe within an HTML element."""
+    return json.dumps(figure(plot), separators=(",", ":")).replace("<", "\\u003c")
+
+
+def figure(plot: Plot) -> dict[str, Any]:
+    """Data and layout of a plot; "timed" names its axes over time, which the page links."""
+    data: list[dict] = []
+    layout: dict[str, Any] = {
+        "height": round(plot.height * PIXELS),
+        "margin": {**_MARGIN, "t": _top(plot)},
+        "font": _FONT,
+        "hovermode": "x unified" if all(p.timed for p in plot.panels) else "closest",
+        "legend": {"orientation": "h", "x": 0, "y": 1, "yref": "container", "yanchor": "top"},
+        "shapes": [],
+        "annotations": [],
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "barmode": "overlay",
+        "uniformtext": {"mode": "hide", "minsize": 10},
+    }
+    timed: list[str] = []
+    named: set[tuple] = set()
+    ends = lowest(plot)
+    for index, panel in enumerate(plot.panels):
+        number = "" if index == 0 else str(index + 1)
+        domain_x, domain_y = _domains(plot, panel)
+        if panel.z_label:
+            layout[f"scene{number}"] = _scene(panel, domain_x, domain_y)
+            where = {"scene": f"scene{number}"}
+        else:
+            where = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+            _axes(layout, plot, panel, number, (domain_x, domain_y), timed, index in ends)
+        for mark in panel.marks:
+            for trace in traces(mark, plot, panel):
+                trace.update(where)
+                in_legend(trace, named)
+                data.append(trace)
+    return {"data": data, "layout": layout, "timed": timed}
+
+
+def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, timed: list[str], bottom: bool) -> None:
+    x: dict[str, Any] = {"domain": domains[0], "anchor": f"y{number}", "hoverformat": ".5~g", **_GRID}
+    y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_GRID}
+    y["title"] = {"text": panel.y_label, "standoff": 6}
+    x["title"] = {"text": panel.x_label, "standoff": 4}
+    if panel.log_x:
+        x |= {"type": "log", "dtick": 1}
+    if panel.log_y:
+        y |= {"type": "log", "exponentformat": "power"}
+    if panel.y_range:
+        y["range"] = list(np.log10(panel.y_range) if panel.log_y else panel.y_range)
+    if panel.x_range:
+        x["range"] = list(np.log10(panel.x_range) if panel.log_x else panel.x_range)
+    if panel.x_ticks:
+        x |= {"tickvals": list(range(len(panel.x_ticks))), "ticktext": [text_of(text) for text in panel.x_ticks]}
+        x["automargin"] = True  # a text may have several lines
+    if panel.equal:
+        y |= {"scaleanchor": f"x{number}", "scaleratio": 1}
+        x["constrain"] = y["constrain"] = "domain" if panel.x_range else "range"
+    if any(isinstance(mark, Stretch) for mark in panel.marks):
+        y |= {
+            "autorange": "reversed",
+            "type": "category",
+            "ticks": "",
+            "showgrid": False,
+            "fixedrange": True,
+            "automargin": True,
+        }
+    if panel.timed:
+        if timed:
+            x["matches"] = timed[0].replace("axis", "")
+        x |= {"showgrid": False, "zeroline": False, "showticklabels": bottom, "ticks": "outside" if bottom else ""}
+        x["title"]["text"] = f"time [{plot.unit}]" if bottom else ""
+        x["unifiedhovertitle"] = {"text": f"%{{x:.6~g}} {plot.unit}"}
+        if plot.span:
+            x["range"] = list(plot.span)
+        timed.append(f"xaxis{number}")
+        _phases(layout, plot, panel, number)
+    corner: dict[str, Any] = {
+        "showarrow": False,
+        "xref": f"x{number} domain",
+        "yref": f"y{number} domain",
+        "xanchor": "left",
+    }
+    small = {"size": 11, "color": "#555"}
+    if panel.title:
+        layout["annotations"].append(
+            {**corner, "text": text_of(panel.title), "x": 0, "y": 1, "yanchor": "bottom", "font": small}
+        )
+    if panel.note:
+        layout["annotations"].append(
+            {**corner, "text": text_of(panel.note), "x": 0.01, "y": 0.99, "yanchor": "top", "font": small}
+        )
+    layout[f"xaxis{number}"], layout[f"yaxis{number}"] = x, y
+
+
+def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
+    """Every other phase shaded, and their names over the panels of the first row where there is room."""
+    span = plot.span or (0.0, 1.0)
+    room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second
+    for index, (name, start, end) in enumerate(plot.phases):
+        if index % 2:
+            place = {"type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "layer": "below"}
+            shape = {**place, "x0": start, "x1": end, "y0": 0, "y1": 1, "line": {"width": 0}, "fillcolor": SHADE}
+            layout["shapes"].append(shape)
+        if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
+            middle: dict[str, Any] = {"xref": f"x{number}", "yref": f"y{number} domain", "x": (start + end) / 2, "y": 1}
+            looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#666"}}
+            layout["annotations"].append({**middle, **looks, "text": text_of(name)})
+
+
+def _scene(panel: Panel, domain_x: list[float], domain_y: list[float]) -> dict:
+    low, high = cube(panel)
+    looks = {"backgroundcolor": "white", "gridcolor": "#D9DDE1"}
+    axes = {
+        f"{axis}axis": {"title": {"text": text}, "range": [float(low[i]), float(high[i])], **looks}
+        for i, (axis, text) in enumerate(zip("xyz", (panel.x_label, panel.y_label, panel.z_label), strict=True))
+    }
+    camera = {"eye": {"x": -1.45, "y": -1.85, "z": 1.0}, "center": {"x": 0, "y": 0, "z": -0.12}}
+    return {**axes, "domain": {"x": domain_x, "y": domain_y}, "aspectmode": "cube", "camera": camera}
+
+
+def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
+    """The part of the figure that a panel covers, from the left and from below."""
+    inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
+    own = any(not p.timed and not p.z_label for p in plot.panels)
+    gap_y = _GAP_Y + (_GAP_X_LABEL if own and len(plot.heights) > 1 else 0.0)
+    x = _share(plot.widths, _GAP_X / _PAGE, panel.column, panel.columns)
+    top = _share(plot.heights, gap_y / inner, panel.row, panel.rows)
+    return x, [1.0 - top[1], 1.0 - top[0]]
+
+
+def _top(plot: Plot) -> int:
+    """Room [pixel] above the panels: for a legend, and for titles and names of phases."""
+    names = {getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks} - {""}
+    lines = math.ceil(sum(_LETTER * len(name) + _SYMBOL for name in names) / _PAGE)
+    return 6 + 22 * lines + (18 if plot.phases or any(panel.title for panel in plot.panels) else 0)
+
+
+def _share(parts: tuple[float, ...], gap: float, first: int, count: int) -> list[float]:
+    free = max(1.0 - gap * (len(parts) - 1), 0.1)
+    sizes = [free * part / sum(parts) for part in parts]
+    start = sum(sizes[:first]) + gap * first
+    end = start + sum(sizes[first : first + count]) + gap * (count - 1)
+    return [round(min(max(v, 0.0), 1.0), 5) for v in (start, end)]

@@ -1,0 +1,118 @@
+"""Marks of a plot as traces of plotly.js."""
+
+import base64
+import html
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.report.downsampling import drawn, extremes
+from lapwing.studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch
+
+_POINT = 96.0 / 72.0  # [pixel]
+_SYMBOLS = {"circle": "circle", "open": "circle-open", "square": "square"}
+
+
+def traces(mark: Mark, plot: Plot, panel: Panel) -> list[dict[str, Any]]:
+    """A mark as one trace, a band as two; without the axes that they belong to."""
+    if isinstance(mark, Level):
+        return [_level(mark, plot, panel)]
+    if isinstance(mark, Stretch):
+        return [_bar(mark)]
+    if isinstance(mark, Band):
+        kept = extremes(mark.high)
+        looks = {"type": "scatter", "mode": "lines", "line": {"width": 0, "color": mark.colour}, "hoverinfo": "skip"}
+        x = _array(mark.x[kept])
+        low = {**looks, "x": x, "y": _array(mark.low[kept]), "name": text_of(mark.name), "showlegend": False}
+        filled = {"fill": "tonexty", "fillcolor": _pale(mark.colour), "name": text_of(mark.name)}
+        return [low, {**looks, "x": x, "y": _array(mark.high[kept]), **filled}]
+    return [_line(mark, panel)]
+
+
+def in_legend(trace: dict, named: set[tuple]) -> None:
+    """One entry in the legend for all that has one name and looks; a click on it shows or hides them together."""
+    if not trace.get("name"):
+        trace.update(showlegend=False, name="")
+        return
+    key = (trace["name"], trace.get("line", {}).get("color"), trace.get("line", {}).get("dash"))
+    trace.update(legendgroup="/".join(map(str, key)), showlegend=trace.get("showlegend", True) and key not in named)
+    if trace["showlegend"]:
+        named.add(key)
+
+
+def _line(mark: Line, panel: Panel) -> dict:
+    line = drawn(mark, panel.timed)
+    modes = [mode for mode, wanted in (("lines", line.joined), ("markers", line.marker)) if wanted]
+    trace: dict[str, Any] = {
+        "type": "scatter3d" if panel.z_label else "scatter",
+        "mode": "+".join(modes),
+        "x": _array(line.x),
+        "y": _array(line.y),
+        "line": {"color": line.colour, "width": round(line.width * _POINT, 2), "dash": line.dash},
+        "name": text_of(line.name),
+    }
+    if panel.z_label:
+        trace["z"] = _array(np.zeros_like(line.x) if line.z is None else line.z)
+        trace["line"]["width"] *= 2.0  # WebGL draws thinner
+    if line.marker:
+        trace["marker"] = {"symbol": _SYMBOLS[line.marker], "size": line.size * _POINT, "color": line.colour}
+    if line.fill:
+        trace |= {"fill": "toself", "fillcolor": line.fill}
+    if line.hidden:
+        trace["visible"] = "legendonly"
+    if not line.name:
+        label = panel.y_label.partition(" [")[0]
+        trace["hovertemplate"] = f"{label} %{{y}}<extra></extra>"
+    return trace
+
+
+def _level(mark: Level, plot: Plot, panel: Panel) -> dict:
+    """A trace and no shape, so that it is in the legend and says its value."""
+    lines = [m for m in panel.marks if isinstance(m, Line) and len(m.x)]
+    ends = [f(m.x) for m in lines for f in (np.nanmin, np.nanmax)] or [0.0, 1.0]
+    low, high = plot.span if plot.span and panel.timed else panel.x_range or (min(ends), max(ends))
+    looks = {"color": mark.colour, "width": round(mark.width * _POINT, 2), "dash": mark.dash}
+    x, y = [float(low), float(high)], [mark.y, mark.y]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": x,
+        "y": y,
+        "line": looks,
+        "name": text_of(mark.name),
+        "hoverinfo": "skip",
+    }
+
+
+def _bar(mark: Stretch) -> dict:
+    lasted = f"{mark.start:.2f} to {mark.end:.2f}"
+    return {
+        "type": "bar",
+        "orientation": "h",
+        "base": [mark.start],
+        "x": [mark.end - mark.start],
+        "y": [text_of(mark.lane)],
+        "text": [text_of(mark.text)],
+        "textposition": "inside",
+        "insidetextanchor": "middle",
+        "textangle": 0,
+        "marker": {"color": _pale(mark.colour, 0.45), "line": {"color": "white", "width": 1}},
+        "textfont": {"color": "#222"},
+        "hovertemplate": f"{text_of(mark.lane)}: {text_of(mark.text)}<br>{lasted}<extra></extra>",
+    }
+
+
+def _pale(colour: str, opacity: float = 0.16) -> str:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity})"
+
+
+def _array(values: np.ndarray) -> dict[str, str]:
+    """A typed array as plotly.js reads it: single precision is finer than any screen."""
+    data = np.ascontiguousarray(values, dtype="<f4").tobytes()
+    return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+
+
+def text_of(text: str) -> str:
+    """As plotly.js shows it letter by letter; it would take < and & for markup."""
+    return html.escape(text, quote=False).replace("\n", "<br>")

@@ -1,0 +1,17 @@
+"""Roll, pitch, yaw over time, and how far they are from what was asked (the paper's Figure 23)."""
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.flight_phases import DEGREES, three_axes
+from lapwing.studies.report.plot import Plot
+
+ORDER = 20
+TITLE = "Attitude"
+NEEDS = ("truth",)
+
+
+def draw(flight: Flight) -> Plot:
+    """One row for each angle."""
+    said = "Attitude as roll, pitch and yaw."
+    if len(flight.reference):
+        said += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."
+    return three_axes(flight, 3, DEGREES * flight.truth.attitude, "°", DEGREES, said)

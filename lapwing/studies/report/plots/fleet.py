@@ -1,0 +1,30 @@
+"""The paths of all vehicles of a fleet from above, and how near they come to one another."""
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.plot import Level, Line, Panel, Plot
+from lapwing.studies.report.style import COLOURS
+from lapwing.studies.separation import least_over_time, nearest
+
+ORDER = 42
+TITLE = "Fleet"
+NEEDS = ("truth",)
+FLEET = True
+
+
+def draw(flight: Flight) -> Plot:
+    """The plan view on the left, the least distance of any two over time on the right."""
+    marks = []
+    for i, (name, truth) in enumerate(flight.fleet.items()):
+        x, y, _ = truth.position.T
+        colour = COLOURS[i % len(COLOURS)]
+        marks.append(Line(x, y, name, colour))
+        marks.append(Line(x[:1], y[:1], colour=colour, marker="open", size=8.0, joined=False))
+        marks.append(Line(x[-1:], y[-1:], colour=colour, marker="square", size=7.0, joined=False))
+    plan = Panel(tuple(marks), "y north [m]", "x east [m]", timed=False, equal=True)
+    least, found = least_over_time(flight.fleet), nearest(flight.fleet)
+    over = (Line(flight.truth.times[: len(least)], least), Level(found.distance))
+    apart = Panel(over, "least distance of two [m]", column=1)
+    said = (
+        f"All vehicles from above, north up (left; open: start, square: end), and the least distance of two. {found}."
+    )
+    return Plot((plan, apart), said, 4.9, (1.0,), (1.0, 1.0))

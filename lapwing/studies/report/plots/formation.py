@@ -1,0 +1,67 @@
+"""Quadrotors that carry a load: how well it follows its path, how the links hang, and the view from the side."""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.flight_phases import over
+from lapwing.studies.report.plot import Line, Panel, Plot, reference
+from lapwing.studies.report.style import BOUND, COLOURS
+
+ORDER = 35
+TITLE = "Load, links and quadrotors"
+NEEDS = ("truth", "bodies", "lift")
+MODELS = ("cooperative_load",)
+INSTANTS = 11  # pictures of the links
+
+
+def draw(flight: Flight) -> Plot:
+    """Three panels over time on the left, the view from the side on the right."""
+    t = flight.times("bodies")
+    places = flight.topic("bodies").position
+    wanted = _wanted(flight, t)
+    error = np.linalg.norm(places[:, 0] - wanted, axis=1)
+    links = places[:, :1] - places[:, 1:]
+    angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
+    thrust = flight.topic("lift").thrust
+    panels = (
+        Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
+        Panel(_each(t, angle), "link from vertical [°]", row=1),
+        Panel(_each(flight.times("lift"), thrust), "thrust [N]", row=2),
+        side(places, wanted),
+    )
+    said = (
+        "Distance of the load from its path, the links' angles in the x-z plane and the thrusts; on the right the "
+        f"whole from the side at {INSTANTS} instants. At the end the load is {error[-1]:.2g} m from its path."
+    )
+    return Plot(panels, said, 7.2, (1.0,) * 3, (1.2, 1.0), **over(flight))
+
+
+def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
+    """The load's path and the links seen along y."""
+    marks = [
+        Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
+        reference(wanted[:, 0], wanted[:, 2], name="wanted path"),
+    ]
+    some = places[np.linspace(0, len(places) - 1, INSTANTS).astype(int)]
+    for i in range(places.shape[1] - 1):
+        quad, colour = some[:, 1 + i], COLOURS[i % len(COLOURS)]
+        gap = np.full(len(some), np.nan)
+        x = np.column_stack([quad[:, 0], some[:, 0, 0], gap]).ravel()
+        z = np.column_stack([quad[:, 2], some[:, 0, 2], gap]).ravel()
+        marks.append(Line(x, z, colour=colour, width=0.7))
+        marks.append(Line(quad[:, 0], quad[:, 2], f"quadrotor {i + 1}", colour, marker="square", joined=False))
+    place: dict[str, Any] = {"row": 0, "column": 1, "rows": 3}
+    return Panel(tuple(marks), "z up [m]", "x [m]", timed=False, equal=True, **place)
+
+
+def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
+    """A line for each quadrotor of values of shape (n, quadrotors)."""
+    return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
+
+
+def _wanted(flight: Flight, t: np.ndarray) -> np.ndarray:
+    """The load's wanted path [m] at times t, shape (n, 3)."""
+    path = np.array(flight.origin.scene["formation"]["path"])
+    return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

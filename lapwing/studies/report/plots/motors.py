@@ -1,0 +1,69 @@
+"""Speed, voltage and power of the motors over time (the paper's Figures 24 to 26)."""
+
+import numpy as np
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.flight_phases import over
+from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
+from lapwing.studies.report.style import BOUND, COLOURS, STEERED
+from lapwing.studies.saturation import saturation
+
+ORDER = 50
+TITLE = "Motors: speed, voltage and power"
+NEEDS = ("truth",)
+MODELS = STEERED
+RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
+
+
+def draw(flight: Flight) -> Plot:
+    """One panel for each quantity, one line for each motor."""
+    truth, t = flight.truth, flight.truth.times
+    if truth.rotor_speed.shape[-1] == 0:
+        raise NotRecordedError("the vehicle has no motors")
+    quantities = (
+        ("propeller speed [rpm]", truth.rotor_speed * RPM),
+        ("voltage [V]", truth.motor_voltage),
+        ("electrical power [W]", truth.motor_power),
+    )
+    panels = [Panel(motors(t, values), label) for label, values in quantities]
+    marks, said = limits(flight)
+    panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
+    energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / 3600.0
+    caption = f"Speed of each propeller, voltage and electrical power of its motor. Energy drawn: {energy:.1f} W h. "
+    return Plot(caption=caption + said, **column(panels, 2.2, **over(flight)))
+
+
+def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
+    """A line for each motor of values of shape (n, motors)."""
+    return tuple(
+        Line(t, of_motor, f"motor {k + 1}", COLOURS[k % len(COLOURS)], 1.0) for k, of_motor in enumerate(values.T)
+    )
+
+
+def limits(flight: Flight) -> tuple[tuple[Level | Line, ...], str]:
+    """The limits of the voltage, the stretches in which a motor is at one, and a sentence on them."""
+    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    if highest is None:
+        return (), "The log does not say what limits the voltage."
+    levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")
+    if not len(flight.armed):
+        return levels, f"Limits of the voltage: 0 and {highest:g} V."
+    t, found = flight.truth.times[: len(flight.armed)], saturation(flight.truth, flight.armed, highest)
+    if not found.lasted:
+        return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
+    marks = (*_stretches(t, found.low, 0.0), *_stretches(t, found.high, highest))
+    return (*levels, *marks), (
+        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for "
+        f"{found.lasted:.2f} s, {100.0 * found.share(found.lasted):.2g} % of that time."
+    )
+
+
+def _stretches(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
+    """One line along the limit, at most: start, end and a gap for each stretch in which any motor is there."""
+    any_motor = np.concatenate([[False], at_limit.any(axis=1), [False]])
+    edges = np.flatnonzero(any_motor[1:] != any_motor[:-1])
+    if not len(edges):
+        return ()
+    starts, ends = t[edges[::2]], t[(edges[1::2]).clip(max=len(t) - 1)]
+    x = np.column_stack([starts, ends, np.full(len(starts), np.nan)]).ravel()
+    return (Line(x, np.where(np.isnan(x), np.nan, limit), "at a limit", BOUND, 4.0, marker="square", size=6.0),)

@@ -1,0 +1,54 @@
+"""What the autopilot was doing, as it said itself: phases, modes, arming, failsafes."""
+
+import numpy as np
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.flight_phases import over, phases, runs
+from lapwing.studies.report.plot import Panel, Plot, Stretch
+from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
+
+ORDER = 0
+TITLE = "Timeline"
+NEEDS = ("truth", "status")
+BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
+MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events that have no lane of their own
+WIDTH = 0.004  # of the whole time, of an instant
+
+
+def draw(flight: Flight) -> Plot:
+    """A lane for each thing that can change; lanes of what never happened are left out, and named."""
+    status, t = flight.status, flight.status.times
+    warning = np.array(BATTERY)[status.battery_warning.clip(max=len(BATTERY) - 1)]
+    failed = np.where(status.failed_motor > 0, np.char.add("motor ", status.failed_motor.astype(str)), "")
+    lanes = {
+        "phase": (phases(flight), FLOWN),
+        "mode": (runs(t, status.mode), AXIS_COLOURS[2]),
+        "armed": (runs(t, _where(status.armed, "armed")), AXIS_COLOURS[1]),
+        "landed": (runs(t, _where(status.landed, "landed")), QUIET),
+        "failsafe": (runs(t, _where(status.failsafe, "failsafe")), BOUND),
+        "motor failed": (runs(t, failed), BOUND),
+        "battery": (runs(t, warning), BOUND),
+        "said": (runs(t, status.text), COLOURS[3]),
+        **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
+    }
+    found = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
+    bars = tuple(Stretch(lane, s, e, text, colour) for lane, (some, colour) in found.items() for text, s, e in some)
+    never = [lane for lane, (some, _) in found.items() if not some]
+    said = f" Never in this flight: {', '.join(never)}." if never else ""
+    shown = max(len(found) - len(never), 1)
+    return Plot(
+        (Panel(bars),),
+        f"What the autopilot says of itself, {len(t)} times.{said}",
+        1.1 + 0.32 * shown,
+        span=over(flight)["span"],
+    )
+
+
+def _where(flags: np.ndarray, text: str) -> np.ndarray:
+    return np.where(flags, text, "")
+
+
+def _instants(flight: Flight, kind: str) -> list[tuple[str, float, float]]:
+    """Events of a kind as stretches that are just wide enough to be seen."""
+    first, last = over(flight)["span"]
+    return [(e.text, e.time, min(last, e.time + WIDTH * (last - first))) for e in flight.events if e.kind == kind]

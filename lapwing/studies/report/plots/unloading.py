@@ -1,0 +1,93 @@
+"""The unloading of the pack: its displacements (the paper's Figure 28), the door, the forces, and how it looks."""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report.flight_phases import over
+from lapwing.studies.report.plot import Line, Panel, Plot
+from lapwing.studies.report.style import AXIS_COLOURS, BOUND, REFERENCE
+
+ORDER = 5
+TITLE = "Unloading"
+NEEDS = ("truth", "bodies")
+MODELS = ("unloading",)
+INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
+
+
+def draw(flight: Flight) -> Plot:
+    """The three displacements, door and forces over time, and six instants from the side."""
+    crate = flight.origin.scene["unloading"]
+    bodies = flight.topic("bodies")
+    t, place = bodies.times, bodies.position
+    turn = np.array([_pitch(q) for q in np.moveaxis(bodies.orientation[:, :2], 1, 0)]).T
+    force = np.linalg.norm(bodies.force, axis=2)
+    door = turn[:, 1] - crate["tilt_deg"]
+    until = t <= crate["pickup"]
+    rows = (("longitudinal [m]", place[:, 0, 0]), ("vertical [m]", place[:, 0, 2]), ("angular [°]", turn[:, 0]))
+    panels = [
+        Panel((Line(t[until], values[until]),), label, row=i, columns=2) for i, (label, values) in enumerate(rows)
+    ]
+    panels.append(Panel((Line(t, door, colour=BOUND),), "door [°]", row=0, column=2))
+    forces = zip(
+        (force[:, 2:6].sum(axis=1), force[:, 1], force[:, 6]), ("rollers", "door", "ground"), AXIS_COLOURS, strict=True
+    )
+    marks = tuple(Line(t, values, name, colour, 0.9) for values, name, colour in forces)
+    panels.append(Panel(marks, "contact force [N]", row=1, column=2, rows=2))
+    for i, part in enumerate(INSTANTS):
+        k = int(np.searchsorted(t, part * crate["pickup"] * 2.0 if part < 0.5 else crate["pickup"] - 0.1))
+        k = min(k, len(t) - 1)
+        panels.append(picture(crate, place[k], turn[k])._replace(title=f"{t[k]:.2f} s", row=3 + i // 3, column=i % 3))
+    shut = t[until.sum() :][np.abs(door[until.sum() :]) < 1.0]
+    after = f"{shut[0] - crate['pickup']:.2f} s after it is taken the door is shut" if len(shut) else "it stays open"
+    said = (
+        "Displacements of the pack's middle until it is taken (longitudinal, vertical, angular as in the paper's "
+        f"Figure 28), the door's angle from shut, the contact forces on the pack, and the crate from the side; {after}."
+    )
+    return Plot(tuple(panels), said, 10.4, (1.0, 1.0, 1.0, 1.25, 1.25), (1.0,) * 3, **over(flight))
+
+
+def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
+    """Crate, rollers, door and pack from the side."""
+    length, _, height = crate["pack_size"]
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) * (length / 2, height / 2)
+    pack = place[0, [0, 2]] + corners @ _matrix(turn[0]).T
+    hinge = np.array((0.0, crate["floor_height"]))
+    walls = np.array([(0, 0), (-crate["depth"], 0), (-crate["depth"], crate["door_length"])])
+    frame = hinge + walls @ _matrix(crate["tilt_deg"]).T
+    door = np.array([hinge, hinge + _matrix(turn[1]) @ np.array((0.0, crate["door_length"]))])
+    circle = np.linspace(0, 2 * np.pi, 25)
+    ring = crate["roller_radius"] * np.column_stack([np.cos(circle), np.sin(circle)])
+    left, right = -0.27, 0.42
+    ground = np.array([(left, 0.0), (right, 0.0)])
+    rollers = tuple(
+        _outline(roller[[0, 2]] + ring, colour=REFERENCE, width=0.7, fill="#BBBBBB") for roller in place[2:6]
+    )
+    marks = (
+        _outline(pack, width=1.0, fill="#9CC3DD"),
+        _outline(frame, colour=REFERENCE, width=1.5),
+        *rollers,
+        _outline(door, colour=BOUND, width=2.0),
+        _outline(ground, colour=REFERENCE, width=1.0),
+    )
+    ranges: dict[str, Any] = {"x_range": (left, right), "y_range": (-0.03, 0.45)}
+    return Panel(marks, "z [m]", "x [m]", timed=False, equal=True, **ranges)
+
+
+def _outline(points: np.ndarray, **looks: Any) -> Line:
+    """A line through points (x, z), shape (n, 2)."""
+    return Line(points[:, 0], points[:, 1], **looks)
+
+
+def _matrix(degrees: float) -> np.ndarray:
+    """Turns (x, z) about y."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([(c, s), (-s, c)])
+
+
+def _pitch(xyzw: np.ndarray) -> np.ndarray:
+    """Angle about y [degrees] of attitudes that only turn about y, nearly."""
+    from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
+
+    return np.degrees(Rotation.from_quat(xyzw).as_rotvec()[:, 1])

@@ -1,0 +1,78 @@
+"""The sections of a report: every plot that a log has the topics for, and a line for each of the others."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.report import plots
+from lapwing.studies.report.overlay import overlay
+from lapwing.studies.report.plot import NotRecordedError, Plot, in_hours
+from lapwing.studies.report.plotly_figure import to_json
+
+LONG = 3 * 3600.0  # [s] from which on time is told in hours
+
+
+class Section(NamedTuple):
+    """A plot on the page, or why there is none."""
+
+    name: str
+    title: str
+    plot: Plot | None = None
+    missing: str = ""
+
+    @property
+    def json(self) -> str:
+        """The plot for a browser."""
+        return to_json(self.plot) if self.plot else ""
+
+
+def sections(flights: Sequence[Flight]) -> Iterator[Section]:
+    """Every plot of the vehicles' models, of one flight or of two laid over each other.
+
+    They are drawn one after the other, as they are asked for: each holds all rows of what it shows.
+    """
+    models = {flight.origin.scene.get("vehicle", {}).get("model", "reduced") for flight in flights}
+    wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
+    if all(len(flight.fleet) < 2 for flight in flights):
+        wanted = [module for module in wanted if not getattr(module, "FLEET", False)]
+    return (_section(module, flights) for module in wanted)
+
+
+def labels(flights: Sequence[Flight]) -> tuple[str, ...]:
+    """Names that tell the flights apart: those of their logs, with folders where these are the same."""
+    sources = [Path(flight.origin.source) for flight in flights]
+    stems = tuple(source.stem for source in sources)
+    if len(set(stems)) == len(stems):
+        return stems
+    named = tuple(str(source.with_suffix("")) for source in sources)
+    return named if len(set(named)) == len(named) else tuple("AB"[: len(flights)])
+
+
+def _section(module: ModuleType, flights: Sequence[Flight]) -> Section:
+    name = module.__name__.rpartition(".")[2]
+    drawn: list[tuple[str, Plot]] = []
+    missing: list[str] = []
+    names = labels(flights)
+    for label, flight in zip(names, flights, strict=True):
+        lacking = [topic for topic in module.NEEDS if not flight.has(topic)]
+        try:
+            if lacking:
+                raise NotRecordedError(f"the log has no topic {', '.join(lacking)}")
+            drawn.append((label, module.draw(flight)))
+        except NotRecordedError as reason:
+            missing.append(f"{label}: {reason}" if len(flights) > 1 else str(reason))
+    if not drawn:
+        return Section(name, module.TITLE, missing="; ".join(missing))
+    plot = drawn[0][1]
+    if len(drawn) == 2:
+        plot = overlay(plot, drawn[1][1], (drawn[0][0], drawn[1][0]))
+    elif missing:
+        plot = plot._replace(caption=f"{plot.caption} Of {drawn[0][0]} alone ({'; '.join(missing)}).")
+    return Section(name, module.TITLE, in_hours(plot) if long(flights) else plot)
+
+
+def long(flights: Sequence[Flight]) -> bool:
+    """Whether time is told in hours."""
+    return bool(max(flight.truth.times[-1] for flight in flights) > LONG)

@@ -1,0 +1,79 @@
+"""When motors are at a limit of their voltage in the air."""
+
+import functools
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.kernels import kernel
+from lapwing.studies.topic_view import TopicView
+from lapwing.studies.tracking import plain, strided
+
+NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
+APART = 1.0  # [s] stretches that are nearer to each other are told as one
+
+
+class Saturation(NamedTuple):
+    """Where motors are at a limit while the vehicle flies."""
+
+    low: np.ndarray  # at no voltage, shape (n, motors) of bool
+    high: np.ndarray  # at the highest
+    step: np.ndarray  # [s] of each row, shape (n,)
+    flying: np.ndarray  # armed and off the ground, shape (n,) of bool
+
+    @property
+    def any(self) -> np.ndarray:
+        """Whether any motor is at a limit, shape (n,)."""
+        at_limit = self.low | self.high
+        return functools.reduce(np.logical_or, at_limit.T) if at_limit.any() else np.zeros(len(at_limit), bool)
+
+    @property
+    def lasted(self) -> float:
+        """Time in all at which a motor is at a limit [s]."""
+        return float(self.step[self.any].sum())
+
+    def share(self, seconds: float) -> float:
+        """A time [s] as a share of the time in the air."""
+        return seconds / max(float(self.step[self.flying].sum()), 1e-9)
+
+
+def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturation:
+    """Where motors are at 0 or at the `highest` voltage [V] while the vehicle flies.
+
+    Args:
+        truth: of n or more messages.
+        armed: shape (n,) of bool.
+        highest: of each motor.
+    """
+    n = len(armed)
+    voltage, t = truth.motor_voltage[:n], truth.times[:n]
+    flying = armed & ~truth.ground_contact[:n]
+    step = np.diff(t, append=t[-1]) if n else np.empty(0)
+    return Saturation(*limits(voltage, flying, highest), step, flying)
+
+
+def limits(voltage: np.ndarray, flying: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where motors are at 0, and where at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
+    low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
+    _limits(low, high, strided(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
+    return low, high
+
+
+@kernel
+def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: float) -> None:
+    for row in range(voltage.shape[0]):
+        for k in range(voltage.shape[1]):
+            low[row, k] = flying[row] and voltage[row, k] < least
+            high[row, k] = flying[row] and voltage[row, k] > most
+
+
+def stretches(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
+    """Rows (first, one after the last) of stretches where something holds, those close to each other as one."""
+    edges = np.diff(where.astype(np.int8), prepend=0, append=0)
+    merged: list[tuple[int, int]] = []
+    for start, stop in zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True):
+        if merged and t[start] - t[merged[-1][1] - 1] < APART:
+            merged[-1] = merged[-1][0], stop
+        else:
+            merged.append((start, stop))
+    return merged

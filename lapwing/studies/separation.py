@@ -1,0 +1,46 @@
+"""How near the vehicles of a fleet come to one another."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.topic_view import TopicView
+
+
+class Separation(NamedTuple):
+    """The least distance between the centres of mass of two vehicles, and when."""
+
+    distance: float  # [m]
+    time: float  # [s]
+    vehicles: tuple[str, str]
+
+    def __str__(self) -> str:
+        """As a sentence without its full stop."""
+        return f"Nearest: {' and '.join(self.vehicles)}, {self.distance:.2f} m apart at {self.time:.2f} s"
+
+
+def distances(truths: Mapping[str, TopicView]) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
+    """Each pair of vehicles with their distance [m] over time, as long as both tell of themselves, shape (n,)."""
+    for (a, x), (b, y) in combinations(truths.items(), 2):
+        n = min(len(x), len(y))
+        yield (a, b), np.linalg.norm(x.position[:n] - y.position[:n], axis=1)
+
+
+def nearest(truths: Mapping[str, TopicView]) -> Separation:
+    """The least separation of at least two vehicles, by their true states."""
+    found = []
+    for pair, distance in distances(truths):
+        k = int(np.argmin(distance))
+        found.append(Separation(float(distance[k]), float(truths[pair[0]].times[k]), pair))
+    return min(found)
+
+
+def least_over_time(truths: Mapping[str, TopicView]) -> np.ndarray:
+    """The least distance [m] of any two at each time that all tell of, shape (n,)."""
+    n = min(len(truth) for truth in truths.values())
+    least = np.full(n, np.inf)
+    for _, distance in distances(truths):
+        np.minimum(least, distance[:n], out=least)
+    return least

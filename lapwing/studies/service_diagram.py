@@ -1,0 +1,140 @@
+"""A picture of the services of a run, what they hand to one another, and who listens."""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.services.process_table import MAVLINK, PROCESSES, ProcessEntry
+from lapwing.studies.report.style import DPI, FLOWN
+
+GREY, PALE = "#666666", "#F4F6F8"
+WIDE, HIGH = 6.6, 3.9  # from service to service
+HALF = (1.05, 0.8)  # width and height of half a service
+LOW, NARROW = 0.35, 0.95  # height and width of half a process that listens
+OUTER = 0.9  # that the row of these is wider at each end than the services' middles
+APART = 0.32  # between the arrows of two services
+PLACES = {"plant": (0, 1), "sensors": (1, 1), "trajectory": (0, 0), "autopilot": (1, 0), "formation": (1, 0)}
+TAKEN = {"recorder": "every recorded topic", MAVLINK: "telemetry"}  # by those who do not listen to every topic
+STATION, LINK = "ground station", "MAVLink 2"
+TOP, BOTTOM, LAST, ASIDE = -1.15, -3.0, -5.0, 0.7  # rows below the services; arrows beside the middle
+NOTE = "* taken one or more ticks after it was given\nsolid: lock step; dashed outline: only where it is asked for"
+
+Point = tuple[float, float]
+
+
+class Arrow(NamedTuple):
+    """What goes one way between two boxes."""
+
+    start: Point
+    end: Point
+    text: str
+    colour: str = FLOWN
+    both_ways: bool = False
+
+
+def handed(setup: Setup) -> dict[tuple[str, str], list[str]]:
+    """The ports for each pair (producer, consumer); "*" behind those that are taken later."""
+    found: dict[tuple[str, str], list[str]] = {}
+    producers = setup.producers
+    for name, service in setup.services.items():
+        for taken in service.inputs:
+            found.setdefault((producers[taken.port], name), []).append(taken.port + ("*" if taken.delay else ""))
+    return found
+
+
+def listeners(setup: Setup) -> list[ProcessEntry]:
+    """The processes that stand outside of the lock step; the MAVLink link where somebody steers."""
+    return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.beside)]
+
+
+def places(setup: Setup) -> dict[str, Point]:
+    """Middle of each service."""
+    return {name: (WIDE * x, HIGH * y) for name in setup.services for x, y in [PLACES.get(name, (0.5, 0.5))]}
+
+
+def arrows(setup: Setup) -> list[Arrow]:
+    """An arrow for each topic that a service takes of another, side by side; and those to and from who listens."""
+    at, pairs, found = places(setup), handed(setup), []
+    for one, other in dict.fromkeys((min(pair), max(pair)) for pair in pairs):
+        ways = [(one, other, text) for text in pairs.get((one, other), ())]
+        ways += [(other, one, text) for text in pairs.get((other, one), ())]
+        for k, (producer, consumer, text) in enumerate(ways):
+            offset = APART * (k - 0.5 * (len(ways) - 1))
+            found.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
+    for entry, (x, y) in _listening(setup).items():
+        steers = entry.name == MAVLINK
+        left, taken = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
+        found.append(Arrow((left, TOP), (left, y + LOW), taken, GREY))
+        if steers:
+            found.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
+            found.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))
+    return found
+
+
+def draw(setup: Setup, path: Path) -> None:
+    """Write the picture of a run in the format of the file's ending."""
+    figure = Figure(figsize=(9.4, 9.0))
+    axes = figure.add_subplot(aspect="equal")
+    axes.set(xlim=(-1.9, WIDE + 1.9), ylim=(LAST - 1.3, HIGH + 1.4))
+    axes.axis("off")
+    axes.set_title(f"{setup.scene}: {setup.rate} Hz, {setup.coupling}")
+    area = FancyBboxPatch((-1.4, TOP + 0.1), WIDE + 2.8, HIGH + 2.2, "round,pad=0.1", fc=PALE, ec="none")
+    axes.add_patch(area)
+    for name, place in places(setup).items():
+        _box(axes, place, name, FLOWN, HALF)
+    for entry, place in _listening(setup).items():
+        _box(axes, place, entry.name, GREY, (NARROW, LOW), "--" if entry.optional else "-")
+        if entry.name == MAVLINK:
+            _box(axes, (place[0], LAST), STATION, GREY, (1.4, LOW), ":")
+    for arrow in arrows(setup):
+        _arrow(axes, arrow)
+    axes.text(-1.4, LAST - 0.9, NOTE, ha="left", va="center", fontsize=8, color=GREY)
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
+
+
+def _listening(setup: Setup) -> dict[ProcessEntry, Point]:
+    beside = listeners(setup)
+    step = (WIDE + 2.0 * OUTER) / max(len(beside) - 1, 1)
+    return {entry: (step * k - OUTER, BOTTOM) for k, entry in enumerate(beside)}
+
+
+def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:
+    """The line from the edge of one service to that of another, so far to the left of that between their middles."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(dx, dy)
+    x, y = -dy / length * offset, dx / length * offset
+    return _edge(start, (x, y), (dx, dy)), _edge(end, (x, y), (-dx, -dy))
+
+
+def _edge(middle: Point, at: Point, way: Point) -> Point:
+    """Where a line from `at`, counted from the middle of a service, leaves it along `way`."""
+    shares = [(half * math.copysign(1.0, d) - p) / d for half, p, d in zip(HALF, at, way, strict=True) if abs(d) > 1e-9]
+    share = min(shares)
+    return middle[0] + at[0] + share * way[0], middle[1] + at[1] + share * way[1]
+
+
+def _arrow(axes: Axes, arrow: Arrow) -> None:
+    """An arrow with its text, along it in the lock step."""
+    looks = {"arrowstyle": "<|-|>" if arrow.both_ways else "-|>", "color": arrow.colour, "lw": 1.4}
+    axes.annotate("", arrow.end, arrow.start, arrowprops={**looks, "shrinkA": 0, "shrinkB": 0})
+    (x0, y0), (x1, y1) = arrow.start, arrow.end
+    angle = math.degrees(math.atan2(y1 - y0, x1 - x0))
+    angle += 180.0 if angle > 90.0 else -180.0 if angle <= -90.0 - 1e-9 else 0.0
+    angle = angle if arrow.colour == FLOWN else 0.0
+    place = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    background = {"fc": PALE if arrow.colour == FLOWN else "white", "ec": "none", "pad": 0.8}
+    axes.text(
+        *place, arrow.text, rotation=angle, ha="center", va="center", fontsize=8, color=GREY, bbox=background, zorder=4
+    )
+
+
+def _box(axes: Axes, place: Point, name: str, colour: str, half: Point, line: str = "-") -> None:
+    corner, size = (place[0] - half[0], place[1] - half[1]), (2.0 * half[0], 2.0 * half[1])
+    edge = {"fc": "white", "ec": colour, "lw": 1.8, "ls": line}
+    axes.add_patch(FancyBboxPatch(corner, *size, boxstyle="round,pad=0,rounding_size=0.12", **edge))  # type: ignore[arg-type]
+    axes.text(*place, name, ha="center", va="center", fontsize=12, zorder=5)

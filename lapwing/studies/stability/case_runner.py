@@ -1,0 +1,81 @@
+"""Runs cases in worker processes, as many at once as there are processors."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.stability import cases, other_simulators
+from lapwing.studies.stability.case_result import Found, Plot, Row, Sweep
+from lapwing.studies.workers import workers
+
+
+class Result(NamedTuple):
+    """A case and what it came to."""
+
+    case: str
+    hard: str
+    found: Found
+    sweep: Sweep | None
+    seconds: float  # of wall time
+
+    @property
+    def stands(self) -> bool:
+        """Whether every row does."""
+        return all(row.stands for row in self.found.rows)
+
+
+def chosen(case: str | None, long: bool, sweep: bool) -> list[str]:
+    """Names of the cases to run: one, or all; those that take minutes only where `long`.
+
+    Raises:
+        ValueError: no such case, or one that cannot be swept.
+    """
+    if case is None:
+        every = [name for name in cases.names() if long or not getattr(cases.get(name), "LONG", False)]
+        return [name for name in every if not sweep or hasattr(cases.get(name), "sweep")]
+    if sweep and not hasattr(cases.get(case), "sweep"):
+        able = ", ".join(name for name in cases.names() if hasattr(cases.get(name), "sweep"))
+        raise ValueError(f"--sweep: the difficulty of {case} is not walked; expected one of {able}")
+    return [cases.get(case).__name__.rpartition(".")[2]]
+
+
+def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) -> list[Result]:
+    """The results of these cases, in their order.
+
+    Args:
+        names: of cases.
+        sweep: walk their difficulty as well.
+        progress: told the name of each case that is done.
+    """
+    number = min(len(names), os.cpu_count() or 1)
+    if number == 1:
+        return [_told(one(name, sweep), progress) for name in names]
+    with workers(number) as pool:
+        jobs = {pool.submit(one, name, sweep): name for name in names}
+        done = {jobs[job]: _told(job.result(), progress) for job in as_completed(jobs)}
+    return [done[name] for name in names]
+
+
+def one(name: str, sweep: bool) -> Result:
+    """The result of one case; one that ends in an error falls short, and says with which."""
+    module, started = cases.get(name), time.perf_counter()
+    try:
+        with np.errstate(all="ignore"):  # methods that break run over; that is what is measured
+            found = module.run()
+    except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
+        why = f"ended in an error: {error}"
+        found = Found([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
+    with np.errstate(all="ignore"):
+        others = other_simulators.figures(name)
+        walked = module.sweep() if sweep else None
+    beside = [row._replace(other_simulators=tuple(others.get(row.name, {}).items())) for row in found.rows]
+    return Result(name, module.HARD, found._replace(rows=beside), walked, time.perf_counter() - started)
+
+
+def _told(result: Result, progress: Callable[[str], None]) -> Result:
+    progress(result.case)
+    return result

@@ -1,0 +1,180 @@
+"""Case 13: NaN, infinity, subnormal and absurd numbers, in parameters, states and commands."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.dynamics.integrators import check_start
+from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
+from lapwing.kernels.state_tree import flatten, unflatten
+from lapwing.services.common import ports
+from lapwing.services.common.ports import AutopilotStatus
+from lapwing.services.process_table import create
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.accuracy.systems import cooperative_load, gyrostat
+from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.flights import finite, flown
+
+HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: refused with time, place and value, never passed on"
+
+NOT = (math.nan, math.inf, -math.inf)
+ABSURD = (*NOT, 1e300, -1e300, 1e-300, 5e-324, 0.0)
+KEYS = (
+    "airframe.mass.total", "airframe.motor.resistance", "airframe.motor.speed_constant", "airframe.propeller.diameter",
+    "airframe.propeller.pitch", "airframe.rotors.inertia", "solver.step", "effects.ground_contact.stiffness",
+)  # fmt: skip
+SHORT = ("run.duration=0.2",)
+TICKS = 20
+
+
+class Steady:
+    """Stands for the autopilot: its commands are put by the case."""
+
+    name = "case.given"
+
+    def __init__(self, *outputs: Port):
+        self.outputs = outputs
+
+    def bind(self, graph: Graph) -> None:
+        """Nothing to be known."""
+
+    def act(self, tick: int) -> int:
+        """Nothing to be done."""
+        return NEVER
+
+
+def of_parameters(value: float, key: str) -> str:
+    """What becomes of a scene with an absurd parameter: "refused", "reported", "flown" or "silent"."""
+    try:
+        flight = flown("hover", [f"{key}={value!r}", *SHORT])
+    except ValueError:
+        return "refused"
+    except ArithmeticError:
+        return "silent"  # as to where and which: a trace of the code, for nobody to mend
+    if flight.failure:
+        return "reported" if "t = " in flight.failure or "tick" in flight.failure else "silent"
+    return "flown" if finite(flight) else "silent"
+
+
+def of_states() -> dict[str, int]:
+    """What becomes of every number of states and parameters of three systems, replaced by what is none."""
+    found = {"refused": 0, "silent": 0}
+    systems: list[tuple[Any, Any]] = [
+        (FreeBodyParameters((1.0, 1.6, 2.1)), RigidBody((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3))),  # type: ignore[arg-type]
+        (gyrostat.SPINNING, gyrostat.START),
+        (cooperative_load._parameters(cooperative_load.PUSHED), cooperative_load.START),
+    ]
+    for p, x in systems:
+        for like, check in ((x, lambda tree, p=p: (p, tree)), (p, lambda tree, x=x: (tree, x))):
+            numbers = flatten(like)
+            for k in range(len(numbers)):
+                for value in NOT:
+                    tree = unflatten(like, (*numbers[:k], value, *numbers[k + 1 :]))
+                    try:
+                        check_start(*check(tree))
+                    except ValueError as error:
+                        found["refused" if str(value) in str(error) else "silent"] += 1
+                    else:
+                        found["silent"] += 1
+    return found
+
+
+def of_commands(value: float) -> tuple[str, float]:
+    """(what becomes of a plant under such a voltage at its 10th tick, the largest number that it told before)."""
+    setup = resolve(load("hover", SHORT))
+    outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
+    graph = Graph(setup, [create(setup, "plant"), Service("case", [Steady(*outputs)], [])], 2 * TICKS)
+    like = setup.port(ports.ACTUATORS).like
+    last = 0
+    try:
+        for tick in range(TICKS):
+            volts = (value if tick == TICKS // 2 else 33.0, 33.0, 33.0, 33.0)
+            graph.put(ports.ACTUATORS, tick, like._replace(motor_voltage=volts, armed=True))
+            graph.put(ports.STATUS, tick, AutopilotStatus())
+            graph.advance(tick + 1)
+            last = tick
+    except LockStepError as error:
+        told = np.abs(graph.row(ports.TRUTH, last)).max()
+        return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(told)
+    told = np.abs(graph.row(ports.TRUTH, last)).max()
+    return ("flown" if math.isfinite(told) else "silent"), float(told)
+
+
+def naive_step(mass: float, volts: float) -> float:
+    """The naive way: a falling point under a thrust, stepped with whatever comes; its height after a second."""
+    with np.errstate(all="ignore"):
+        m, v, z = np.float64(mass), np.float64(0.0), np.float64(0.0)
+        for _ in range(10):
+            v = v + 0.1 * (np.float64(volts) ** 2 / m - 9.81)
+            z = z + 0.1 * v
+        return float(z)
+
+
+def _count(found: list[str], what: str) -> float:
+    return float(sum(f == what for f in found))
+
+
+def _no_numbers(values: list[float]) -> float:
+    return float(sum(not math.isfinite(v) for v in values))
+
+
+def run() -> Found:
+    """Counts of what was passed on in silence."""
+    parameters = [of_parameters(value, key) for key in KEYS for value in ABSURD]
+    states = of_states()
+    commands = [of_commands(value) for value in ABSURD]
+    naive = "stepped with whatever comes"
+    by_mass = _no_numbers([naive_step(v, 33.0) for v in ABSURD])
+    by_number, by_voltage = (_no_numbers([naive_step(10.0, v) for v in values]) for values in (NOT, ABSURD))
+    why = "none: a number that is none must not go on its way"
+    rows = [
+        Row(
+            "parameters",
+            "checked when the scene is read, and at every tick",
+            f"of {len(parameters)} scenes, passed in silence",
+            0.0,
+            why,
+            _count(parameters, "silent"),
+            naive,
+            by_mass,
+        ),
+        Row(
+            "states",
+            "`check_start`",
+            f"of {sum(states.values())} numbers of states and parameters, passed in silence",
+            0.0,
+            why,
+            float(states["silent"]),
+            naive,
+            by_number,
+        ),
+        Row(
+            "commands",
+            "the state is looked at every tick",
+            f"of {len(ABSURD)} voltages in flight, passed in silence",
+            0.0,
+            why,
+            _count([c for c, _ in commands], "silent"),
+            naive,
+            by_voltage,
+        ),
+        Row(
+            "state_before",
+            "the rows of the tick before",
+            "of those, after which the state before is no longer finite",
+            0.0,
+            why,
+            _no_numbers([told for _, told in commands]),
+            "one state, overwritten",
+            by_voltage,
+        ),
+    ]
+    kinds = ("refused", "reported", "flown", "silent")
+    x = np.arange(len(kinds), dtype=float)
+    every = [("parameters", parameters), ("commands", [c for c, _ in commands])]
+    curves = [Curve(name, x, np.array([_count(found, k) for k in kinds])) for name, found in every]
+    return Found(rows, Plot("0 refused, 1 reported, 2 flown, 3 silent", "how many", curves, log_y=False))

@@ -1,0 +1,120 @@
+"""Case 18, its edges: a step run into, an edge slid over, a take-off from a slope."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics import effects
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.terrain import relief
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.ground_equilibrium import at_rest, standing_pose
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
+from lapwing.studies.stability.cases.slopes import DYNAMIC, energy
+
+HARD = "an upright step run into, an edge slid over, a take-off from a slope: faces that begin and end at a corner"
+
+SPEED, RISER, DROP = 2.0, 0.1, 0.4  # [m/s], [m], [m]
+ANGLE, LIGHT = math.radians(20.0), 0.5  # of the slope, and how much of the weight the rotors carry while it slides
+DENSITY = STANDARD_DENSITY
+
+
+def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
+    """(parameters, state at rest, voltages) of a drone whose rotors give that share of its weight."""
+    tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
+    p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE, Environment(terrain=terrain)))
+    state = at_rest(multirotor, p, standing_pose(DRONE.contact.feet if DRONE.contact else (), terrain), G)
+    speed = math.sqrt(share * DRONE.mass.total * G / (4.0 * p.effects[2].thrust_constant * DENSITY))
+    motion = state.motion._replace(rotor_speed=(speed,) * 4)
+    return p, state._replace(motion=motion), (speed / p.layout.speed_per_volt,) * 4
+
+
+def run_on(p: Any, state: Any, voltage: tuple[float, ...], seconds: float, step: float = STEP) -> Any:
+    """The state so much later."""
+    return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
+
+
+def gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
+    """Highest energy [J] over that at first, over the kinetic, of a slide at a speed over a step so far ahead."""
+    p, state, off = on(relief(steps=[(distance, rise)]))
+    state = state._replace(motion=state.motion._replace(velocity_world=(speed, 0.0, 0.0)))
+    first = energy(p, state.motion)
+    highest = first
+    for _ in range(100):
+        state = run_on(p, state, off, 0.01, step)
+        highest = max(highest, energy(p, state.motion))
+    return (highest - first) / (0.5 * p.body.mass * speed**2)
+
+
+def naive_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
+    """As `gained`, of a point mass on a height field: beyond the riser it is as deep as the step is high."""
+    mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
+    highest = 0.0
+    for _ in range(round(1.0 / step)):
+        ground = rise if x > distance else 0.0
+        force = max(4e6 * (ground - z) - 4e3 * v, 0.0) if z < ground else 0.0
+        v += step * (force / mass - G)
+        z += step * v
+        x += step * speed
+        highest = max(highest, 0.5 * v * v + G * z)
+    return highest / (0.5 * speed**2)
+
+
+def lifted(share: float) -> float:
+    """Acceleration [m/s^2] along the slope, down, of a drone whose rotors carry a share of its weight."""
+    p, state, voltage = on(relief(slope=(0.0, math.tan(ANGLE))), share)
+    down = np.array([0.0, -math.cos(ANGLE), -math.sin(ANGLE)])
+    pushed = tuple(float(v) for v in 0.2 * down)
+    state = state._replace(motion=state.motion._replace(velocity_world=pushed))
+    early = run_on(p, state, voltage, 0.3)
+    late = run_on(p, early, voltage, 0.2)
+    return float(np.subtract(late.motion.velocity_world, early.motion.velocity_world) @ down / 0.2)
+
+
+def exact(share: float) -> float:
+    """Acceleration [m/s^2] as of `lifted`, by Newton's law: friction goes with what the rotors leave of the weight."""
+    return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
+
+
+def run() -> Found:
+    """Into a step, over an edge, up from a slope."""
+    faces, field = "each face with its own normal, RK4 at 1 ms", "a height field, as deep as the step is high"
+    none = "none but round-off: the ground gives nothing"
+    newton = "acceleration down 20 degrees, half the weight lifted, relative to Newton's law"
+    slid = "what the feet's springs still swing after 0.3 s"
+    unloaded = G * (math.sin(ANGLE) - DYNAMIC * math.cos(ANGLE))
+    rows = [
+        Row("step", faces, "energy gained at a step of 10 cm, over the kinetic", 1e-9, none,
+            gained(0.4, RISER), field, naive_gained(0.4, RISER)),
+        Row("edge", faces, "energy gained over an edge of 40 cm, over the kinetic", 1e-9, none,
+            gained(0.4, -DROP), "forward Euler on spring and damper, upright", naive_fall()),
+        Row("take_off", "anchored feet, RK4 at 1 ms", newton, 1e-3, slid,
+            abs(lifted(LIGHT) / exact(LIGHT) - 1.0),
+            "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
+    ]  # fmt: skip
+    return Found(rows, sweep().plot())
+
+
+def naive_fall() -> float:
+    """Energy gained [over the kinetic of the slide] by a fall of the drop, forward Euler at the plant's step."""
+    mass, z, v = DRONE.mass.total, DROP, 0.0
+    highest = 0.0
+    for _ in range(2000):
+        force = max(-4e6 * z - 4e3 * v, 0.0) if z < 0.0 else 0.0
+        z, v = z + STEP * v, v + STEP * (force / mass - G)
+        highest = max(highest, 0.5 * v * v + G * (z - DROP))
+    return highest / (0.5 * SPEED**2)
+
+
+def sweep() -> Sweep:
+    """Faster and faster into a step."""
+    speeds = np.array([1.0, 2.0, 4.0, 8.0])
+    ways = {"faces": gained, "height field": naive_gained}
+    curves = [
+        Curve(name, speeds, np.maximum([way(0.4, RISER, float(v)) for v in speeds], 1e-17))
+        for name, way in ways.items()
+    ]
+    return Sweep("speed into a step of 10 cm [m/s]", "energy gained, over the kinetic", 1e-9, curves)

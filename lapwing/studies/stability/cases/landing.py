@@ -1,0 +1,216 @@
+"""Case 9: landing on stiff ground, rest, creep and stick-slip."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lapwing.scenes
+from lapwing.dynamics import effects, integrators
+from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.terrain import relief
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+
+HARD = "landing at 0.3 to 5 m/s on ground of 1e6 N/m a foot, at any phase of a step; rest; a slope; sliding to a stop"
+
+DRONE = load_airframe(Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml")
+METHOD = integrators.get("rk4_renormalised").Method()
+OFF = (0.0,) * 4  # [V]
+G, HEIGHT, STEP = 9.80665, 0.35, 1e-3
+SPEEDS = (0.3, 1.0, 3.0, 5.0)  # [m/s]
+PHASES = np.arange(8) / 8  # of a step at the touch
+FEW = PHASES[::2]
+STIFFNESS, DAMPING = 4e6, 4e3  # [N/m], [N s/m] of four feet
+
+
+def standing(
+    height: float, speed: float, angle: float = 0.0, ground: dict[str, Any] | None = None, **table: Any
+) -> tuple[Any, Any]:
+    """(parameters, state): `height` [m] above ground that rises along y by `angle` [rad], sinking at `speed` [m/s].
+
+    `ground` has more arguments of `relief`, `table` keys of the contact.
+    """
+    around = Environment(terrain=relief((0.0, math.tan(angle)), **(ground or {})))
+    p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "ground_contact": table}, DRONE, around))
+    over = HEIGHT + height
+    place = (0.0, -over * math.sin(angle), over * math.cos(angle))
+    state = multirotor.initial_state(p, place, exp((angle, 0.0, 0.0)), velocity_world=(0.0, 0.0, -speed))
+    return p, state
+
+
+def run_on(p: Any, state: Any, seconds: float, step: float = STEP) -> Any:
+    """The state so much later."""
+    return multirotor.advance(METHOD, p, (0, 0), 0, state, OFF, step, round(seconds / step))
+
+
+def restitution(speed: float, phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> float:
+    """Speed after the first touch over that before, from the energies."""
+    start = speed * (2e-3 + phase * STEP)
+    p, state = standing(start, speed)
+    p = p._replace(tolerance=tolerance)
+    m = run_on(p, state, 12e-3, step).motion
+    return math.sqrt(
+        max(m.velocity_world[2] ** 2 + 2.0 * G * (m.position_world[2] - HEIGHT), 0.0) / (speed**2 + 2.0 * G * start)
+    )
+
+
+def naive_restitution(speed: float, phase: float, step: float) -> float:
+    """The naive way: forward Euler on spring and damper at the plant's step."""
+    mass = DRONE.mass.total
+    z = start = speed * (2e-3 + phase * STEP)
+    v = -speed
+    for _ in range(round(12e-3 / step)):
+        force = max(-STIFFNESS * z - DAMPING * v, 0.0) if z < 0.0 else 0.0
+        z, v = z + step * v, v + step * (force / mass - G)
+    return math.sqrt(max(v * v + 2.0 * G * z, 0.0) / (speed**2 + 2.0 * G * start))
+
+
+def errors(step: float, exact: np.ndarray, way: Any) -> float:
+    """Largest error of the restitution over all speeds and phases."""
+    found = np.array([[way(v, phase, step) for phase in PHASES] for v in SPEEDS])
+    return float(np.abs(found - exact).max())
+
+
+def exact_restitution() -> np.ndarray:
+    """Of each speed and phase, shape (k, n), under a tolerance far below what is measured."""
+    return np.array([[restitution(v, phase, STEP, 1e-10) for phase in PHASES] for v in SPEEDS])
+
+
+def rest_place(phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> np.ndarray:
+    """Where a vehicle comes to rest [m], shape (3,), that touches down leaning, turning aside and sinking at 1 m/s."""
+    p, state = standing(0.05 + phase * STEP, 1.0)
+    m = state.motion._replace(attitude=exp((0.1, -0.06, 0.2)), velocity_world=(0.5, -0.3, -1.0))
+    return np.array(run_on(p._replace(tolerance=tolerance), state._replace(motion=m), 4.0, step).motion.position_world)
+
+
+def naive_rest_place(phase: float, step: float) -> float:
+    """How far a mass slides [m] that touches down at the same speeds, forward Euler, friction against the slip."""
+    mass, x, z, u, v = DRONE.mass.total, 0.0, 0.05 + phase * STEP, math.hypot(0.5, 0.3), -1.0
+    for _ in range(round(4.0 / step)):
+        force = max(-STIFFNESS * z - DAMPING * v, 0.0) if z < 0.0 else 0.0
+        drag = math.copysign(0.3 * force / mass, u)
+        x, z, u, v = x + step * u, z + step * v, u - step * drag, v + step * (force / mass - G)
+    return x
+
+
+def settled(angle: float = 0.0) -> tuple[Any, Any]:
+    """Standing still on a slope, some seconds after a soft touch."""
+    p, state = standing(0.0, 0.0, angle)
+    return p, run_on(p, state, 3.0)
+
+
+def naive_rest() -> float:
+    """How far the naive contact still moves [m] after it was set down, over its last second of ten."""
+    mass, z, v, h = DRONE.mass.total, -DRONE.mass.total * G / STIFFNESS, -1e-3, STEP
+    low, high = 0.0, -1.0
+    for i in range(10_000):
+        force = max(-STIFFNESS * z - DAMPING * v, 0.0) if z < 0.0 else 0.0
+        z, v = z + h * v, v + h * (force / mass - G)
+        if i >= 9000:
+            low, high = min(low, z), max(high, z)
+    return high - low
+
+
+def resting(seconds: float, angle: float) -> float:
+    """Distance [m] from where it stood, after so long."""
+    p, state = settled(angle)
+    later = run_on(p, state, seconds).motion
+    return float(np.abs(np.subtract(later.position_world, state.motion.position_world)).max())
+
+
+def creeping(angle: float) -> float:
+    """Distance [m] in a second from where it stood, held by friction that is a function of the slip."""
+    _, rest = settled(angle)
+    p, state = standing(0.0, 0.0, angle, friction="smooth")
+    later = run_on(p, state._replace(motion=rest.motion), 1.0).motion
+    return float(np.abs(np.subtract(later.position_world, rest.motion.position_world)).max())
+
+
+def stick_slip() -> tuple[float, float]:
+    """Speeds [m/s] left a second after a slide at 1 m/s has come to its end, ours and with the sign of the slip."""
+    p, state = settled()
+    m = state.motion._replace(velocity_world=(1.0, 0.0, 0.0))
+    ours = np.abs(run_on(p, state._replace(motion=m), 2.0).motion.velocity_world).max()
+    v = 1.0
+    for _ in range(2000):
+        v -= STEP * 0.3 * G * math.copysign(1.0, v)
+    return float(ours), abs(v)
+
+
+def run() -> Found:
+    """Touch, rest, slope and slide."""
+    exact = exact_restitution()
+    left, chattering = stick_slip()
+    slope = math.radians(20.0)
+    euler = "forward Euler on spring and damper"
+    places = [
+        np.linalg.norm(rest_place(f, k * STEP) - rest_place(f, STEP, 1e-10)) for f in FEW for k in (0.25, 0.5, 1.0)
+    ]
+    naive_places = [abs(naive_rest_place(f, STEP) - naive_rest_place(f, STEP / 32.0)) for f in FEW]
+    every = "error of the restitution, 4 speeds at 8 phases of a step"
+    rows = [
+        Row(
+            "restitution",
+            "RK4 at 1 ms, the plant's step",
+            every,
+            1e-4,
+            "ten times the tolerance of a part of a step: a bounce takes twenty parts and more",
+            errors(STEP, exact, restitution),
+            f"{euler}, 1 ms",
+            errors(STEP, exact, naive_restitution),
+        ),
+        Row(
+            "rest_place",
+            "RK4 at 0.25, 0.5 and 1 ms",
+            "way [m] of the rest place from that at an accuracy of 1e-10, 4 phases",
+            1e-4,
+            "ten times the tolerance of a part of a step, as of the restitution",
+            float(max(places)),
+            f"{euler}, 1 ms against 1/32 ms",
+            max(naive_places),
+        ),
+        Row(
+            "rest",
+            "anchored feet, RK4 at 1 ms",
+            "way [m] in an hour of rest",
+            1e-9,
+            "a hundredth of the depth by which round-off of a position of metres shows",
+            resting(3600.0, 0.0),
+            f"{euler}, 1 ms, over a second",
+            naive_rest(),
+        ),
+        Row(
+            "creep",
+            "anchored feet, RK4 at 1 ms",
+            "way [m] in ten minutes on 20 degrees",
+            1e-6,
+            "a thousandth of the millimetre that no survey would find",
+            resting(600.0, slope),
+            "friction as a function of the slip, a second",
+            creeping(slope),
+        ),
+        Row(
+            "stick_slip",
+            "anchored feet",
+            "speed [m/s] after a slide has ended",
+            1e-6,
+            "a micrometre a second: it sticks",
+            left,
+            "friction against the sign of the slip",
+            chattering,
+        ),
+    ]
+    return Found(rows, sweep().plot())
+
+
+def sweep() -> Sweep:
+    """Longer and longer steps: the error of the restitution."""
+    steps = STEP / np.array([16.0, 8.0, 4.0, 2.0, 1.0])
+    exact = exact_restitution()
+    ways = {"RK4, feet of the plant": restitution, "forward Euler": naive_restitution}
+    curves = [Curve(name, steps, np.array([errors(h, exact, way) for h in steps])) for name, way in ways.items()]
+    return Sweep("step [s]", "error of the restitution", 1e-4, curves)

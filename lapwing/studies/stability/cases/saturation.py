@@ -1,0 +1,143 @@
+"""Case 12: saturated motors."""
+
+import numpy as np
+
+from lapwing.kernels import uncompiled
+from lapwing.messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, TRUTH
+from lapwing.services.autopilot import pid
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.motor import thrust_at
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.scene_resolver import load
+from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.flights import flown
+
+HARD = (
+    "a gust of 25 m/s, half a second without thrust, a payload dropped in wind, a motor out: outputs that are cut off"
+)
+
+STEP, AT, LOSS = 0.004, 5.0, 0.5  # [s]
+TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, STATUS)
+DROP = ("effects.payload.release_time=15.0", "effects.wind_random.mean=[25.0,0.0,0.0]", "effects.wind_random.sigma=2.0")
+OUT = ("effects.rotor_damage.rotor=1", "effects.rotor_damage.time=5.0")
+GUST = (
+    "effects.wind_gust.peak=[0.0,0.0,-25.0]",
+    "effects.wind_gust.start=10.0",
+    "effects.wind_gust.duration=3.0",
+    "effects.body_drag.area=[0.06,0.06,0.3]",
+    'trajectory.phase.0.z={kind="minimum_jerk", to=10.0, duration=5.0}',
+    "trajectory.phase.1.duration=20.0",
+    "run.duration=24.0",
+)  # from above, on a box so large that all motors are at their limit
+OVERSHOOT, BACK, AWAY, UNIT = 1.0, 0.1, 0.5, 1e-12
+
+
+def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
+    """(times, height [m] over the setpoint) of the drone's height loop, without thrust for `loss` [s]."""
+    of = load("hover", [])
+    frame, gains = known_airframe(of), pid.Pid(*of[GainSet].altitude)
+    most = thrust_at(frame.motor, frame.voltage_max)
+    weight = 0.25 * frame.mass * frame.gravity
+    integrate, output = uncompiled(pid.integrate), uncompiled(pid.output)
+    z = v = integral = cut = 0.0
+    thrust, found = weight, []
+    times = np.arange(0.0, 30.0, STEP)
+    for t in times:
+        integral = integrate(gains, integral, -z, cut if unwound else 0.0, STEP)
+        wanted = weight + output(gains, integral, -z, -v)
+        given = min(max(wanted, 0.0), most)
+        cut = float(np.sign(wanted - given))
+        if AT <= t < AT + loss:
+            given = 0.0
+        thrust += STEP / frame.motor.time_constant * (given - thrust)
+        v += STEP * (4.0 * thrust / frame.mass - frame.gravity)
+        z += STEP * v
+        found.append(z)
+    return times, np.array(found)
+
+
+def away(gains: str) -> float:
+    """Largest distance [m] from the path: the pack falls off in flight, in a wind of 25 m/s."""
+    flight = flown("delivery_full", [*DROP, "run.duration=60.0", f"autopilot.gains={gains}"], TOPICS)
+    n = min(len(flight.reference), len(flight.truth))
+    return float(np.linalg.norm(flight.truth.position[:n] - flight.reference[:n, :3], axis=1).max())
+
+
+def rebound(gains: str) -> float:
+    """Largest height [m] over the path after a gust that has pushed the vehicle down."""
+    flight = flown("hover", [*GUST, f"autopilot.gains={gains}"], TOPICS)
+    n = min(len(flight.reference), len(flight.truth))
+    over = flight.truth.position[:n, 2] - flight.reference[:n, 2]
+    return float(over[flight.truth.times[:n] > 10.0].max())
+
+
+def tumbling() -> tuple[float, float]:
+    """How far the attitude's quaternion is from unit length with a motor out: in flight, and stepped from its rates."""
+    truth = flown("hover", OUT).truth
+    q = np.array([1.0, 0.0, 0.0, 0.0])
+    for wx, wy, wz in truth.angular_velocity:
+        turn = np.array([[0, -wx, -wy, -wz], [wx, 0, wz, -wy], [wy, -wz, 0, wx], [wz, wy, -wx, 0]])
+        q = q + 0.5 * STEP * turn @ q
+    return float(np.abs(np.linalg.norm(truth.orientation, axis=1) - 1.0).max()), abs(float(np.linalg.norm(q)) - 1.0)
+
+
+def run() -> Found:
+    """Overshoot after a loss of thrust, the path of a drop in wind, the attitude of a vehicle that turns over."""
+    t, ours = height(True, LOSS)
+    _, naive = height(False, LOSS)
+    unit, stepped = tumbling()
+    rows = [
+        Row(
+            "thrust_loss",
+            "integral held while the output is cut off",
+            "overshoot [m] after half a second without thrust",
+            OVERSHOOT,
+            "less than the 2.5 m by which it falls: it comes back, and does not go on",
+            float(ours.max()),
+            "integral that goes on",
+            float(naive.max()),
+        ),
+        Row(
+            "gust",
+            "tuned gains, integral held",
+            "height [m] over the path after 3 s of a gust of 25 m/s from above, motors at their limit",
+            BACK,
+            "a fifth of the 0.5 m by which it is pushed down",
+            rebound("tuned"),
+            "the paper's gains, without feed-forward",
+            rebound("paper"),
+        ),
+        Row(
+            "payload_drop",
+            "tuned gains, integral held",
+            "largest distance [m] from the path, 2 kg dropped in 25 m/s of wind",
+            AWAY,
+            "half the distance between two rotors across the vehicle",
+            away("tuned"),
+            "the paper's gains, without feed-forward",
+            away("paper"),
+        ),
+        Row(
+            "motor_out",
+            "attitude on SO(3)",
+            "length of the quaternion less one, with a motor out in hover",
+            UNIT,
+            "round-off, which must not add up while it tumbles",
+            unit,
+            "forward Euler on its numbers",
+            stepped,
+        ),
+    ]
+    curves = [Curve("integral held", t, ours), Curve("integral goes on", t, naive)]
+    return Found(rows, Plot("time [s]", "height over the setpoint [m]", curves, OVERSHOOT, log_y=False))
+
+
+def sweep() -> Sweep:
+    """Longer and longer losses of thrust: what is left after a quarter of a minute."""
+    losses = np.geomspace(0.1, 4.0, 25)
+    found = {True: "integral held", False: "integral goes on"}
+    curves = [
+        Curve(name, losses, np.array([np.abs(height(held, float(s))[1][-250:]).max() for s in losses]))
+        for held, name in found.items()
+    ]
+    return Sweep("seconds without thrust", "height error at the end [m]", 0.1, curves)

@@ -1,0 +1,109 @@
+"""Case 18: slopes up to the friction angle and beyond it, bumps, a landing on one foot."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics.lie.quaternion import exp, multiply
+from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.cases.landing import STEP, G, naive_restitution, run_on, standing
+
+HARD = "slopes up to where feet that are loaded unevenly let go, and beyond; bumps; a touch with one foot first"
+
+STATIC, DYNAMIC = 0.5, 0.3  # coefficients of the effect
+# The uphill feet carry less and let go first: tan a = mu_d (1/2 - t tan a) + mu_s (1/2 + t tan a), t = height / base
+EDGE = math.degrees(math.atan(0.5 * (STATIC + DYNAMIC) / (1.0 - (STATIC - DYNAMIC) * 0.35 / 0.5)))  # 24.9
+MARGIN = 2.0  # [degrees] below it: let go at once, not tilted slowly, the feet overshoot
+STILL, SLIDES = 1e-6, 1e-3  # [m], relative
+
+
+def way(degrees: float, seconds: float = 60.0) -> float:
+    """Distance [m] that a standing vehicle moves on a slope."""
+    # set down gently: held until the springs across the slope carry the weight, and then let go
+    held, state = standing(0.0, 0.0, math.radians(degrees), friction_static=5.0)
+    state = run_on(held, state, 3.0)
+    p, _ = standing(0.0, 0.0, math.radians(degrees))
+    state = run_on(p, state, 3.0)  # the uphill feet slip by hundredths of a millimetre, and stick again
+    later = run_on(p, state, seconds).motion
+    return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
+
+
+def chattering(degrees: float, seconds: float = 60.0) -> float:
+    """The naive way: friction against the sign of the slip, forward Euler at the plant's step; distance [m]."""
+    a, x, v = math.radians(degrees), 0.0, 0.0
+    for _ in range(round(seconds / STEP)):
+        v += STEP * G * (math.sin(a) - STATIC * math.cos(a) * math.copysign(1.0, v))
+        x += STEP * v
+    return abs(x)
+
+
+def sliding(degrees: float) -> float:
+    """Acceleration [m/s^2] down a slope, once it slides."""
+    a = math.radians(degrees)
+    p, state = standing(0.0, 0.0, a)
+    early = run_on(p, state, 0.3)
+    late = run_on(p, early, 0.5)
+    down = np.array([0.0, -math.cos(a), -math.sin(a)])
+    return float(np.subtract(late.motion.velocity_world, early.motion.velocity_world) @ down / 0.5)
+
+
+def energy(p: Any, m: Any) -> float:
+    """Kinetic and potential energy [J] of a vehicle with parameters p and motion m."""
+    spin = np.dot(p.body.inertia, np.square(m.omega_body))
+    return float(
+        p.body.mass * (G * m.position_world[2] + np.dot(m.velocity_world, m.velocity_world) / 2.0) + spin / 2.0
+    )
+
+
+def one_foot() -> float:
+    """Highest energy, over that at first, less one, of a landing on one foot at 1 m/s."""
+    p, state = standing(0.1, 1.0)
+    m = state.motion
+    state = state._replace(motion=m._replace(attitude=multiply(m.attitude, exp((0.15, -0.12, 0.3)))))
+    energies = [energy(p, state.motion)]
+    for _ in range(500):
+        state = run_on(p, state, 4e-3)
+        energies.append(energy(p, state.motion))
+    return max(energies) / energies[0] - 1.0
+
+
+def bumps() -> float:
+    """Distance [m] that it moves in a minute on bumps of 2 cm, once it has come to rest."""
+    p, state = standing(0.1, 0.0, ground={"bump_height": 0.02, "bump_length": 0.7})
+    state = run_on(p, state, 3.0)
+    later = run_on(p, state, 60.0).motion
+    return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
+
+
+def run() -> Found:
+    """Sticks, slides, comes down on one foot, stands on bumps."""
+    below, beyond = EDGE - MARGIN, 30.0
+    a = math.radians(beyond)
+    exact = G * (math.sin(a) - DYNAMIC * math.cos(a))
+    one_coefficient = G * (math.sin(a) - STATIC * math.cos(a))
+    sign, anchored = "friction against the sign of the slip", "anchored feet, RK4 at 1 ms"
+    gain = max(naive_restitution(1.0, phase / 8, STEP) for phase in range(8)) ** 2 - 1.0
+    stuck, slid = "a thousandth of a millimetre: it sticks", "what the feet's springs still swing after 0.3 s"
+    steep, gained = f"way [m] in a minute at {below:.1f} degrees", "energy gained in a landing on one foot, relative"
+    against, on_bumps = (
+        "acceleration on 30 degrees, relative to g (sin - mu cos)",
+        "way [m] in a minute on bumps of 2 cm",
+    )
+    off, naive_off = abs(sliding(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
+    none, euler = "none but round-off: the ground gives nothing", "forward Euler on spring and damper, upright"
+    rows = [
+        Row("below", anchored, steep, STILL, stuck, way(below), sign, chattering(below)),
+        Row("beyond", anchored, against, SLIDES, slid, off, "one coefficient for both", naive_off),
+        Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
+        Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chattering(5.0)),
+    ]
+    return Found(rows, sweep().plot())
+
+
+def sweep() -> Sweep:
+    """Steeper and steeper."""
+    angles = np.array([5.0, 10.0, 15.0, 20.0, 22.0, 22.5, 23.0, 23.5, 24.0, 25.0, 26.0, 28.0])
+    ways = {"anchored feet": way, "sign of the slip": chattering}
+    curves = [Curve(name, angles, np.maximum([f(float(d), 5.0) for d in angles], 1e-17)) for name, f in ways.items()]
+    return Sweep(f"slope [degrees], uphill feet let go at {EDGE:.1f}", "way in 5 s [m]", STILL, curves, log_x=False)

@@ -1,0 +1,200 @@
+"""Case 9, its toppling: a vehicle that is set down leaning, or pushed, over the edge of its feet."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
+from lapwing.dynamics.vector import scale
+from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.cases.landing import DAMPING, DRONE, HEIGHT, STEP, STIFFNESS, G, run_on, standing
+from lapwing.studies.stability.cases.slopes import energy
+
+HARD = (
+    "a vehicle that leans, or is pushed, over the edge of its feet: it falls or comes back by a billionth of a radian"
+)
+
+MASS, FEET = DRONE.mass.total, DRONE.contact.feet if DRONE.contact else ()
+AXES = (0, 1)  # roll, pitch
+SECONDS = 5.0  # in which what is off its balance by 1e-9 rad has grown to a tenth: 4.5 or 4.7 e-folds a second
+FRICTION, GRIP = 0.5, 2.0  # coefficients: of the effect, and so that pushed feet do not slide
+NEAR = 1e-4  # [rad] beside the edge
+EXACT, PUSHED, GAINED = 1e-9, 1e-3, 1e-9
+
+
+def base(axis: int) -> float:
+    """Half the distance [m] between the feet that the vehicle leans over."""
+    return float(max(foot[1 - axis] for foot in FEET))
+
+
+def edge(axis: int) -> float:
+    """The angle [rad] at which the centre of mass is over the feet.
+
+    The force of the ground then passes through it, however deep the feet are in: their springs do not move the edge.
+    """
+    return math.atan(base(axis) / HEIGHT)
+
+
+def unit(axis: int) -> tuple[float, float, float]:
+    """Unit vector of the body's axis x (0) or y (1)."""
+    return (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0)
+
+
+def toppled(state: Any, axis: int) -> bool:
+    """Whether it leans over its edge."""
+    return rotation_matrix(state.motion.attitude)[8] < math.cos(edge(axis))
+
+
+def leaning(axis: int, angle: float) -> tuple[Any, Any]:
+    """(parameters, state at rest) on two feet, which just touch, leaning by an angle [rad]."""
+    p, state = standing(base(axis) * math.sin(angle) + HEIGHT * (math.cos(angle) - 1.0), 0.0)
+    return p, state._replace(motion=state.motion._replace(attitude=exp(scale(angle, unit(axis)))))
+
+
+def falls(axis: int, angle: float, step: float = STEP) -> bool:
+    """Whether a vehicle that is set down leaning topples."""
+    p, state = leaning(axis, angle)
+    return toppled(run_on(p, state, SECONDS, step), axis)
+
+
+def inertia(axis: int) -> float:
+    """Moment [kg m^2] about the edge of the feet."""
+    return DRONE.mass.inertia[axis] + MASS * (base(axis) ** 2 + HEIGHT**2)
+
+
+def enough(axis: int) -> float:
+    """The rate [rad/s] about the edge whose energy lifts the centre of mass over it."""
+    return math.sqrt(2.0 * MASS * G * (math.hypot(base(axis), HEIGHT) - HEIGHT) / inertia(axis))
+
+
+def settled() -> tuple[Any, Any]:
+    """(parameters, state) of the vehicle standing still on all feet, which do not slide."""
+    p, state = standing(0.0, 0.0, friction_static=GRIP, friction_dynamic=GRIP)
+    return p, run_on(p, state, 3.0)
+
+
+def pushed(axis: int, rest: tuple[Any, Any], rate: float) -> bool:
+    """Whether a standing vehicle that is pushed about the edge of its feet topples."""
+    p, state = rest
+    omega = scale(rate, unit(axis))
+    arm = (0.0, base(axis), HEIGHT) if axis == 0 else (-base(axis), 0.0, HEIGHT)  # from the edge to the middle
+    velocity = tuple(float(v) for v in np.cross(omega, arm))
+    motion = state.motion._replace(omega_body=omega, velocity_world=velocity)
+    return toppled(run_on(p, state._replace(motion=motion), SECONDS / 2.0), axis)
+
+
+def threshold(topples: Callable[[float], bool], low: float, high: float, parts: int) -> float:
+    """Where it begins to topple between two values, by halving."""
+    for _ in range(parts):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if topples(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+def naive(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> np.ndarray:
+    """The naive way: forward Euler on spring, damper and friction against the slip, in the plane of the fall.
+
+    Rows of (angle [rad], energy [J]), shape (n, 2); `rate` [rad/s] is that about the edge.
+    """
+    b, about = base(axis), DRONE.mass.inertia[axis]
+    z = b * math.sin(angle) + HEIGHT * math.cos(angle)
+    y, vy, vz, omega = 0.0, -rate * HEIGHT, rate * b, rate
+    found = []
+    for _ in range(round(SECONDS / step)):
+        c, s = math.cos(angle), math.sin(angle)
+        fy = fz = torque = 0.0
+        for side in (-b, b):
+            py, pz = side * c + HEIGHT * s, side * s - HEIGHT * c
+            deep, sinking = -(z + pz), -(vz + omega * py)
+            press = max(0.5 * (STIFFNESS * deep + DAMPING * sinking), 0.0) if deep > 0.0 else 0.0
+            drag = -friction * press * math.copysign(1.0, vy - omega * pz)
+            fy, fz, torque = fy + drag, fz + press, torque + py * press - pz * drag
+        y, z, angle = y + step * vy, z + step * vz, angle + step * omega
+        vy, vz, omega = vy + step * fy / MASS, vz + step * (fz / MASS - G), omega + step * torque / about
+        found.append((angle, MASS * (G * z + 0.5 * (vy * vy + vz * vz)) + 0.5 * about * omega * omega))
+        if abs(angle) > 0.5 * math.pi:
+            break
+    return np.array(found)
+
+
+def naive_falls(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> bool:
+    """Whether it topples under the naive way."""
+    return bool(abs(naive(axis, angle, rate, step, friction)[-1, 0]) > edge(axis))
+
+
+def gained(axis: int, angle: float) -> float:
+    """Highest energy over that at first, relative to what the edge is over the standing vehicle."""
+    p, state = leaning(axis, angle)
+    energies = [energy(p, state.motion)]
+    for _ in range(1000):
+        state = run_on(p, state, SECONDS / 1000.0)
+        energies.append(energy(p, state.motion))
+    return (max(energies) - energies[0]) / lift(axis)
+
+
+def lift(axis: int) -> float:
+    """Energy [J] of the centre of mass over the edge, over that of the standing vehicle."""
+    return MASS * G * (math.hypot(base(axis), HEIGHT) - HEIGHT)
+
+
+def error(axis: int, step: float, topples: Any, parts: int) -> float:
+    """Distance [rad] of the angle at which it topples, set down at rest, from the edge."""
+    exact = edge(axis)
+    return abs(threshold(lambda a: topples(axis, a, step=step), exact - 0.1, exact + 0.1, parts) - exact)
+
+
+def push_error(axis: int, topples: Callable[[float], bool], parts: int) -> float:
+    """Difference of the rate at which it topples from that of the energy, relative."""
+    exact = enough(axis)
+    return abs(threshold(topples, 0.5 * exact, 1.5 * exact, parts) / exact - 1.0)
+
+
+def run() -> Found:
+    """Set down leaning, pushed, and what becomes of the energy."""
+    ours, euler = "anchored feet, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
+    rest = settled()
+    rate = max(push_error(i, partial(pushed, i, rest), 20) for i in AXES)
+    naive_rate = max(push_error(i, partial(naive_falls, i, 0.0, friction=GRIP), 16) for i in AXES)
+    beside = [(i, edge(i) + side) for i in AXES for side in (-NEAR, NEAR)]
+    kicked = max(float(np.ptp(np.maximum(e[:, 1], e[0, 1]))) / lift(i) for i, a in beside for e in (naive(i, a),))
+    rows = [
+        Row("leaning", ours, "angle at which it topples, set down at rest, less atan(base / height) [rad]", EXACT,
+            "what grows to a tenth of a radian in 5 s; the depth of the feet does not enter: their force goes "
+            "through the centre of mass",
+            max(error(i, STEP, falls, 34) for i in AXES), euler, max(error(i, STEP, naive_falls, 16) for i in AXES)),
+        Row("pushed", ours, "rate at which it topples, standing, relative to that of equal energies", PUSHED,
+            "the energy of the feet's springs and of the depth to which it stands, 5 of 8000 mJ",
+            rate, euler, naive_rate),
+        Row("energy", ours, f"energy gained, set down {NEAR:g} rad to either side, over that of the edge", GAINED,
+            "none but round-off: the ground gives nothing",
+            max(gained(i, a) for i, a in beside), euler, kicked),
+    ]  # fmt: skip
+    return Found(rows, course())
+
+
+def course() -> Plot:
+    """The roll of vehicles that are set down a little to either side of the edge."""
+    t = np.arange(251) * 0.02
+    curves = []
+    for name, off in (("before the edge", -NEAR), ("beyond it", NEAR)):
+        p, state = leaning(0, edge(0) + off)
+        angles = [edge(0) + off]
+        for _ in t[1:]:
+            state = run_on(p, state, 0.02)
+            angles.append(2.0 * math.atan2(state.motion.attitude[1], state.motion.attitude[0]))
+        plain = naive(0, edge(0) + off)[:, 0][::20]
+        curves += [Curve(name, t, np.array(angles)), Curve(f"{name}, Euler", t[: len(plain)], plain)]
+    return Plot("time [s]", "roll [rad]", curves, log_y=False)
+
+
+def sweep() -> Sweep:
+    """Longer and longer steps: the error of the angle at which it topples."""
+    steps = STEP * np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
+    curves = [
+        Curve("RK4, feet of the plant", steps, np.array([error(1, h, falls, 34) for h in steps])),
+        Curve("forward Euler", steps, np.array([error(1, h, naive_falls, 16) for h in steps])),
+    ]
+    return Sweep("step [s]", "error of the angle at which it topples [rad]", EXACT, curves)

@@ -1,0 +1,109 @@
+"""The results as a table and as JSON."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from lapwing.studies.stability.case_runner import Result
+
+
+def figure(value: float) -> str:
+    """A number in few letters."""
+    return f"{value:.2g}" if math.isfinite(value) else str(value)
+
+
+def verdict(passes: bool) -> str:
+    """How a row has done in one word, "pass" or "fail", as it is printed and as JSON has it."""
+    return "pass" if passes else "fail"
+
+
+def distance(bound: float, measured: float) -> str:
+    """How far a figure is from its bound: as a factor."""
+    if bound == 0.0 or not math.isfinite(measured):
+        return ""
+    if measured == 0.0:
+        return "exact"
+    return f"{bound / measured:.3g} x" if measured > 0.1 * bound else f"{bound / measured:.1g} x"
+
+
+COLUMNS = {  # name: share of the width, None where it is as wide as its figures
+    "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
+    "naive method": 5, "its result": None, "other simulators": 4,
+}  # fmt: skip
+FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}  # letters
+
+
+def table(console: Console, results: Sequence[Result]) -> None:
+    """For each case a line that says what is hard about it, and its rows."""
+    for k, result in enumerate(results):
+        console.print(f"\n[bold]{result.case}[/bold]: {escape(result.hard)}", highlight=False)
+        shown = Table(box=None, pad_edge=False, header_style="dim", show_header=k == 0, expand=True)
+        for name, ratio in COLUMNS.items():
+            width = FIGURES.get(name)
+            right = name in FIGURES and name != "verdict"
+            shown.add_column(name, justify="right" if right else "left", ratio=ratio, width=width, no_wrap=bool(width))
+        for row in result.found.rows:
+            shown.add_row(
+                row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
+                distance(row.bound, row.measured), _coloured(row.passes), escape(row.naive),
+                f"{figure(row.naive_measured)} {_coloured(row.naive_passes, not row.naive_passes)}",
+                "\n".join(f"{escape(name)}: {figure(value)}" for name, value in row.other_simulators),
+            )  # fmt: skip
+        console.print(shown)
+
+
+def _coloured(passes: bool, wanted: bool | None = None) -> str:
+    colour = "green" if (passes if wanted is None else wanted) else "red"
+    return f"[{colour}]{verdict(passes)}[/{colour}]"
+
+
+def sweeps(console: Console, results: Sequence[Result]) -> None:
+    """Where each method breaks."""
+    for result in results:
+        if result.sweep is None:
+            continue
+        console.print(
+            f"\n[bold]{result.case}[/bold]: {escape(result.sweep.error)} beyond {figure(result.sweep.bound)}",
+            highlight=False,
+        )
+        for name, at in result.sweep.breaks().items():
+            where = "nowhere in the sweep" if at is None else f"at {escape(result.sweep.difficulty)} = {at:.3g}"
+            console.print(f"  {escape(name)}: {where}", highlight=False)
+
+
+def as_json(results: Sequence[Result]) -> dict[str, Any]:
+    """{"cases": [...]}, an entry for each row, with "other_simulators" where any has run it; not finite: null."""
+    return {
+        "cases": [
+            {
+                "name": f"{result.case}.{row.name}",
+                "bound": _finite(row.bound),
+                "measured": _finite(row.measured),
+                "verdict": verdict(row.passes),
+                "naive_measured": _finite(row.naive_measured),
+                "naive_verdict": verdict(row.naive_passes),
+                **(
+                    {"other_simulators": {name: _finite(value) for name, value in row.other_simulators}}
+                    if row.other_simulators
+                    else {}
+                ),
+            }
+            for result in results
+            for row in result.found.rows
+        ]
+    }
+
+
+def write_json(path: Path, results: Sequence[Result]) -> None:
+    """Write `as_json` to a file."""
+    path.write_text(json.dumps(as_json(results), indent=1) + "\n", encoding="utf-8")
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,28 @@
+"""The delivery drone of five bodies as cases throw it into the air."""
+
+from typing import Any
+
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.multibody.delivery_drone import delivery_drone
+from lapwing.dynamics.multibody.five_bodies import BodyState, machine
+from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.vector import ZERO, Vec3
+
+__all__ = ["PAPER", "delivery_drone", "thrown"]
+
+PAPER: dict[str, Any] = {
+    "central_frame": 8.0,
+    "payload": 2.0,
+    "frame_inertia": (0.27, 0.26, 0.42),
+    "propeller": 5.6e-3,
+    "propeller_inertia": (9.8e-6, 8.6e-4, 8.6e-4),
+    "arm_length": 0.4974,
+    "rotor_sign_x": (1, -1, -1, 1),
+    "rotor_sign_y": (1, 1, -1, -1),
+}
+
+
+def thrown(drone: Any, omega: Vec3, speeds: tuple[float, ...]) -> tuple[Any, Any]:
+    """(machine, state): turning at omega [rad/s] with propellers at these speeds [rad/s], nothing acting."""
+    p = machine(drone, ZERO, speeds=speeds)
+    return p, together(p, BodyState(ZERO, NO_ROTATION, ZERO, omega), (0.1, 0.4, 0.7, 1.0), speeds)

@@ -1,0 +1,51 @@
+"""What every other simulator measures that can march a free rigid body with equal steps."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.stability.cases import intermediate_axis, looping, odd_inertia
+from lapwing.studies.stability.other_simulators import Figures
+from lapwing.studies.stability.sampled_runs import drift
+
+# (inertia [kg m^2], start, duration [s], steps, samples) -> R_world_body and omega_body, shape (samples + 1, 12)
+March = Callable[[Any, Any, float, int, int], np.ndarray]
+
+
+def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Figures]]:
+    """The `CASES` of free bodies, of methods by the name that they are shown under."""
+
+    def tumbling() -> Figures:
+        c = intermediate_axis
+        found: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
+        for name, march in methods.items():
+            y = march(c.INERTIA, c.start(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
+            for row, values in zip(found, c.compared(y, c.EPSILON), strict=True):
+                found[row][name] = float(values.max())
+        return found
+
+    def loops() -> Figures:
+        c = looping
+        return {
+            "momentum": {
+                name: float(drift(c.momentum(march(c.INERTIA, c.start(c.ASIDE), c.DURATION, c.STEPS, c.SAMPLES))).max())
+                for name, march in methods.items()
+            }
+        }
+
+    def odd_bodies() -> Figures:
+        c = odd_inertia
+        return {
+            body: {
+                name: float(
+                    c.drifted(
+                        march(inertia, c.RigidBody(c.ASKEW, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
+                    ).max()
+                )
+                for name, march in methods.items()
+            }
+            for body, (inertia, omega) in c.BODIES.items()
+        }
+
+    return {"intermediate_axis": tumbling, "looping": loops, "odd_inertia": odd_bodies}

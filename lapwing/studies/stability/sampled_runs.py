@@ -1,0 +1,37 @@
+"""Runs of any integrator on any system, sampled: what many cases are made of."""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics import integrators
+from lapwing.kernels.state_tree import flatten
+from lapwing.studies.accuracy.coordinates import coordinates
+from lapwing.studies.accuracy.integrate import sampled
+
+
+def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
+    """Stored numbers of the states at `samples` equal parts of a run from time 0, shape (samples + 1, n).
+
+    `steps` is a multiple of `samples`. Rows from the first that is not finite on are NaN.
+    """
+    out = np.empty((samples + 1, len(flatten(x))))
+    kept = sampled(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
+    out[kept:] = np.nan
+    return out
+
+
+def marched(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
+    """`rows` with attitudes as matrices, shape (samples + 1, m)."""
+    return coordinates(x, rows(method, p, x, duration, steps, samples))
+
+
+def worst(values: np.ndarray) -> float:
+    """The largest absolute value; NaN if any value is NaN, 0 of none."""
+    return float(np.abs(values).max()) if len(values) else 0.0
+
+
+def drift(values: np.ndarray) -> np.ndarray:
+    """Change of an invariant from its start, relative to its size there, shape (k,)."""
+    values = values.reshape(len(values), -1)
+    return np.abs(values - values[0]).max(axis=1) / np.abs(values[0]).max()

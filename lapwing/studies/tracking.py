@@ -1,0 +1,187 @@
+"""How far a flight is from what was asked: errors of the six axes while the motors are armed."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.kernels import kernel, leaf
+
+TURN = 2.0 * np.pi
+AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
+
+DEGREE = np.pi / 180.0  # [rad]
+
+
+def shown(axis: str) -> tuple[str, float]:
+    """The unit in which people are shown an axis, and how many of it are 1 m or 1 rad: angles in degrees."""
+    return ("°", 1.0 / DEGREE) if AXES[axis] == "rad" else ("m", 1.0)
+
+
+def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw [rad] of unit quaternions of shape (n, 4), shape (n, 3); yaw without jumps."""
+    found, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))
+    _sines(found, cosines, plain(np.transpose(xyzw)))
+    roll, pitch, yaw = found
+    np.arctan2(roll, cosines[0], out=roll)  # numpy takes vectors of angles at once, compiled code takes one
+    np.arcsin(pitch, out=pitch)
+    np.arctan2(yaw, cosines[1], out=yaw)
+    if not (np.abs(np.diff(yaw)) < np.pi).all():
+        yaw[:] = np.unwrap(yaw)
+    return found.T
+
+
+@kernel
+def _sines(found: Any, cosines: Any, xyzw: Any) -> None:
+    """Sines of roll, pitch, yaw (3, n) and cosines of roll and yaw (2, n), up to a factor, of quaternions (4, n)."""
+    for k in range(xyzw.shape[1]):
+        x, y, z, w = xyzw[0, k], xyzw[1, k], xyzw[2, k], xyzw[3, k]
+        found[0, k], cosines[0, k] = 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
+        sine = 2.0 * (w * y - z * x)
+        found[1, k] = np.sign(sine) if abs(sine) > 1.0 else sine
+        found[2, k], cosines[1, k] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+
+
+def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
+    """Reference minus truth of each axis [m], [rad], shape (k, 6), of the k rows with the motors armed.
+
+    Args:
+        reference: x, y, z [m], roll, pitch, yaw [rad], shape (n, 6).
+        position: x, y, z [m], shape (n, 3).
+        attitude: roll, pitch, yaw [rad], shape (n, 3).
+        armed: shape (n,) of bool.
+    """
+    found = np.empty((np.count_nonzero(armed), len(AXES)))
+    _errors(found, plain(reference), plain(position), plain(attitude), plain(armed, bool))
+    return found
+
+
+def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
+    """The same array laid out so that one compiled version serves all; a copy where it is not."""
+    return np.require(values, kind, ("C", "W"))
+
+
+def strided(values: np.ndarray) -> np.ndarray:
+    """The same numbers, to be read only, laid out with gaps between rows as they lie in the rows of ports, so that one
+    compiled version serves all; a copy where they lie otherwise."""
+    found = np.asarray(values, float)
+    if found.flags.contiguous or not found.flags.aligned:
+        found = np.empty((*found.shape, 2))[..., 0]
+        found[...] = values
+    found = found.view()
+    found.flags.writeable = False
+    return found
+
+
+@leaf
+def _turn(wanted: float, flown: float) -> float:
+    """The shortest way from one angle to another [rad]."""
+    turn = wanted - flown
+    return turn if abs(turn) <= 0.5 * TURN else turn - TURN * np.rint(turn / TURN)
+
+
+@kernel
+def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any) -> None:
+    k = 0
+    for row in range(len(armed)):
+        if armed[row]:
+            for i in range(3):
+                found[k, i] = reference[row, i] - position[row, i]
+                found[k, 3 + i] = _turn(reference[row, 3 + i], attitude[row, i])
+            k += 1
+
+
+class Reference(NamedTuple):
+    """Where the vehicle ought to be at n times."""
+
+    position: np.ndarray  # x, y, z [m], shape (n, 3)
+    roll_pitch: np.ndarray  # [rad], shape (n, 2) or more
+    yaw: np.ndarray  # [rad], shape (n,)
+
+
+def rmse(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> dict[str, float]:
+    """Root-mean-square error of each axis [m], [rad] while the motors are armed, NaN where they never were; other
+    arguments as of `errors`."""
+    wanted = Reference(*(strided(values) for values in reference))
+    found = _mean_squares(*wanted, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
+    return dict(zip(AXES, map(math.sqrt, found), strict=True))
+
+
+@kernel
+def _mean_squares(
+    wanted: Any, roll_pitch: Any, heading: Any, position: Any, attitude: Any, armed: Any
+) -> tuple[float, float, float, float, float, float]:
+    rows = 0
+    x = y = z = roll = pitch = yaw = 0.0
+    for row in range(len(armed)):
+        if armed[row]:
+            rows += 1
+            x += (wanted[row, 0] - position[row, 0]) ** 2
+            y += (wanted[row, 1] - position[row, 1]) ** 2
+            z += (wanted[row, 2] - position[row, 2]) ** 2
+            roll += _turn(roll_pitch[row, 0], attitude[0, row]) ** 2
+            pitch += _turn(roll_pitch[row, 1], attitude[1, row]) ** 2
+            yaw += _turn(heading[row], attitude[2, row]) ** 2
+    n = rows if rows else np.nan
+    return x / n, y / n, z / n, roll / n, pitch / n, yaw / n
+
+
+def reach(wanted: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
+    """Of positions while the motors are armed: greatest distance from those wanted [m], and how far they go beyond the
+    extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
+    return _reach(strided(wanted), strided(position), plain(armed, bool))
+
+
+@kernel
+def _reach(wanted: Any, position: Any, armed: Any) -> tuple[float, float]:
+    squares, away = 0.0, 0.0
+    along_x = along_y = along_z = (-np.inf, -np.inf, -np.inf, -np.inf)
+    for row in range(len(armed)):
+        if armed[row]:
+            x, y = wanted[row, 0] - position[row, 0], wanted[row, 1] - position[row, 1]
+            z = wanted[row, 2] - position[row, 2]
+            square = x * x + y * y + z * z
+            squares, away = squares + square, _greater(away, square)
+            along_x = _extended(along_x, position[row, 0], wanted[row, 0])
+            along_y = _extended(along_y, position[row, 1], wanted[row, 1])
+            along_z = _extended(along_z, position[row, 2], wanted[row, 2])
+    if squares != squares:  # what a comparison would leave out
+        return np.nan, np.nan
+    return np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z)))
+
+
+Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown; that was wanted
+
+
+@leaf
+def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
+    """Extremes with another x."""
+    return (
+        _greater(known[0], flown), _greater(known[1], -flown), _greater(known[2], wanted), _greater(known[3], -wanted),
+    )  # fmt: skip
+
+
+@leaf
+def _beyond(known: Extremes) -> float:
+    """How far what was flown reaches beyond what was wanted."""
+    return _greater(known[0] - known[2], known[1] - known[3])
+
+
+@leaf
+def _greater(a: float, b: float) -> float:
+    """The greater number, of two that are numbers."""
+    return a if a > b else b
+
+
+def total(values: np.ndarray) -> float:
+    """The sum of all numbers (n, k)."""
+    return _total(strided(values))
+
+
+@kernel
+def _total(values: Any) -> float:
+    found = 0.0
+    for row in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            found += values[row, k]
+    return found

@@ -1,0 +1,107 @@
+"""What `lapwing tune` has found, as tables."""
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.services.autopilot.margins import Margins
+from lapwing.studies.tracking import AXES, shown
+from lapwing.studies.tune.gain_refinement import rmse
+from lapwing.studies.tune.identify import LOOPS
+from lapwing.studies.tune.procedure import Tuned
+
+UNITS = {
+    "altitude": "m/s^2 / N",
+    "roll": "rad/s^2 / N",
+    "pitch": "rad/s^2 / N",
+    "yaw": "rad/s^2 / N",
+    "spin_up_zero": "s",
+    "lag": "s",
+}
+
+
+class Rows:
+    """A table before it is drawn: title, heads and rows of text; the first column names the row."""
+
+    def __init__(self, title: str, *heads: str):
+        self.title, self.heads = title, heads
+        self.rows: list[tuple[str, ...]] = []
+
+    def add(self, *cells: str) -> None:
+        """One more row."""
+        self.rows.append(cells)
+
+
+def tables(found: Tuned) -> Iterator[Rows]:
+    """Every table of the study, the answer first."""
+    yield _margins(found)
+    if found.polished:
+        yield _errors(found)
+        yield _corners(found)
+    yield _model(found)
+
+
+def show(console: Console, found: Tuned) -> None:
+    """Print the tables for people."""
+    for rows in tables(found):
+        table = Table(title=rows.title, title_justify="left")
+        for k, head in enumerate(rows.heads):
+            table.add_column(head, justify="right" if k else "left", no_wrap=True)
+        for row in rows.rows:
+            table.add_row(*row)
+        console.print(table)
+
+
+def cell(m: Margins) -> str:
+    """Margins in few words."""
+    if not 0.0 < m.crossover < math.inf:
+        return f"no crossover: gain {'above' if m.crossover else 'below'} 1"
+    up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
+    return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
+
+
+def _margins(found: Tuned) -> Rows:
+    rows = Rows(
+        "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", found.before.name, "new"
+    )
+    for name in found.after.margins:
+        rows.add(name, cell(found.before.margins[name]), cell(found.after.margins[name]))
+    return rows
+
+
+def _errors(found: Tuned) -> Rows:
+    p = found.polished
+    assert p is not None
+    title = f"RMSE of {len(p.after)} flights of the scene: as designed, and polished ({p.candidates} gain sets flown)"
+    rows = Rows(title, "axis", "designed", "polished")
+    for axis in AXES:
+        unit, scale = shown(axis)
+        rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
+    return rows
+
+
+def _corners(found: Tuned) -> Rows:
+    rows = Rows(
+        "The flight with a vehicle that differs from the controller's model", "vehicle", "max. position error, m", "end"
+    )
+    for corner, f in found.corners.items():
+        rows.add(str(corner), f"{f['max_distance']:.3f}", f["verdict"])
+    return rows
+
+
+def _model(found: Tuned) -> Rows:
+    if found.identified is None:
+        rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit")
+        for name, unit in UNITS.items():
+            rows.add(name, f"{getattr(found.compiled, name):.4g}", unit)
+        return rows
+    rows = Rows(
+        "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %"
+    )
+    for name, unit in UNITS.items():
+        a, b = getattr(found.identified.model, name), getattr(found.compiled, name)
+        fit = f"{found.identified.fit[name]:.1f}" if name in LOOPS else ""
+        rows.add(name, f"{a:.4g}", f"{b:.4g}", unit, fit)
+    return rows

@@ -1,0 +1,78 @@
+"""The non-linear closed loop with mass, inertia and thrust wrong by a fifth, which the controller is not told."""
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics import effects
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.ground_equilibrium import at_rest
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.common.autopilot_parameters import of_gains
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.vehicle_schema import Effects, airframe, gravity, start_pose
+from lapwing.studies.campaign.campaign_config import TOPICS
+from lapwing.studies.metrics import figures
+from lapwing.studies.simulate import fly
+
+WRONG = 0.2  # of the nominal value
+
+
+class Corner(NamedTuple):
+    """Factors on the true vehicle."""
+
+    mass: float
+    inertia: float
+    thrust: float
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {100.0 * (value - 1.0):+.0f} %" for name, value in self._asdict().items())
+
+
+CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repeat=3)]
+
+
+def flown(setup: Setup) -> dict[str, Any]:
+    """Figures of a flight of which all that a campaign looks at is told at every tick."""
+    return figures(fly(setup, TOPICS))
+
+
+def with_gains(setup: Setup, gains: GainSet) -> Setup:
+    """The run with another gain set, also where the scene's parameters had changed single gains of its own."""
+    own, changed = setup.services["autopilot"].parameters, {p.name: p for p in of_gains(gains)}
+    parameters = tuple(changed.get(p.name, p) for p in own.parameters)
+    return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
+
+
+def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
+    """The run with a vehicle that differs from the one which the autopilot knows."""
+    frame = airframe(scene)
+    mass = frame.mass.model_copy(
+        update={
+            "total": corner.mass * frame.mass.total,
+            "inertia": tuple(float(i) for i in corner.inertia * np.array(frame.mass.inertia)),
+            "products": tuple(float(i) for i in corner.inertia * np.array(frame.mass.products)),
+        }
+    )
+    frame = frame.model_copy(update={"mass": mass})
+    active = effects.from_scene(scene[Effects].tables, frame, environment(scene))
+    acting = tuple(_stronger(e, corner.thrust) for e in active)
+    p = multirotor.parameters(frame, acting)
+    plant = setup.services["plant"].parameters
+    start = plant.start._replace(vehicle=at_rest(multirotor, p, start_pose(scene), gravity(scene)))
+    return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
+
+
+def _with(setup: Setup, name: str, parameters: Any) -> Setup:
+    changed = setup.services[name]._replace(parameters=parameters)
+    return setup._replace(services={**setup.services, name: changed})
+
+
+def _stronger(effect: Any, factor: float) -> Any:
+    """An effect whose rotors give `factor` times the thrust; others as they are."""
+    if "thrust_constant" not in getattr(effect, "_fields", ()):
+        return effect
+    return effect._replace(thrust_constant=factor * effect.thrust_constant)

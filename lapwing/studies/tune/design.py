@@ -1,0 +1,121 @@
+"""A gain set for given bandwidths, slowed down loop by loop until every margin holds."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from lapwing.services.autopilot.controller_parameters import Airframe, build, lift, moments
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.linearise import Hover
+
+PHASE, GAIN = 45.0, 6.0  # [deg], [dB] the least margins
+CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each 20 % wrong in the worse direction
+DELAY = 1  # [ticks] that of the parallel coupling, the later of the two
+BACK_OFF = 0.95
+ATTEMPTS = 60
+
+
+def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
+    """The airframe with the mass, inertia and lag that the linear model shows."""
+    effects = model.roll, model.pitch, model.yaw
+    x, y, z = (moment / k for moment, k in zip(moments(airframe), effects, strict=True))
+    return airframe._replace(
+        spin_up_zero=model.spin_up_zero,
+        mass=lift(airframe) / model.altitude,
+        inertia_body=(x, y, z),
+        motor=airframe.motor._replace(time_constant=model.lag),
+    )
+
+
+def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
+    """Gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
+
+    def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
+        d = w / effect
+        return _rounded(p * w * d), _rounded(i * w * p * w * d), _rounded(d)
+
+    roll = loop(model.roll, wanted.attitude, 0.12, 0.024)
+    outer = loop(model.tilt, wanted.position, 0.39, 0.032)
+    return GainSet(
+        description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in wanted._asdict().items())} rad/s",
+        altitude=loop(model.altitude, wanted.altitude, 0.39, 0.06),
+        yaw=loop(model.yaw, wanted.yaw, 0.21, 0.017),
+        roll_inner=(-roll[0], -roll[1], -roll[2]),
+        pitch_inner=loop(model.pitch, wanted.attitude, 0.12, 0.024),
+        roll_outer=outer,
+        pitch_outer=outer,
+        tilt_limit=0.6,
+        reference_bandwidth=_rounded(4.1 * wanted.position),
+        reference_damping=0.55,
+        feed_forward=True,
+    )
+
+
+def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
+    """What is wrong with each loop that is unstable, has too small a margin, or is unstable at a corner."""
+    found = {}
+    for name, response in loops.items():
+        m = margins(response)
+        # Only the single loops and the cuts at the motors scale with the vehicle's gain.
+        scaled = CORNERS if name in ("altitude", "yaw", "x_plant_input", "y_plant_input") else ()
+        if not stable(response):
+            found[name] = "unstable"
+        elif not 0.0 < m.crossover < math.inf:
+            found[name] = f"its gain is {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
+        elif math.degrees(m.phase) < PHASE:
+            found[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
+        elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN:
+            found[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN:g}"
+        elif not all(stable(k * response) for k in scaled):
+            found[name] = "unstable with mass, inertia or thrust 20 % wrong"
+    return found
+
+
+def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]) -> Bandwidths:
+    """The fastest bandwidths at or below those `wanted` whose gain set keeps its margins.
+
+    Args:
+        model: the plant about hover.
+        airframe: what the controller is told of the vehicle.
+        tick: the controller's period [s].
+        wanted: bandwidths to begin with.
+        say: told of every loop that had to be slowed down, and why.
+
+    Raises:
+        ValueError: no bandwidth down to a twentieth of what was wanted holds the margins.
+    """
+    plant, now = assumed_airframe(airframe, model), wanted
+    first: dict[str, str] = {}
+    for _ in range(ATTEMPTS):
+        wrong = shortfalls(open_loops(build(gain_set(model, now).plain(), airframe), plant, tick, DELAY))
+        if not wrong:
+            for loop, was in wanted._asdict().items():
+                if (value := getattr(now, loop)) < was:
+                    say(f"{loop}: backed off from {was:.3g} to {value:.3g} rad/s ({first[loop]})")
+            return now
+        slower = {}
+        for name, why in wrong.items():
+            loop = _owner(name, wrong)
+            first.setdefault(loop, f"{name}: {why}")
+            slower[loop] = BACK_OFF * getattr(now, loop)
+        now = now._replace(**slower)
+    name, why = next(iter(wrong.items()))
+    raise ValueError(f"no gains with {PHASE:g} deg and {GAIN:g} dB found: {name}: {why}; ask for lower bandwidths")
+
+
+def _owner(name: str, wrong: dict[str, str]) -> str:
+    """The bandwidth that is to blame for a loop: of a cascade the inner one first."""
+    if name in ("altitude", "yaw"):
+        return name
+    return "attitude" if {"roll", "pitch"} & wrong.keys() else "position"
+
+
+def _decibel(factor: float) -> float:
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")

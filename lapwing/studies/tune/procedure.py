@@ -1,0 +1,115 @@
+"""The whole of `lapwing tune`: a linear model, the gains that are there, a design for margins, a polish in flight."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from lapwing.cosim.scene import Scene
+from lapwing.services.autopilot.control import Parameters
+from lapwing.services.autopilot.controller_parameters import Airframe, build
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.margins import Margins, margins, open_loops
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.autopilot.schema import Autopilot
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import follows_trajectory
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.studies.campaign.campaign_config import campaign_setup
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.tune import corners, gain_refinement
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
+from lapwing.studies.tune.identify import Identified, identify
+from lapwing.studies.tune.linearise import Hover, hover
+
+
+class Judged(NamedTuple):
+    """A gain set and what it is worth."""
+
+    name: str
+    parameters: Parameters
+    margins: dict[str, Margins]
+    shortfalls: dict[str, str]
+
+
+class Tuned(NamedTuple):
+    """What has been found."""
+
+    scene: str
+    tick: float  # [s] the controller's period
+    compiled: Hover  # from the model
+    identified: Identified | None  # from a log
+    assumed: Airframe  # what the design is for
+    before: Judged
+    after: Judged
+    gains: GainSet
+    polished: gain_refinement.Polished | None  # None where nothing is flown along
+    corners: dict[corners.Corner, gain_refinement.Figures]
+
+    @property
+    def model(self) -> Hover:
+        """The linear model that was designed for."""
+        return self.identified.model if self.identified else self.compiled
+
+
+def tune(
+    scene: Scene,
+    wanted: Bandwidths,
+    say: Callable[[str], None],
+    log: Path | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Tuned:
+    """Design a gain set for the scene's vehicle about hover, and polish it on the scene's flight.
+
+    Args:
+        scene: whose vehicle, path and wind.
+        wanted: bandwidths to begin with.
+        say: told of everything that is not as it ought to be.
+        log: a flight to identify the plant from, instead of linearising the compiled model.
+        progress: called after every gain set that was flown.
+
+    Raises:
+        ValueError: the scene has no autopilot, its vehicle cannot hover, the log does not tell enough, or no gains hold
+            the margins.
+    """
+    if not scene.has(Autopilot):
+        raise ValueError(f"{scene.path}: has no [autopilot] to tune; expected a scene whose vehicle it flies")
+    for name, value in wanted._asdict().items():
+        if not 0.0 < value < float("inf"):
+            raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
+    airframe, tick, config = known_airframe(scene), scene[Exchange].interval, scene[Autopilot]
+    own = build(scene[GainSet].plain(), airframe)
+    compiled = hover(scene)
+    identified = identify(Flight.read(log), own, compiled) if log else None
+    model = identified.model if identified else compiled
+    plant = assumed_airframe(airframe, model)
+    before = _judged(config.gains, own, plant, tick)
+    for name, why in before.shortfalls.items():
+        say(f"warning: gains {config.gains}: {name}: {why}")
+    reached = design(model, airframe, tick, wanted, say)
+    gains, polished, at_corners = gain_set(model, reached), None, {}
+    if follows_trajectory(scene) and scene[Vehicle].model == "reduced" and not config.operator:
+        polished = gain_refinement.polish(scene, model, airframe, tick, reached, progress)
+        gains = polished.gains
+        setup = corners.with_gains(campaign_setup(scene), gains)
+        at_corners = {c: corners.flown(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
+    else:
+        say("not polished: there is no [trajectory] that the vehicle flies along by itself")
+    after = _judged("new", build(gains.plain(), airframe), plant, tick)
+    return Tuned(scene.name, tick, compiled, identified, plant, before, after, gains, polished, at_corners)
+
+
+def _judged(name: str, parameters: Parameters, plant: Airframe, tick: float) -> Judged:
+    loops = open_loops(parameters, plant, tick, DELAY)
+    return Judged(name, parameters, {loop: margins(response) for loop, response in loops.items()}, shortfalls(loops))
+
+
+def write(path: Path, gains: GainSet) -> None:
+    """Write a gain set as a scene can name it."""
+    lines = ["# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
+    for key, value in gains.model_dump().items():
+        if isinstance(value, tuple):
+            value = list(value)
+        text = f'"{value}"' if isinstance(value, str) else str(value).lower()
+        lines.append(f"{key} = {text}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

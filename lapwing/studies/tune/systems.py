@@ -1,0 +1,43 @@
+"""The loops about hover as systems of python-control: Bode plots, margins and step responses."""
+
+from typing import Any, NamedTuple
+
+import control
+import numpy as np
+
+from lapwing.services.autopilot.control import Parameters
+from lapwing.services.autopilot.controller_parameters import Airframe
+from lapwing.services.autopilot.margins import loops
+
+PADE = 3  # order of the approximation of the delay: 3e-5 off up to 200 rad/s
+CANCEL = 1e-6  # relative distance of poles and zeros that cancel
+AXES = {"z": "altitude", "yaw": "yaw", "x": "x", "y": "y"}  # what a setpoint moves, and the loop that closes it
+
+
+class Stepped(NamedTuple):
+    """Response of an axis to a unit step of its setpoint, nothing fed forward."""
+
+    time: np.ndarray  # [s]
+    value: np.ndarray
+    rise: float  # [s] from a tenth to nine tenths
+    overshoot: float  # ratio
+    settling: float  # [s] until it stays within 2 %
+
+
+def systems(p: Parameters, airframe: Airframe, tick: float, delay: int) -> dict[str, Any]:
+    """Open loops as transfer functions; arguments as of `lapwing.services.autopilot.margins.open_loops`."""
+    s = control.tf("s")
+    late = control.tf(*control.pade((delay + 0.5) * tick, PADE))
+    return {name: control.minreal(loop, CANCEL, verbose=False) for name, loop in loops(p, airframe, s, late).items()}
+
+
+def closed(loop: Any) -> Any:
+    """The loop closed by unit feedback."""
+    return control.minreal(loop / (1.0 + loop), CANCEL, verbose=False)
+
+
+def step(loop: Any, seconds: float = 5.0) -> Stepped:
+    """Step response of the closed loop."""
+    time, value = control.step_response(closed(loop), np.linspace(0.0, seconds, 1001))
+    found = control.step_info(value, time, yfinal=1.0)
+    return Stepped(time, value, found["RiseTime"], found["Overshoot"] / 100.0, found["SettlingTime"])

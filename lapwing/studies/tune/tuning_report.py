@@ -1,0 +1,93 @@
+"""The page of `lapwing tune`: margins, Bode plots and step responses before and after, and what was flown."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+
+from lapwing.studies.report.page import render
+from lapwing.studies.report.plot import Level, Line, Panel, Plot
+from lapwing.studies.report.sections import Section
+from lapwing.studies.report.style import BOUND, FLOWN, QUIET, REFERENCE
+from lapwing.studies.tune.console_output import tables
+from lapwing.studies.tune.design import DELAY
+from lapwing.studies.tune.procedure import Judged, Tuned
+from lapwing.studies.tune.systems import AXES, step, systems
+
+OMEGA = np.geomspace(0.2, 500.0, 1200)  # [rad/s]
+SHOWN = {
+    "altitude": "altitude",
+    "yaw": "yaw",
+    "pitch": "pitch (inner)",
+    "x": "x (outer)",
+    "x_plant_input": "x, at the plant input",
+}
+LOOKS = ((REFERENCE, "dash"), (FLOWN, "solid"))  # of before and after
+
+
+def write(path: Path, found: Tuned) -> None:
+    """Write the page."""
+    both = (found.before, found.after)
+    loops = [systems(j.parameters, found.assumed, found.tick, DELAY) for j in both]
+    sections = [
+        Section("bode", "Open loops", _bode(both, loops)),
+        Section("steps", "Steps of the setpoint", _steps(both, loops)),
+    ]
+    page = render(
+        "tuning.html", title=f"{found.scene}: gains", tables=list(tables(found)), sections=sections, gains=found.gains
+    )
+    path.write_text(page, encoding="utf-8")
+
+
+_BODE = (
+    "From the error to what answers it, with the motors' lag and the delay of sampling. Dots: where the gain is one; "
+    "the phase margin is what is left above -180 degrees there. Shown are gains of 0.001 to 1000 and phases of -360 to "
+    "-30 degrees; what lies beyond is found by dragging an axis."
+)
+_STEPS = "Linear, about hover, nothing fed forward: what feedback alone makes of a unit step."
+
+
+def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+    panels = []
+    for column, (name, title) in enumerate(SHOWN.items()):
+        sizes: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
+        phases: list[Line | Level] = [Level(-180.0, colour=BOUND, dash="solid")]
+        for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
+            response = control.frequency_response(systems_of[name], OMEGA)
+            phase = np.degrees(np.unwrap(response.phase))
+            crossover = judged.margins[name].crossover
+            at = float(np.clip(crossover, OMEGA[0], OMEGA[-1]))  # for a loop that has one
+            phase -= 360.0 * math.ceil(np.interp(math.log(at), np.log(OMEGA), phase) / 360.0)  # in (-360, 0] there
+            sizes.append(Line(OMEGA, np.asarray(response.magnitude), judged.name, colour, dash=dash))
+            phases.append(Line(OMEGA, phase, judged.name, colour, dash=dash))
+            crossing = float(np.interp(math.log(at), np.log(OMEGA), phase))
+            for marks, y in ((sizes, 1.0), (phases, crossing)) if at == crossover else ():
+                marks.append(Line(np.array([at]), np.array([y]), colour=colour, marker="circle", joined=False))
+        place: dict[str, Any] = {"column": column, "timed": False, "log_x": True}
+        label = ("gain", "phase [°]") if column == 0 else ("", "")
+        panels.append(Panel(tuple(sizes), label[0], title=title, log_y=True, y_range=(1e-3, 1e3), **place))
+        panels.append(Panel(tuple(phases), label[1], "frequency [rad/s]", row=1, y_range=(-360.0, -30.0), **place))
+    return Plot(tuple(panels), _BODE, 5.4, (1.0, 1.0), (1.0,) * len(SHOWN))
+
+
+def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+    panels = []
+    for column, (axis, loop) in enumerate(AXES.items()):
+        marks: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
+        said = []
+        for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
+            seconds = 1.5 if axis == "yaw" else 4.0
+            inner = f"{loop}_plant_input"  # an outer loop falls with its inner one
+            if "unstable" in (judged.shortfalls.get(loop), judged.shortfalls.get(inner)):
+                said.append(f"{judged.name}: unstable")
+                continue
+            found = step(systems_of[loop], seconds)
+            said.append(f"{judged.name}: {found.rise:.2g} s, {100.0 * found.overshoot:.0f} % over")
+            marks.append(Line(np.asarray(found.time), np.asarray(found.value), judged.name, colour, dash=dash))
+        label = "response to a unit step" if column == 0 else ""
+        top = 1.35 * max([1.0, *(float(mark.y.max()) for mark in marks if isinstance(mark, Line))])  # room for the note
+        place: dict[str, Any] = {"column": column, "timed": False, "y_range": (-0.05, top)}
+        panels.append(Panel(tuple(marks), label, "time [s]", title=axis, note="\n".join(said), **place))
+    return Plot(tuple(panels), _STEPS, 3.4, widths=(1.0,) * len(AXES))

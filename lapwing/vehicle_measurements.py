@@ -1,0 +1,158 @@
+"""What must be measured of a multirotor to make an airframe of it, how, and what it is likely to be."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from lapwing.dynamics.config_error import KeyedError
+
+Values = Mapping[str, float]
+CELL_VOLTAGE = 3.7  # [V] nominal
+ROTORS = (4, 6, 8)
+
+
+class Figure(NamedTuple):
+    """A figure to be measured."""
+
+    name: str
+    unit: str
+    guess: Callable[[Values], float]  # from those before it
+    how: str
+    least: float = 0.0
+    most: float = math.inf
+    zero: bool = False  # whether the least itself will do
+    far: float = 8.0  # factor from the guess beyond which the unit may be another one: rpm are 9.5 times as many
+
+    def check(self, value: float) -> None:
+        """KeyedError for a value that cannot be."""
+        if self.unit == "count" and not float(value).is_integer():
+            raise KeyedError(self.name, f"got {value:g}", "a whole number")
+        if self.name == "rotors" and value not in ROTORS:
+            raise KeyedError(self.name, f"got {value:g}", "4, 6 or 8; write others into the file by hand")
+        if not (self.least < value or (self.zero and value == self.least)) or not value < self.most:
+            low = f"{'from' if self.zero else 'above'} {self.least:g}"
+            high = f" and below {self.most:g}" if self.most < math.inf else ""
+            raise KeyedError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
+
+    def doubt(self, value: float, guess: float) -> str:
+        """What to ask of a value that is far from its guess; "" of one that is not."""
+        if not (value > 0.0 and guess > 0.0) or 1.0 / self.far <= value / guess <= self.far:
+            return ""
+        return f"{self.name} = {value:g} {self.unit}, where about {guess:.2g} is usual: is that the unit?"
+
+
+FIGURES = (
+    Figure("mass", "kg", lambda v: 2.0, "All of it, with battery and payload, on scales.", most=1e4, far=100.0),
+    Figure("payload", "kg", lambda v: 0.0, "The part of the mass that is let go in flight.", zero=True),
+    Figure("rotors", "count", lambda v: 4.0, "4, 6 or 8, on a circle, with two of them side by side in front."),
+    Figure("arm", "m", lambda v: 0.16 * v["mass"] ** 0.5, "From the centre of mass to a hub, with a ruler.", most=1e2),
+    Figure(
+        "inertia_x",
+        "kg m^2",
+        lambda v: 0.2 * v["mass"] * v["arm"] ** 2,
+        "Hang it by two parallel wires of length L, b apart, with body x (ahead) vertical, and time a swing T: "
+        "m g b^2 T^2 / (16 pi^2 L).",
+    ),
+    Figure("inertia_y", "kg m^2", lambda v: 1.1 * v["inertia_x"], "The same with body y (left) vertical."),
+    Figure(
+        "inertia_z",
+        "kg m^2",
+        lambda v: 0.9 * (v["inertia_x"] + v["inertia_y"]),
+        "The same with body z (up) vertical; of a flat frame nearly the sum of the other two, and not more.",
+    ),
+    Figure(
+        "diameter",
+        "m",
+        lambda v: 1.12 * v["arm"] * (4.0 / v["rotors"]) ** 0.5,
+        "Of the propeller, printed on it: inches times 0.0254.",
+        most=1e2,
+    ),
+    Figure("pitch", "m", lambda v: 0.45 * v["diameter"], "Printed beside the diameter: inches times 0.0254.", most=1e2),
+    Figure("blades", "count", lambda v: 2.0, "Of one propeller.", most=20.0),
+    Figure("stand_density", "kg/m^3", lambda v: 1.225, "Of the air at the thrust stand: pressure / (287.05 T [K])."),
+    Figure(
+        "stand_speed",
+        "rad/s",
+        lambda v: 160.0 / v["diameter"],
+        "One propeller on a thrust stand, at about the thrust of hover; its speed by tachometer: rpm times 0.10472.",
+    ),
+    Figure("stand_thrust", "N", lambda v: _thrust(v), "Thrust on the stand at that speed."),
+    Figure(
+        "stand_torque",
+        "N m",
+        lambda v: 0.072 * v["stand_thrust"] * v["diameter"],
+        "Torque on the stand at that speed.",
+    ),
+    Figure(
+        "rotor_inertia",
+        "kg m^2",
+        lambda v: 6.0e-5 * (v["diameter"] / 0.254) ** 5,
+        "Propeller and bell about the shaft: two threads at the tips, as for the vehicle.",
+    ),
+    Figure("cells", "count", lambda v: max(3.0, round(2.8 * v["mass"] ** 0.5)), "Of the battery in series.", most=1e3),
+    Figure("capacity", "mAh", lambda v: 10_000.0 * v["mass"] / v["cells"], "Printed on the battery."),
+    Figure("c_rating", "C", lambda v: 30.0, "Printed on the battery."),
+    Figure(
+        "cell_resistance",
+        "ohm",
+        lambda v: 20.0 / v["capacity"],
+        "A step of load on the warm, half-charged battery: drop of voltage over current and cells.",
+        zero=True,
+    ),
+    Figure(
+        "speed_constant",
+        "rpm/V",
+        lambda v: 1.75 * _hover(v) * 30.0 / math.pi / (CELL_VOLTAGE * v["cells"]),
+        "KV: the motor without propeller, rpm over (V - R I).",
+    ),
+    Figure("gear_ratio", "-", lambda v: 1.0, "Propeller speed over motor speed; 1 for direct drive."),
+    Figure("no_load_current", "A", lambda v: 0.6, "In the same run, without propeller.", zero=True),
+    Figure(
+        "resistance",
+        "ohm",
+        lambda v: 0.07 * (CELL_VOLTAGE * v["cells"]) ** 2 / _hover_power(v),
+        "Between two leads of the motor, four wires, with the leads of the controller.",
+    ),
+    Figure(
+        "esc_current",
+        "A",
+        lambda v: 6.0 * _hover_power(v) / (CELL_VOLTAGE * v["cells"]),
+        "Printed on the speed controller.",
+    ),
+    Figure(
+        "time_constant",
+        "s",
+        lambda v: 0.05 * v["diameter"] ** 0.5,
+        "A step of throttle by 10 % about hover, propeller mounted: time to 63 % of the change of speed.",
+    ),
+    Figure("foot_depth", "m", lambda v: 0.7 * v["arm"], "From the centre of mass down to the ground, standing."),
+    Figure(
+        "foot_distance",
+        "m",
+        lambda v: 0.75 * v["arm"],
+        "From the centre of mass to a foot, seen from above; four feet, at the corners of a square.",
+    ),
+    Figure(
+        "drag_area",
+        "m^2",
+        lambda v: 0.5 * v["arm"] ** 2,
+        "Level flight at a steady speed v in still air at a tilt a: 2 m g tan(a) / (1.225 v^2).",
+        zero=True,
+    ),
+)
+
+
+def _thrust(v: Values) -> float:
+    """Guessed thrust [N] on the stand: 5.1 N for 10 inches at 628.3 rad/s, scaled with density, speed and diameter."""
+    return 5.1 * v["stand_density"] / 1.225 * (v["stand_speed"] / 628.3) ** 2 * (v["diameter"] / 0.254) ** 4
+
+
+def _hover(v: Values) -> float:
+    """Rotor speed [rad/s] in hover."""
+    return v["stand_speed"] * math.sqrt(v["mass"] * 9.80665 / v["rotors"] / v["stand_thrust"])
+
+
+def _hover_power(v: Values) -> float:
+    """Of one rotor in hover, at its shaft [W]."""
+    speed = _hover(v)
+    return v["stand_torque"] * (speed / v["stand_speed"]) ** 2 * speed

@@ -1,0 +1,212 @@
+"""All messages of a topic as columns, by dotted field name."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.messages.cdr_arrays import number_fields, record_dtype, unknown_field
+from lapwing.messages.cdr_layout import ENCAPSULATION, Layout
+
+Column = np.ndarray | list[Any]
+
+PAGE = 4096  # messages
+
+
+class _Group(NamedTuple):
+    """The messages of one shape."""
+
+    places: np.ndarray  # among all messages, int64, shape (m,)
+    layout: Layout
+    records: np.ndarray  # shape (m,)
+
+
+class History(Mapping[str, Column]):
+    """The columns of n messages; each is put together when it is asked for.
+
+    - A number: shape (n,). An array, a sequence of numbers, or a message within the message that holds float64 only:
+      shape (n, k); a sequence whose length varies: object array of n arrays. A sequence of k such messages: (n, k, 3).
+    - A string: list of n str. A sequence of strings: list of n tuples.
+    - An element of a sequence has its number in the name: "pose.0.position".
+
+    What not every message has, "pose.2" where some have two poses, is no column: KeyError says so.
+    """
+
+    def __init__(self, message: Any, groups: Sequence[_Group]) -> None:
+        """Messages of a class, sorted by shape; see `history` and `history_of_pages`."""
+        self.message = message
+        self.count = sum(len(group.places) for group in groups)
+        self._groups = groups
+        tables = [_columns(group) for group in self._groups]
+        self._names = [name for name in tables[0] if all(name in table for table in tables[1:])]
+        self._partly = {name for table in tables for name in table}.difference(self._names)
+
+    def __getitem__(self, name: str) -> Column:
+        """A column.
+
+        Raises:
+            KeyError: there is no such field, or not in every message.
+            ValueError: a string is not UTF-8.
+        """
+        if name in self._partly:
+            raise KeyError(f"{self.message.type_name}: field {name} is not in every message")
+        if name not in self._names:
+            raise KeyError(f"{self.message.type_name}: {unknown_field(name, tuple(self._names))}")
+        if name in number_fields(self._groups[0].records.dtype):
+            return self._numbers(name)
+        texts: list[Any] = [None] * self.count
+        for group in self._groups:
+            for place, text in zip(group.places.tolist(), _texts(group, name), strict=True):
+                texts[place] = text
+        return texts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return history, (self.message, self.payloads())
+
+    def payloads(self) -> list[bytes]:
+        """The messages in their order, as CDR."""
+        found = [b""] * self.count
+        for group in self._groups:
+            for place, row in zip(group.places.tolist(), _bytes(group.records), strict=True):
+                found[place] = row.tobytes()
+        return found
+
+    def _numbers(self, name: str) -> np.ndarray:
+        parts = [group.records[name] for group in self._groups]
+        shapes = {part.shape[1:] for part in parts}
+        shape = shapes.pop()
+        if not shapes:
+            column = np.empty((self.count, *shape), parts[0].dtype.newbyteorder("="))
+            for group, part in zip(self._groups, parts, strict=True):
+                column[group.places] = part
+            return column
+        column = np.empty(self.count, object)
+        for group, part in zip(self._groups, parts, strict=True):
+            for place, value in zip(group.places.tolist(), part.copy(), strict=True):
+                column[place] = value
+        return column
+
+
+def history(message: Any, payloads: Sequence[bytes]) -> History:
+    """Messages of one type as columns by dotted field name.
+
+    Args:
+        message: the message class.
+        payloads: CDR, in the order of the columns; strings and sequences may differ in length.
+
+    Raises:
+        ValueError: a payload is not a message of the class.
+    """
+    return History(message, list(_groups(message, payloads)))
+
+
+class Gathered:
+    """Messages of one type as they come, put together page by page: so that no more than a page is there twice."""
+
+    def __init__(self, message: Any) -> None:
+        self._message, self._groups = message, list[_Group]()
+        self._times: list[np.ndarray] = []
+        self._waiting: list[tuple[int, bytes]] = []
+        self._count = 0
+
+    def add(self, time_ns: int, payload: bytes) -> None:
+        """One more, as CDR; ValueError if a message of its page is none of the class."""
+        self._waiting.append((time_ns, payload))
+        if len(self._waiting) == PAGE:
+            self._put_together()
+
+    def history(self) -> tuple[np.ndarray, History]:
+        """Times [ns], int64, shape (n,), and columns of all that have come, as of `history`."""
+        if self._waiting or not self._groups:
+            self._put_together()
+        return np.concatenate(self._times), History(self._message, self._groups)
+
+    def _put_together(self) -> None:
+        times, payloads = zip(*self._waiting, strict=True) if self._waiting else ((), ())
+        self._times.append(np.array(times, np.int64))
+        self._groups += [
+            group._replace(places=group.places + self._count) for group in _groups(self._message, payloads)
+        ]
+        self._count += len(times)
+        self._waiting.clear()
+
+
+def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> History:
+    """The same from pages of messages that have one shape each.
+
+    Args:
+        message: the message class.
+        pages: places of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
+    """
+    groups = []
+    for places, payloads in pages:
+        rows = payloads if payloads.dtype == np.uint8 else _bytes(payloads)
+        layout = message.layouts.measure(rows[0].tobytes())
+        groups.append(_Group(places, layout, rows.view(record_dtype(layout)).reshape(len(rows))))
+    return History(message, groups or list(_groups(message, ())))
+
+
+def _bytes(records: np.ndarray) -> np.ndarray:
+    """Records (m,) as uint8, shape (m, size)."""
+    return records.view(np.uint8).reshape(len(records), records.dtype.itemsize)
+
+
+def _groups(message: Any, payloads: Sequence[bytes]) -> Iterator[_Group]:
+    """The messages by shape. All payloads of a size are compared with one layout at once."""
+    if not payloads:
+        layout = message.layouts.measure(message().encode())
+        yield _Group(np.empty(0, np.int64), layout, np.empty(0, record_dtype(layout)))
+    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
+    for size in dict.fromkeys(sizes.tolist()):
+        places = np.flatnonzero(sizes == size)
+        joined = b"".join(payloads if len(places) == len(payloads) else [payloads[k] for k in places.tolist()])
+        rows = np.frombuffer(joined, np.uint8).reshape(len(places), size)
+        while len(places):
+            layout = message.layouts.measure(rows[0].tobytes())
+            same = _fits(layout, rows)
+            fitting = rows if same.all() else rows[same]
+            yield _Group(places[same], layout, fitting.view(record_dtype(layout)).reshape(len(fitting)))
+            places, rows = places[~same], rows[~same]
+
+
+def _fits(layout: Layout, rows: np.ndarray) -> np.ndarray:
+    """Whether payloads as long as the layout, shape (m, size), belong to it; see `Layout.fits`."""
+    lengths = [(0, ENCAPSULATION), *((e.offset, e.length) for e in layout.entries if e.kind == "length")]
+    found = np.ones(len(rows), bool)
+    for offset, value in lengths:
+        found &= np.ascontiguousarray(rows[:, offset : offset + 4]).view("<u4")[:, 0] == value
+    return found
+
+
+def _columns(group: _Group) -> dict[str, None]:
+    """Names of all that a group has, in order of the payload; numbers first."""
+    texts = [e.name for e in group.layout.entries if e.kind == "string" or e.base == "string[]"]
+    return dict.fromkeys([*number_fields(group.records.dtype), *texts])
+
+
+def _texts(group: _Group, name: str) -> list[Any]:
+    """A field's strings, or tuples of strings, of each message of a group."""
+    found = {entry.name: entry for entry in group.layout.entries if entry.name == name}
+    entry = found[name]  # the last of its name: a string stands behind its length
+    if entry.kind == "length":
+        elements = [_texts(group, f"{name}.{k}") for k in range(entry.length)]
+        return list(zip(*elements, strict=True)) if elements else [()] * len(group.records)
+    size = max(entry.length - 1, 0)
+    if not size:
+        return [""] * len(group.records)
+    rows = _bytes(group.records)
+    raw = np.ascontiguousarray(rows[:, entry.offset : entry.offset + size]).view(f"V{size}")[:, 0].tolist()
+    try:
+        decoded = {text: text.decode() for text in set(raw)}
+    except UnicodeDecodeError as fault:
+        raise ValueError(f"field {name}: a string is not UTF-8: {fault}") from None
+    return [decoded[text] for text in raw]

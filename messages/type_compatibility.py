@@ -1,0 +1,58 @@
+"""Whether a message type as a log defines it is the one that this version has."""
+
+from lapwing.messages.parse import PRIMITIVES, Definition, parse
+from lapwing.messages.types import DEFINITIONS, TYPES
+
+_BAR = "=" * 80  # between the types of a schema, as ROS 2 writes it
+_HEAD = "MSG: "
+
+
+def otherwise(type_name: str, text: str) -> str:
+    """First difference between a recorded definition and ours, in words; "" where both read the same.
+
+    Comments, constants and defaults are not part of a message. A type that is not ours has no difference.
+
+    Args:
+        type_name: full name, "sensor_msgs/msg/Imu".
+        text: the recorded definition, in the schema encoding `ros2msg`.
+    """
+    if type_name not in TYPES or not text.strip() or text == TYPES[type_name].schema_text:
+        return ""
+    try:
+        theirs = _fields(type_name, _definitions(type_name, text))
+    except (ValueError, LookupError):
+        return "has a definition that cannot be read"
+    ours = _fields(type_name, DEFINITIONS)
+    for here, there in zip([*ours, ("", "")], [*theirs, ("", "")], strict=False):
+        if here != there:
+            wanted, found = (" ".join(field).strip() or "no more fields" for field in (here, there))
+            return f"has {found} where this version has {wanted}"
+    return ""
+
+
+def _definitions(type_name: str, text: str) -> dict[str, Definition]:
+    """The types of a schema by full name."""
+    found = {}
+    for k, part in enumerate(text.replace("\r", "").split(f"{_BAR}\n")):
+        name, own = type_name, part
+        if k:
+            head, _, own = part.partition("\n")
+            package, _, short = head.removeprefix(_HEAD).strip().partition("/")
+            name = f"{package}/msg/{short.removeprefix('msg/')}"
+        found[name] = parse(name, own)
+    return found
+
+
+def _fields(type_name: str, known: dict[str, Definition], prefix: str = "") -> list[tuple[str, str]]:
+    """Type and dotted name of every field of a type down to its numbers and texts; types of one layout are one."""
+    found = []
+    for field in known[type_name].fields:
+        array = "" if field.length is None else f"[{field.length or ''}]"
+        if field.nested:
+            found += _fields(field.base, known, f"{prefix}{field.name}{array}.")
+        else:
+            found.append((_NAMES.get(PRIMITIVES.get(field.base, ""), field.base) + array, f"{prefix}{field.name}"))
+    return found
+
+
+_NAMES = {layout: name for name, layout in PRIMITIVES.items() if name not in ("byte", "char")}

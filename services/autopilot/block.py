@@ -1,0 +1,129 @@
+"""The controller of a tick, compiled: estimate and setpoint in, motor voltages and what the autopilot does out."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import leaf, uncompiled
+from lapwing.services.autopilot import control, interface, motor_failure
+from lapwing.services.autopilot.commander_wakeup import battery_warning
+from lapwing.services.autopilot.land_detector import FLYING, ON_GROUND
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate
+
+ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
+NO_TRAJECTORY = "no_trajectory"  # stands for that of the trajectory where there is none; never written
+
+
+class Order(NamedTuple):
+    """What the commander asks of the controller, until it asks for something else."""
+
+    follow: bool = True  # the scene's trajectory, instead of `reference`
+    reference: Reference = Reference()
+    words: int = 0  # number of the commander's words
+    armed: bool = False
+    finished: bool = False  # the run may end
+    released: bool = False  # the gripper is to be open
+    restart_at: int = -1  # [tick] at which the controller begins afresh, on the ground
+
+
+class Flight(NamedTuple):
+    """Where the flight is after a tick."""
+
+    stage: int = ON_GROUND  # ON_GROUND, FLYING or LANDED
+    still_from: int = 0  # [tick] from which a vehicle that stands does not move
+    failed_motor: int = 0  # number from 1; 0: none
+
+
+class Controller(NamedTuple):
+    """The control law on its vehicle."""
+
+    law: Any  # cell of `control.Parameters`
+    watch: motor_failure.Parameters
+    thresholds: Any  # cell of `BatteryThresholds`
+    interval: float  # [s] a tick
+    bounce: int  # ticks after a touch-down in which the vehicle may still move
+
+
+class ControllerState(NamedTuple):
+    """Memory of the controller."""
+
+    control: control.State
+    watch: motor_failure.State
+    still_from: int  # [tick]
+    charge: float  # of the battery, fraction; NaN: not known
+
+
+def start(p: Controller) -> ControllerState:
+    """Before the first tick."""
+    return ControllerState(control.START, uncompiled(motor_failure.start)(p.watch), 0, float("nan"))
+
+
+@leaf
+def setpoint_of(wanted: Reference) -> interface.Setpoint:
+    """What the control law is asked for."""
+    return interface.Setpoint(
+        wanted.position_world, wanted.velocity_world, wanted.acceleration_world, wanted.yaw, wanted.yaw_rate
+    )
+
+
+@leaf
+def estimate_of(e: StateEstimate) -> interface.Estimate:
+    """What the control law believes."""
+    return interface.Estimate(e.position_world, e.attitude, e.velocity_world, e.omega_body)
+
+
+@leaf
+def outcome(
+    p: Controller,
+    watched: motor_failure.State,
+    still_from: int,
+    battery_charge: float,
+    order: Order,
+    e: StateEstimate,
+    wanted: Reference,
+    stage: int,
+    c: interface.Command,
+) -> tuple[motor_failure.State, tuple[MotorCommand, Reference, AutopilotStatus, Flight]]:
+    """The motor failure detection after a tick, and what the part gives: command, setpoint, status and flight.
+
+    Args:
+        p: Controller.
+        watched: state of the motor failure detection.
+        still_from: [tick].
+        battery_charge: fraction.
+        order: Order.
+        e: StateEstimate.
+        wanted: Reference that is followed.
+        stage: ON_GROUND, FLYING or LANDED.
+        c: Command of the control law.
+    """
+    height = e.position_world[2] - p.law.value.resting_height
+    watched = motor_failure.step(p.watch, watched, p.interval, e.omega_body, height, c.thrust)
+    flying = stage == FLYING
+    armed = flying if order.follow else order.armed
+    finished = (c.finished and wanted.final) if order.follow else order.finished
+    released = order.released or (order.follow and wanted.release and not flying)
+    attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
+    warning = battery_warning(p.thresholds.value, battery_charge)
+    return watched, (
+        MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
+        wanted,
+        AutopilotStatus(wanted.phase, order.words, armed, not flying, finished, warning, watched.failed, released),
+        Flight(stage, still_from, watched.failed),
+    )
+
+
+@leaf
+def step(
+    p: Controller, s: ControllerState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[ControllerState, tuple, int]:
+    """The command at `tick`."""
+    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
+    wanted = inputs[3].value if order.follow else order.reference
+    controlled, watched, still_from = s.control, s.watch, s.still_from
+    if order.restart_at == tick:
+        controlled, watched, still_from = control.START, motor_failure.start(p.watch), tick + p.bounce
+    charge = battery.value.charge if battery.due else s.charge
+    failed = watched.failed
+    controlled, c = control.step(p.law.value, controlled, p.interval, estimate_of(e), setpoint_of(wanted), failed)
+    watched, outputs = outcome(p, watched, still_from, charge, order, e, wanted, controlled.stage.name, c)
+    return ControllerState(controlled, watched, still_from, charge), outputs, GO_ON

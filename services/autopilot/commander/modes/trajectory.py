@@ -1,0 +1,14 @@
+"""The scene's own `[trajectory]`, setpoint by setpoint."""
+
+from lapwing.services.autopilot.commander.commander_input import Constants
+from lapwing.services.autopilot.commander.flight_mode import FlightMode
+from lapwing.services.autopilot.commander.guidance import Guidance
+
+NAME = "phases"
+
+
+class Mode(FlightMode):
+    """Follows the setpoints of the trajectory; once left, it is not entered again."""
+
+    def __init__(self, constants: Constants, guidance: Guidance, *values: float):
+        raise ValueError("phases: the trajectory of the scene has been left")

@@ -1,0 +1,37 @@
+"""What must be in order before the motors may be armed, in words for people."""
+
+import math
+
+from lapwing.services.autopilot.commander.commander_input import View
+from lapwing.services.autopilot.commander.commander_state import State
+from lapwing.services.autopilot.estimator import SOURCES
+from lapwing.services.autopilot.initial_estimate import NOT_STARTED
+from lapwing.services.common import status_texts
+
+MAXIMUM_TILT = 0.35  # [rad] from the vertical
+MAXIMUM_OUTAGE = 0.5  # [s] of a source: single readings are refused now and then
+_UNCERTAIN = {64: status_texts.POSITION_UNCERTAIN, 128: status_texts.ATTITUDE_UNCERTAIN}
+
+
+def count_outages(view: View, state: State) -> None:
+    """Take in the health of an estimate: how long each source has been lost or refused."""
+    health, interval = view.estimate.health, view.estimate_interval
+    state.source_outage = [t + interval if health >> bit & 1 else 0.0 for bit, t in enumerate(state.source_outage)]
+
+
+def reasons(view: View, state: State) -> list[str]:
+    """Why the vehicle cannot be armed; empty: it can."""
+    estimate, guidance = view.estimate, state.guidance
+    if estimate.health == NOT_STARTED:
+        return [status_texts.NOT_STARTED]
+    bad = (name for name, time in zip(SOURCES, state.source_outage, strict=True) if time > MAXIMUM_OUTAGE)
+    found = [status_texts.NO_READINGS.format(name) for name in bad]
+    found += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
+    q = estimate.attitude
+    if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(MAXIMUM_TILT):
+        found.append(status_texts.NOT_LEVEL)
+    if view.battery_charge < guidance.parameters["BAT_CRIT_THR"]:
+        found.append(f"{status_texts.BATTERY_LOW}: {view.battery_charge:.0%}")
+    if not guidance.fence.allows(*estimate.position_world[:2]):
+        found.append(status_texts.OUTSIDE_FENCE)
+    return found

@@ -1,0 +1,238 @@
+"""The commander as a part of the graph that stays in Python: acts when it is called, at every tick while it steers.
+
+Along the scene's trajectory it is asked only at the ticks at which something may change (`commander.attention`).
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.tick_schedule import KEPT, Port
+from lapwing.kernels.cell import Cell, write
+from lapwing.messages import CommandAcks, header
+from lapwing.messages import topics as topic
+from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
+from lapwing.services.autopilot.commander.commander import Commander
+from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_output import Request, Status
+from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
+from lapwing.services.autopilot.commander_wakeup import LOOK_EVERY
+from lapwing.services.autopilot.controller_parameters import build, lift
+from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
+from lapwing.services.autopilot.failure_injection.motor_failures import Direct
+from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
+from lapwing.services.autopilot.service_config import AutopilotSetup
+from lapwing.services.common import ports
+from lapwing.services.common.autopilot_parameters import with_gains
+from lapwing.services.common.operator_inbox import joined
+from lapwing.services.common.ports import Reference
+
+Operator = Callable[[int], Iterable[Any]]
+
+
+class Texts:
+    """Texts by number; a new one gets the next number."""
+
+    def __init__(self, known: Iterable[Any] = ()):
+        """With `known` texts from 0 on."""
+        self.table = list(known)
+        self._number = {text: i for i, text in enumerate(self.table)}
+
+    def number(self, text: Any) -> int:
+        """The number of a text."""
+        if text not in self._number:
+            self._number[text] = len(self.table)
+            self.table.append(text)
+        return self._number[text]
+
+
+class Commanding:
+    """Shows the commander what it is to see, and puts what it asks for into the port that the controller follows."""
+
+    name = "autopilot.commander"
+
+    def __init__(
+        self,
+        given: AutopilotSetup,
+        law: Cell,
+        thresholds: Cell,
+        service: Service,
+        operator: Operator,
+        injection: Injection,
+    ):
+        """Parameters and failures that change go into their cells.
+
+        Args:
+            given: the autopilot.
+            law: cell of the controller's parameters.
+            thresholds: cell of the battery's.
+            service: gets the messages.
+            operator: gives the commands that have come until a tick.
+            injection: where failures are injected.
+        """
+        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), KEPT),)
+        self.outputs = (Port(ORDER, Order(), KEPT), *unwritten)
+        a = given.airframe
+        self._given, self._law, self._thresholds, self._service, self._operator = (
+            given,
+            law,
+            thresholds,
+            service,
+            operator,
+        )
+        self._weight, self._lift = a.mass * a.gravity, lift(a) / len(a.rotor_x)  # [N]; of 1 N of all rotors' thrusts
+        table = {p.name: p for p in given.parameters}
+        thrust_max = controller(given, {p.name: p.default for p in given.parameters}).thrust_max
+        self._commander = Commander(
+            Constants(
+                table,
+                a.resting_height,
+                a.gravity,
+                self._weight / (lift(a) * thrust_max),
+                bool(given.phases),
+                given.operator,
+                injection.units,
+                len(a.rotor_x),
+            )
+        )
+        self._injection = injection
+        self._battery = injection.received(ports.BATTERY)
+        self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
+        self._driven: tuple[float, ...] | None = None  # voltages from outside that hold
+        self._asked = -1  # [tick] at which the commander was asked last
+        self._estimate: Any = None  # that it is shown
+        self._shown = -1  # [tick] of it
+        self._estimate_every_tick = False
+        self._ordered: Order | None = None  # what stands in the port
+        self._acknowledgements: list[Any] = []
+        self._texts: list[str] = []
+
+    def bind(self, graph: Graph) -> None:
+        """Before the first tick the trajectory is followed."""
+        self._graph = graph
+        self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
+
+    def act(self, tick: int) -> int:
+        """Ask the commander at `tick`."""
+        graph = self._graph
+        if self._given.operator and tick - self._asked > 1:
+            self._skip(range(self._asked + 1, tick))
+        self._asked = tick
+        elapsed = 0.0
+        looked = tick - tick % LOOK_EVERY
+        if tick == looked or self._estimate_every_tick:
+            elapsed = self._interval * (1 if self._estimate_every_tick else LOOK_EVERY)
+            looked = tick
+        if looked > self._shown:
+            self._estimate, self._shown = graph.latest(ports.ESTIMATE, looked), looked
+        flight = self._flight(tick)
+        followed = self._followed(tick) if self._given.phases else None
+        request = self._commander.step(
+            View(
+                self._interval,
+                self._estimate,
+                elapsed,
+                graph.latest(self._battery, tick).charge if graph.has(self._battery) else math.nan,
+                flight.failed_motor,
+                followed,
+                self._thrust(tick),
+                flight.stage == LANDED,
+                self._commands(tick),
+            )
+        )
+        self._estimate_every_tick = request.estimate_every_tick
+        if request.parameters is not None:
+            write(self._law, controller(self._given, dict(request.parameters)))
+            write(self._thresholds, battery_thresholds(request.parameters))
+        if request.faults is not None and self._injection.faults is not None:
+            write(self._injection.faults, request.faults)
+        if self._injection.direct is not None and request.motor_voltage != self._driven:
+            self._driven = request.motor_voltage
+            write(self._injection.direct, self._direct(request.motor_voltage))
+        order = self._order(tick, request, flight)
+        if order != self._ordered:
+            graph.put(ORDER, tick, order)
+            self._ordered = order
+        self._answer(tick, request)
+        return self._next(tick, request.quiet)
+
+    def _next(self, tick: int, quiet: float) -> int:
+        """The tick of the next say, after a request at `tick` that is quiet for so long [s]."""
+        ticks = int(quiet / self._interval) if quiet < math.inf else NEVER
+        if self._given.operator:
+            ticks = min(ticks, *[every - tick % every for every in (LOOK_EVERY, self._given.answers_every)])
+        return min(tick + max(1, ticks), NEVER)
+
+    def _skip(self, missed: range) -> None:
+        """Let the commander take in the ticks since it was asked, in which its request was quiet."""
+        flew = next((tick for tick in reversed(missed) if self._flies(tick)), None)
+        setpoint = None if flew is None else self._followed(flew)
+        self._commander.skip(len(missed), self._interval, flew == missed[-1], setpoint)
+
+    def _flies(self, tick: int) -> bool:
+        """Whether the vehicle flies along the trajectory, as the commander sees it."""
+        return self._thrust(tick) > 0.0 and self._flight(tick).stage != LANDED
+
+    def _flight(self, tick: int) -> Flight:
+        found: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
+        return found
+
+    def _followed(self, tick: int) -> Setpoint:
+        return _setpoint(self._graph.latest(ports.TRAJECTORY, tick))
+
+    def _direct(self, volts: tuple[float, ...] | None) -> Direct:
+        """Voltages from outside within what the motors take; None: the controller's."""
+        if volts is None:
+            return self._injection.released
+        return Direct(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
+
+    def _thrust(self, tick: int) -> float:
+        """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""
+        if not self._weight > 0.0:
+            return 1.0
+        asked = sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
+        return asked * self._lift / self._weight
+
+    def _commands(self, tick: int) -> tuple[Any, ...]:
+        given = self._given
+        if not given.operator or tick % given.answers_every:
+            return ()
+        message = joined(tick * self._interval_ns, self._operator(tick))
+        self._service.messages.append((topic.OPERATOR, tick, message.encode()))
+        return tuple(message.commands)
+
+    def _order(self, tick: int, request: Request, flight: Flight) -> Order:
+        status, wanted = request.status, request.setpoint
+        restart = tick if request.reset_controller and flight.stage != ON_GROUND else -1
+        words = self.words.number(_words(status))
+        if wanted is None:
+            return Order(True, Reference(), words, False, False, status.released, restart)
+        reference = Reference(*wanted, self.phases.number(status.phase), False)
+        return Order(False, reference, words, status.armed, status.finished, status.released, restart)
+
+    def _answer(self, tick: int, request: Request) -> None:
+        self._acknowledgements += request.acknowledgements
+        self._texts += request.texts
+        if self._given.operator and tick % self._given.answers_every == 0:
+            message = CommandAcks(
+                header(tick * self._interval_ns, "world"), tuple(self._acknowledgements), tuple(self._texts)
+            )
+            self._service.messages.append((topic.COMMAND_ACKS, tick, message.encode()))
+            self._acknowledgements.clear()
+            self._texts.clear()
+
+
+def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
+    """The controller's parameters under the commander's `values`."""
+    return build(with_gains(given.gains, values), given.airframe, given.geometric)
+
+
+def _words(status: Status) -> Status:
+    """What is left of a status without all that is numbers in the port."""
+    return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)
+
+
+def _setpoint(r: Reference) -> Setpoint:
+    return Setpoint(r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate)

@@ -1,0 +1,29 @@
+"""What calls the commander, as the compiled parts before it look at it."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.kernels import leaf
+from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, needs_attention
+
+LOOK_EVERY = 5  # ticks between two looks of the commander at the estimate
+
+
+class Attention(NamedTuple):
+    """What the conditions depend on."""
+
+    thresholds: Any  # cell of `BatteryThresholds`, which an operator may change
+
+
+@leaf
+def attention_due(p: Attention, tick: int, health: int, battery: Received, flight: Received) -> bool:
+    """Whether the commander has a say at `tick`; battery and flight as they were received."""
+    charge = battery.value.charge if battery.due else 1.0
+    failed = flight.value.failed_motor if flight.due else 0
+    return needs_attention(p.thresholds.value, health, charge, failed, tick % LOOK_EVERY == 0)
+
+
+@leaf
+def battery_warning(thresholds: BatteryThresholds, charge: float) -> int:
+    """0: none, 1: low, 2: critical, 3: nearly empty; an unknown charge (NaN) is none."""
+    return int(charge < thresholds.low) + int(charge < thresholds.critical) + int(charge < thresholds.emergency)

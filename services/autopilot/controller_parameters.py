@@ -1,0 +1,156 @@
+"""A gain set put on an airframe: the parameters of the controller."""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.effects._types import WakeSlopes
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import uncompiled
+from lapwing.services.autopilot.allocation import demand_effects, effectiveness, in_wakes, tables, tilted_effectiveness
+from lapwing.services.autopilot.angle_reference import Smoothing
+from lapwing.services.autopilot.control import Parameters
+from lapwing.services.autopilot.interface import PerRotor
+from lapwing.services.autopilot.mixer import Shares
+from lapwing.services.autopilot.motor import Motor, thrust_at
+from lapwing.services.autopilot.pid import Pid
+
+Triple = tuple[float, float, float]  # P, I, D
+
+
+class Gains(NamedTuple):
+    """The numbers of a gain set; outputs of altitude, yaw and the inner loops are the force demand of every rotor [N],
+    those of the outer loops are tilts [rad]."""
+
+    altitude: Triple  # over [m]
+    yaw: Triple  # over [rad]
+    roll_inner: Triple  # over [rad] of tilt to the left, which is minus the roll: negative
+    pitch_inner: Triple  # over [rad]
+    roll_outer: Triple  # over [m]
+    pitch_outer: Triple  # over [m]
+    tilt_limit: float  # [rad]
+    reference_bandwidth: float  # of the tilt references' filter [rad/s]
+    reference_damping: float
+    feed_forward: bool  # weight, tilt, setpoint acceleration, and the torque that the tilt references need
+
+
+class Airframe(NamedTuple):
+    """What the controller knows of the vehicle."""
+
+    mass: float  # [kg]
+    inertia_body: Vec3  # principal [kg m^2]
+    rotor_x: PerRotor  # positions of the rotors in body axes [m]
+    rotor_y: PerRotor
+    reaction_sign: PerRotor  # +1 where thrust turns the vehicle to the left about the rotor's axis
+    torque_per_thrust: float  # reaction torque of a rotor over its thrust [m]
+    motor: Motor
+    voltage_max: float  # [V]
+    resting_height: float  # world z of the vehicle's origin when it stands [m]
+    gravity: float = 9.80665  # [m/s^2]
+    spin_up_zero: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
+    rotor_z: PerRotor = ()  # [m] of rotors that have axes
+    rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () where that is body z
+    wakes: WakeSlopes = WakeSlopes()  # of rotors that stand in the wake of others; thrusts are what each has by itself
+
+
+def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
+    """The controller's parameters: the gain set on an airframe; `geometric` takes the attitude error on SO(3).
+
+    Raises ValueError where the airframe cannot hover, or not in balance.
+    """
+    thrust_max = uncompiled(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
+    weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
+    share, needed = shares(airframe), hover_thrust(airframe)
+    if thrust_max <= needed:
+        raise ValueError(
+            f"the rotors give at most {thrust_max:.1f} N each, less than the {needed:.1f} N that hovering needs"
+        )
+    forward = 1.0 if gains.feed_forward else 0.0
+    x, y, z = (forward * i / moment for i, moment in zip(airframe.inertia_body, moments(airframe), strict=True))
+    return Parameters(
+        altitude=Pid(*gains.altitude),
+        yaw=Pid(*gains.yaw),
+        roll_inner=Pid(*gains.roll_inner),
+        pitch_inner=Pid(*gains.pitch_inner),
+        roll_outer=Pid(*gains.roll_outer),
+        pitch_outer=Pid(*gains.pitch_outer),
+        smoothing=Smoothing(gains.reference_bandwidth, gains.reference_damping, forward * airframe.motor.time_constant),
+        tilt_limit=gains.tilt_limit,
+        hover_demand=forward * weight,
+        gravity=airframe.gravity,
+        torque_demands=(x, y, z),
+        geometric=geometric,
+        shares=share,
+        thrust_max=thrust_max,
+        motor=airframe.motor,
+        resting_height=airframe.resting_height,
+    )
+
+
+def hover_thrust(airframe: Airframe) -> float:
+    """Thrust [N] in hover of the rotor that carries the most; by itself, where some stand in the wake of others."""
+    weight = airframe.mass * airframe.gravity / lift(airframe)
+    return weight * max(collective for collective, *_ in shares(airframe)[0])
+
+
+def hover_torque(airframe: Airframe) -> float:
+    """Torque [N m] against the rotor that turns hardest in hover."""
+    gained = max((sum(row) for row in airframe.wakes.torque), default=0.0)
+    return hover_thrust(airframe) * (airframe.torque_per_thrust + max(gained, 0.0))
+
+
+def lift(airframe: Airframe) -> float:
+    """Force along body z [N] of a collective demand of 1 N: the number of rotors where none is tilted."""
+    return _demand_effects(*_geometry(airframe))[0]
+
+
+def moments(airframe: Airframe) -> Vec3:
+    """Torques about body x, y, z [N m] of demands of 1 N."""
+    _, x, y, z = _demand_effects(*_geometry(airframe))
+    return x, y, z
+
+
+def shares(airframe: Airframe) -> tuple[Shares, ...]:
+    """Each rotor's share of the demands, as of `allocation.tables`."""
+    return _tables(*_geometry(airframe))
+
+
+def rotor_effectiveness(a: Airframe) -> np.ndarray:
+    """Force along body z [N] and torques [N m] of 1 N of thrust of every rotor, as of `allocation.effectiveness`."""
+    return _effectiveness(*_geometry(a))
+
+
+def _geometry(a: Airframe) -> tuple:
+    """All that the rotors' effectiveness depends on: the arguments of `_effectiveness`."""
+    return a.rotor_x, a.rotor_y, a.rotor_z, a.rotor_axis, a.reaction_sign, a.torque_per_thrust, a.wakes
+
+
+def _effectiveness(
+    x: PerRotor, y: PerRotor, z: PerRotor, axes: tuple, signs: PerRotor, torque: float, wakes: WakeSlopes
+) -> np.ndarray:
+    def alone(torque: float) -> np.ndarray:
+        reaction = tuple(sign * torque for sign in signs)
+        if axes:
+            return tilted_effectiveness(tuple(zip(x, y, z, strict=True)), axes, reaction)
+        return effectiveness(x, y, reaction)
+
+    if not wakes.thrust:
+        return alone(torque)
+    return in_wakes(alone(0.0), alone(1.0) - alone(0.0), torque, wakes)
+
+
+# asked for several times at a start, and by every run of a campaign
+@lru_cache(maxsize=16)
+def _demand_effects(*geometry: Any) -> tuple[float, ...]:
+    return tuple(map(float, demand_effects(_effectiveness(*geometry))))
+
+
+@lru_cache(maxsize=16)
+def _tables(*geometry: Any) -> tuple[Shares, ...]:
+    B = _effectiveness(*geometry)
+    x, y, z, axes, signs, torque, wakes = geometry
+    if not wakes.thrust:
+        return tables(B)
+    # so weighed, all rotors hover at one speed, about which the slopes hold
+    return tables(B, B[0] / _effectiveness(x, y, z, axes, signs, torque, WakeSlopes())[0])

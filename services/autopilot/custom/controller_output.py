@@ -1,0 +1,123 @@
+"""What a controller of the user's asks for, and its way to the motors."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import define, each, implements
+from lapwing.services.autopilot import control
+from lapwing.services.autopilot.interface import Command, PerRotor
+from lapwing.services.autopilot.land_detector import FLYING, LANDED
+from lapwing.services.autopilot.mixer import Demands, at_rest, mix, possible, saturate, shares_in_force
+from lapwing.services.autopilot.motor import Motor, thrust_at, voltages
+from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
+
+DEMAND = "demand"  # port within the autopilot
+
+Wrench = tuple[float, float, float, float]
+NO_WRENCH = (0.0, 0.0, 0.0, 0.0)
+
+
+class Demand(NamedTuple):
+    """Either voltages, or thrust and moments, as numbers."""
+
+    to_motors: bool
+    volts: PerRotor  # [V] of each motor; or
+    wrench: Wrench  # thrust [N] and moments about body x, y, z [N m]
+    roll_pitch: tuple[float, float]  # [rad] that the controller steers to
+
+
+def off(rotors: int) -> Demand:
+    """What stops the motors."""
+    return Demand(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
+
+
+def demand(output: Any, none: PerRotor) -> Demand:
+    """The demand of a `MotorVoltages` or `ThrustAndMoments`.
+
+    Args:
+        output: one of both.
+        none: 0 V for each motor of the vehicle.
+
+    Raises:
+        TypeError: anything else, or other than numbers in it.
+        ValueError: a number is not finite.
+    """
+    if isinstance(output, MotorVoltages):
+        to_motors, volts, wrench = True, _numbers("volts", output.volts, len(none)), NO_WRENCH
+    elif isinstance(output, ThrustAndMoments):
+        to_motors, volts, moments = False, none, _numbers("moments_body", output.moments_body, 3)
+        wrench = (*_numbers("thrust", (output.thrust,), 1), *moments)
+    else:
+        raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
+    return Demand(to_motors, volts, wrench, _numbers("roll_pitch", output.roll_pitch, 2))
+
+
+def _numbers(what: str, given: Iterable[float], n: int) -> Any:
+    try:
+        found = tuple(map(float, given))
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != n:
+        raise TypeError(f"step returned {what} = {' '.join(repr(given).split())}, expected {n} number{'s' * (n > 1)}")
+    if not all(map(math.isfinite, found)):
+        raise ValueError(f"step returned {what} = {found}, which is not finite")
+    return found
+
+
+@implements(demand, inline=True)
+def _demand(output: types.Type, none: types.Type) -> Callable:
+    told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
+    roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
+    if output.instance_class is MotorVoltages:
+        given = "True, output[0], (0.0, 0.0, 0.0, 0.0)"
+    else:
+        given = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
+    return define("demand(output, none)", {"Demand": Demand}, f"return Demand({given}, {roll_pitch})")
+
+
+@leaf
+def _thrust_at(motor: Motor, volts: float, _: float) -> float:
+    return thrust_at(motor, volts)
+
+
+@leaf
+def command(
+    law: control.Parameters,
+    lift: float,
+    moments: Vec3,
+    voltage_max: float,
+    asked: Demand,
+    yaw: float,
+    stage: int,
+    failed: int,
+) -> Command:
+    """The motors' command.
+
+    Args:
+        law: control.Parameters, of which the control allocation and the motor model are used.
+        lift: force along body z [N] of a collective demand of 1 N.
+        moments: torques about body x, y, z [N m] of demands of 1 N.
+        voltage_max: [V].
+        asked: Demand.
+        yaw: of the setpoint [rad].
+        stage: ON_GROUND, FLYING or LANDED.
+        failed: number of the rotor that is known to have failed, from 1; 0: none.
+    """
+    if stage != FLYING:
+        none = at_rest(law.shares[0])
+        return Command(none, none, 0.0, 0.0, yaw, stage == LANDED)
+    if asked.to_motors:
+        volts = possible(asked.volts, voltage_max)
+        thrust = each(_thrust_at, law.motor, volts, volts)
+    else:
+        shares, w = shares_in_force(law.shares, failed), asked.wrench
+        part = 1.0 / lift
+        demands = Demands(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
+        thrust = possible(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
+        volts = voltages(law.motor, thrust)
+    return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)

@@ -1,0 +1,59 @@
+"""An estimator of the user's, as parts of the graph: in Python at its rate, then its estimate at every tick."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from lapwing.cosim.config.user_module import FAULTS, blame
+from lapwing.cosim.diagram.compiled_block import GO_ON, LOOK, Received
+from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.kernels import leaf
+from lapwing.services.autopilot.commander_wakeup import Attention, attention_due
+from lapwing.services.autopilot.custom.periodic import PeriodicPart
+from lapwing.services.autopilot.service_config import CustomCode
+from lapwing.services.common.estimator_api import checked_estimate
+from lapwing.services.common.ports import StateEstimate
+
+HELD = "held_estimate"  # port within the autopilot
+
+
+class AskedEstimator(PeriodicPart):
+    """Shows the estimator the readings that have come, and puts what it says into the port `held_estimate`."""
+
+    name = "autopilot.estimator"
+    outputs = (Port(HELD, StateEstimate(), KEPT),)
+
+    def __init__(
+        self, code: CustomCode, module: ModuleType, construct: Callable[[], Any], sensors: dict[str, int]
+    ) -> None:
+        """An estimator on these sensors, each with the ticks between its readings."""
+        self._code, self._module, self._construct, self._sensors = code, module, construct, sensors
+        self.inputs = tuple(Input(name) for name in sensors)
+        self._estimator: Any = None
+
+    def _ask(self, tick: int) -> None:
+        new = {name: period for name, period in self._sensors.items() if tick % period < self._code.every}
+        readings = {name: self._graph.latest(name, tick) for name in new}
+        time = tick * self._graph.setup.interval
+        try:
+            self._estimator = self._estimator or self._construct()
+            estimate = checked_estimate(self._estimator.step(time, readings))
+        except FAULTS as error:
+            said = blame(error, self._module)
+            raise LockStepError(f"estimator {self._code.name}: {said} at t = {time:.3f} s") from error
+        self._graph.put(HELD, tick, estimate)
+
+
+class HeldEstimate(NamedTuple):
+    """What calls the commander."""
+
+    attention: Attention
+
+
+@leaf
+def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
+    """The estimate that holds at `tick`; it has no state of its own."""
+    held, battery, flight = inputs
+    due = attention_due(p.attention, tick, held.value.health, battery, flight)
+    return s, (held.value,), LOOK if due else GO_ON

@@ -1,0 +1,148 @@
+"""The user's controller or estimator, from its name to something that can be asked, with all that can be wrong."""
+
+import copy
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any
+
+import numba
+from numba.core.errors import NumbaError
+
+from lapwing.cosim.config.user_module import FAULTS, blame
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.kernels.cell import Cell
+from lapwing.services.autopilot.controller_parameters import Airframe
+from lapwing.services.autopilot.custom.controller_output import demand
+from lapwing.services.autopilot.motor import thrust_at
+from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments, VehicleModel
+from lapwing.services.common.estimator_api import checked_estimate
+from lapwing.services.common.ports import Reference, StateEstimate
+from lapwing.services.common.user_code import named
+
+CONTROLLER, ESTIMATOR = "autopilot.controller", "autopilot.estimator"
+OUTPUTS = (MotorVoltages, ThrustAndMoments)
+
+
+def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
+    """What a controller is told of the vehicle whose airframe the autopilot knows."""
+    return VehicleModel(
+        a.mass,
+        a.inertia_body,
+        a.gravity,
+        tuple(zip(a.rotor_x, a.rotor_y, a.rotor_z or (0.0,) * len(a.rotor_x), strict=True)),
+        a.reaction_sign,
+        a.torque_per_thrust,
+        thrust_at(a.motor, a.voltage_max),
+        a.voltage_max,
+        a.motor.time_constant,
+        a.resting_height,
+        interval,
+        a.rotor_axis or ((0.0, 0.0, 1.0),) * len(a.rotor_x),
+    )
+
+
+def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
+    """The rate [Hz] of a controller, which is asked once on the ground to see whether it answers.
+
+    Args:
+        name: "module:Name".
+        texts: of the modules that the set-up carries.
+        vehicle: what it is told.
+        options: of its constructor.
+
+    Raises:
+        KeyedError: it cannot be constructed, has no rate, or its step fails or returns something else.
+    """
+    module, found = named(CONTROLLER, name, texts)
+    start = (0.0, 0.0, vehicle.resting_height)
+    given = (0.0, StateEstimate(position_world=start), Reference(position_world=start))
+    if not is_compiled(found):
+        p = constructor(CONTROLLER, module, found, vehicle, options)()
+        _try(CONTROLLER, name, module, p, lambda: demand(p.step(*given), (0.0,) * len(vehicle.spin_directions)))
+        return _rate(CONTROLLER, name, p)
+    p, s = compiled(module, found, vehicle, options)
+
+    def trial() -> None:
+        output = module.step(p, s, *given)
+        if not (type(output) is tuple and len(output) == 2 and isinstance(output[1], OUTPUTS)):
+            raise TypeError("step is to return (state, MotorVoltages or ThrustAndMoments)")
+        if numba.typeof(output[0]) != numba.typeof(s):
+            raise TypeError("step returns a state of another type than build; write every number as a float")
+        Cell((p, s))  # which they are flown in
+
+    _try(CONTROLLER, name, module, module, trial)
+    return _rate(CONTROLLER, name, p)
+
+
+def estimator_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
+    """The same of an estimator, which is asked once without a reading."""
+    module, found = named(ESTIMATOR, name, texts)
+    p = constructor(ESTIMATOR, module, found, vehicle, options)()
+    _try(ESTIMATOR, name, module, p, lambda: checked_estimate(p.step(0.0, {})))
+    return _rate(ESTIMATOR, name, p)
+
+
+def _try(key: str, name: str, module: ModuleType, owner: Any, step: Callable[[], Any]) -> None:
+    if not callable(getattr(owner, "step", None)):
+        raise KeyedError(key, f"{name} has no step", "the method `step`")
+    try:
+        step()
+    except FAULTS as error:
+        raise KeyedError(key, f"{name}: {_told(error, module)}") from error
+
+
+def _rate(key: str, name: str, p: Any) -> float:
+    rate = getattr(p, "rate", None)
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not (math.isfinite(rate) and rate > 0.0):
+        raise KeyedError(key, f"{name} has rate = {rate!r}", "a number of steps a second [Hz]")
+    return float(rate)
+
+
+def _told(error: BaseException, module: ModuleType) -> str:
+    if isinstance(error, NumbaError):
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        return f"cannot be compiled: {lines[1] if len(lines) > 1 else lines[0]}"
+    return blame(error, module)
+
+
+def is_compiled(found: Any) -> bool:
+    """Whether a name of the user's module stands for a compiled controller: a function, not a class."""
+    return inspect.isfunction(found)
+
+
+def constructor(
+    key: str, module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]
+) -> Callable[[], Any]:
+    """Makes a new one of what `key` names: of a class, or as a copy of an object; KeyedError where that is refused."""
+    if options and not inspect.isclass(found):
+        raise KeyedError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
+
+    cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
+
+    def construct() -> Any:
+        try:
+            return cls(vehicle, **options) if cls else copy.deepcopy(found)
+        except FAULTS as error:
+            raise _refused(key, error, module) from error
+
+    return construct
+
+
+def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Parameters and first state of a compiled controller; KeyedError where they cannot be made."""
+    try:
+        p, s = found(vehicle, **options)
+    except FAULTS as error:
+        raise _refused(CONTROLLER, error, module) from error
+    if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
+        expected = "a NamedTuple of its own module, which has `step` too"
+        raise KeyedError(CONTROLLER, f"{found.__name__} gives a {type(p).__name__} for the parameters", expected)
+    return p, s
+
+
+def _refused(key: str, error: BaseException, module: ModuleType) -> KeyedError:
+    """Options that do not fit, or whatever else a constructor complains of."""
+    options = isinstance(error, TypeError) and "argument" in str(error)
+    return KeyedError(f"{key}_options" if options else key, blame(error, module))

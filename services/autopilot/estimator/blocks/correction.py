@@ -1,0 +1,70 @@
+"""The readings of a barometer, a magnetometer, a distance or optical flow: each kind has its update of the filter."""
+
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import ByClass, leaf
+from lapwing.kernels.codegen import implements
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import Estimator, State
+from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
+from lapwing.services.common.ports import BarometerReading, DistanceReading, MagnetometerReading, OpticalFlowReading
+
+Reading = BarometerReading | DistanceReading | MagnetometerReading | OpticalFlowReading
+
+
+class Correction(NamedTuple):
+    """The filter."""
+
+    filter: Estimator
+
+
+@leaf
+def _barometer(p: Estimator, x: State, r: BarometerReading) -> State:
+    return estimator.update_barometer(p, x, r.pressure, r.variance, r.valid)
+
+
+@leaf
+def _magnetometer(p: Estimator, x: State, r: MagnetometerReading) -> State:
+    return estimator.update_magnetometer(p, x, r.field_body, r.variance, r.valid)
+
+
+@leaf
+def _distance(p: Estimator, x: State, r: DistanceReading) -> State:
+    return estimator.update_sonar(p, x, r.range, r.variance, r.valid)
+
+
+@leaf
+def _flow(p: Estimator, x: State, r: OpticalFlowReading) -> State:
+    return estimator.update_flow(p, x, r.flow, r.rate, r.distance, r.variance, r.valid)
+
+
+UPDATES = ByClass()
+"""The compiled update of the filter by the class of a reading."""
+UPDATES[BarometerReading] = _barometer
+UPDATES[MagnetometerReading] = _magnetometer
+UPDATES[DistanceReading] = _distance
+UPDATES[OpticalFlowReading] = _flow
+
+
+def update(p: Estimator, x: State, r: Reading) -> State:
+    """The filter's state after a reading; in compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(update, inline=True)
+def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
+    return UPDATES[r.instance_class]
+
+
+@leaf
+def step(
+    p: Correction, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
+    """Correct by the reading of the tick."""
+    x = s.filter
+    if s.begun:
+        x = update(p.filter, x, inputs[0].value)
+    return NavigationState(s.begun, x), (), GO_ON

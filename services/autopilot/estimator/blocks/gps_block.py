@@ -1,0 +1,32 @@
+"""The readings of the satellite receiver: position, then velocity."""
+
+from typing import NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import leaf
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
+
+
+class GpsFusion(NamedTuple):
+    """The filter, and how late the receiver is."""
+
+    filter: Estimator
+    age: int  # of a reading when it arrives, in IMU readings
+    height_variance: float  # [m^2] by which its height is doubted: 0 where it is the reference
+
+
+@leaf
+def step(
+    p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
+    """Correct by the reading of the tick."""
+    r, x = inputs[0].value, s.filter
+    if s.begun:
+        east, north, up = r.position_variance
+        doubted = (east, north, up + p.height_variance)
+        x = estimator.update_gps(p.filter, x, r.latitude_deg, r.longitude_deg, r.height, doubted, p.age, r.valid)
+        variance = r.velocity_variance if r.valid else -1.0
+        x = estimator.update_gps_velocity(p.filter, x, r.velocity_world, variance, p.age, variance >= 0.0)
+    return NavigationState(s.begun, x), (), GO_ON

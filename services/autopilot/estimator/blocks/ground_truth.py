@@ -1,0 +1,28 @@
+"""The truth as an estimate without error and without bias."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, LOOK, Received
+from lapwing.dynamics.vector import ZERO
+from lapwing.kernels import leaf
+from lapwing.services.autopilot.commander_wakeup import Attention, attention_due
+from lapwing.services.common.ports import StateEstimate
+
+
+class TrueEstimate(NamedTuple):
+    """What calls the commander."""
+
+    attention: Attention
+
+
+@leaf
+def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
+    """The true state at `tick`; it has no state of its own."""
+    truth, battery, flight = inputs
+    x = truth.value
+    e = StateEstimate(
+        x.position_world, x.attitude, x.velocity_world, x.omega_body, x.acceleration_world,
+        ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
+    )  # fmt: skip
+    due = attention_due(p.attention, tick, 0, battery, flight)
+    return s, (e,), LOOK if due else GO_ON

@@ -1,0 +1,48 @@
+"""The IMU's readings: the filter begins with them where the vehicle stands still, and is carried on by them."""
+
+import math
+from typing import NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.vector import Vec3, norm
+from lapwing.kernels import leaf
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
+from lapwing.services.autopilot.land_detector import ON_GROUND
+
+STANDSTILL_RATIO = 0.02  # ratio by which the specific force of a vehicle at rest may differ from gravity
+STANDSTILL_EVERY = 10  # readings between two corrections by a vehicle that is known to stand
+
+
+class InertialNavigation(NamedTuple):
+    """The filter, and where it begins."""
+
+    filter: Estimator
+    start_world: Vec3  # [m]
+    standstill_every: int  # ticks between two corrections by a vehicle that is known to stand
+
+
+@leaf
+def step(
+    p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[NavigationState, tuple[()], int]:
+    """Begin once the vehicle is level and the compass has been read; then predict to `tick`."""
+    imu, magnetometer, flight = inputs
+    r, begun, x = imu.value, s.begun, s.filter
+    if not begun:
+        still = abs(norm(r.specific_force_body) - p.filter.gravity) < STANDSTILL_RATIO * p.filter.gravity
+        if magnetometer.due and still:
+            nothing = (math.nan, math.nan, math.nan)
+            field = magnetometer.value.field_body if magnetometer.value.valid else nothing
+            x = estimator.initial(p.filter, x.memory, p.start_world, r.specific_force_body, field)
+            begun = True
+    if begun:
+        omega_variance = r.omega_variance if r.valid else -1.0
+        force_variance = r.specific_force_variance if r.valid else -1.0
+        valid = omega_variance >= 0.0 and force_variance >= 0.0
+        x = estimator.predict(p.filter, x, r.omega_body, r.specific_force_body, omega_variance, force_variance, valid)
+        on_ground = not flight.due or (flight.value.stage == ON_GROUND and tick >= flight.value.still_from)
+        if on_ground and tick % p.standstill_every == 0:
+            x = estimator.update_standstill(p.filter, x, omega_variance, force_variance)
+    return NavigationState(begun, x), (), GO_ON

@@ -1,0 +1,21 @@
+"""The state that the parts of the navigation share."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.vector import ZERO
+from lapwing.services.autopilot.estimator.filter_state import Inertial, Nominal, State, new_memory
+
+
+class NavigationState(NamedTuple):
+    """The filter, once it has begun."""
+
+    begun: bool
+    filter: State  # means nothing before
+
+
+def blank() -> NavigationState:
+    """Before the first reading."""
+    nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
+    inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False)
+    return NavigationState(False, State(nominal, inertial, new_memory()))

@@ -1,0 +1,66 @@
+"""Rows and innovations of a measurement of the past (theory.md, eqs. (3.30) and (3.35))."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.vector import Mat3, Vec3, dot
+from lapwing.kernels import apart, leaf
+from lapwing.services.autopilot.estimator.filter_state import POSITION, SIZE, VELOCITY, WANDER, Memory
+from lapwing.services.autopilot.estimator.fuse import FLOOR, acceleration_row, clear, innovation_variance
+
+
+class Noise(NamedTuple):
+    """Process noise of a stretch of time, the same in each axis and independent between them."""
+
+    velocity: float  # [(m/s)^2]
+    velocity_position: float  # [m^2/s]
+    position: float  # [m^2]
+    attitude_velocity: float  # [rad^2 s^2] of the attitude, by what it has left to do to the row of a late velocity
+    attitude_position: float  # [rad^2 s^4] the same of a late position
+
+
+@leaf
+def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
+    """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30)).
+
+    `force_world` is the specific force of the delay, weighted by how long it has moved the position.
+    """
+    clear(m)
+    m.row[POSITION + axis] = 1.0
+    m.row[VELOCITY + axis] = -delay
+    m.row[WANDER + axis] = 1.0
+    acceleration_row(m, force_world, r, axis, 0.5 * delay * delay)
+
+
+@leaf
+def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
+    """Row of the velocity `delay` seconds ago; `force_world` is the mean specific force since."""
+    clear(m)
+    m.row[VELOCITY + axis] = 1.0
+    acceleration_row(m, force_world, r, axis, -delay)
+
+
+@apart
+def late_innovation_variances(
+    m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
+) -> tuple[float, float]:
+    """Variances of the innovation of a late row: of the gain, and of the gate (theory.md, eqs. (3.35) and (3.36)).
+
+    Leaves the covariance of the innovation with the error now in `m.product`. What came in since, an impact above all,
+    was not measured and stays unknown; the gate allows for other sources having told of it already.
+
+    Args:
+        m: `Memory`; its row is filled.
+        axis: of the row.
+        since: noise that the covariance has got since the moment that was measured.
+        variance: of the measurement.
+        force_world: of the row [m/s^2].
+    """
+    v, p = m.row[VELOCITY + axis], m.row[POSITION + axis]
+    noise = v * v * since.velocity + 2.0 * v * p * since.velocity_position + p * p * since.position
+    across = dot(force_world, force_world) - force_world[axis] * force_world[axis]
+    noise += across * (since.attitude_position if p > 0.0 else since.attitude_velocity)
+    now = innovation_variance(m, 0.0)
+    then = max(now - noise, 0.0)
+    for i in range(SIZE):
+        m.product[i] *= then / now
+    return then + variance + FLOOR, now + noise + variance

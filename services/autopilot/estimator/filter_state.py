@@ -1,0 +1,238 @@
+"""State of the estimator, its beginning, and what it tells (theory.md, section 3.3).
+
+The error state has 24 components. Its attitude part is a rotation vector in the world frame:
+R = exp(theta) R_estimated.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
+from lapwing.kernels import kernel, leaf
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.common.ports import StateEstimate
+
+SIZE = 24
+THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
+HEADING, BAROMETER, SCALE = 21, 22, 23
+
+SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
+IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
+FLOW = len(SOURCES)  # kept books on as well, but it only stands in for GPS: its lack is no fault
+NAMES = (*SOURCES, "optical_flow")  # of all that books are kept on
+WATCHED = len(NAMES)
+
+HISTORY = 128  # IMU readings that are remembered for late measurements
+NEVER = -1
+
+
+class Nominal(NamedTuple):
+    """Best estimate."""
+
+    attitude: Quaternion
+    velocity_world: Vec3  # [m/s]
+    position_world: Vec3  # [m]
+    gyro_bias: Vec3  # [rad/s]
+    accelerometer_bias: Vec3  # [m/s^2]
+    gps_wander: Vec3  # [m]
+    magnetometer_bias: Vec3  # [T] body
+    heading_bias: float  # [rad]
+    barometer_bias: float  # [m]
+    sonar_scale: float  # error, ratio
+
+
+class Inertial(NamedTuple):
+    """The last IMU reading and what it was integrated to."""
+
+    tick: int  # readings so far
+    omega: Vec3  # [rad/s] as read
+    force: Vec3  # [m/s^2] as read
+    force_world: Vec3  # [m/s^2] specific force, bias taken off
+    velocity_gain: Vec3  # [m/s] acceleration integrated since the start, never corrected
+    distance_gain: Vec3  # [m] velocity_gain integrated
+    held: bool  # the last reading was refused and the one before it used again
+
+
+class Memory(NamedTuple):
+    """Arrays that one state owns; steps change them in place, so a state must not be used again after its successor."""
+
+    covariance: np.ndarray  # (24, 24)
+    correction: np.ndarray  # (24,) not yet added to the estimate
+    row: np.ndarray  # (24,) of the measurement matrix
+    product: np.ndarray  # (24,) covariance times row
+    history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, what the tick added to velocity and attitude
+    since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
+    refused: np.ndarray  # (WATCHED,) 1 where the last reading of a source was refused
+    repeats: np.ndarray  # (WATCHED,) equal readings in a row
+    last: np.ndarray  # (WATCHED, 6) last reading of each source
+    nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
+
+
+class State(NamedTuple):
+    """State of the filter."""
+
+    nominal: Nominal
+    inertial: Inertial
+    memory: Memory
+
+
+@leaf
+def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
+    """Attitude at rest from gravity and the magnetic field (theory.md, eq. (3.20))."""
+    up = scale(1.0 / norm(specific_force_body), specific_force_body)
+    across = subtract(field_body, scale(dot(field_body, up), up))
+    forth = scale(1.0 / norm(across), across)
+    left = cross(up, forth)
+    bx, by, _ = p.magnetic_field_world
+    k = 1.0 / math.hypot(bx, by)
+    east = scale(k, subtract(scale(bx, forth), scale(by, left)))
+    north = scale(k, add(scale(by, forth), scale(bx, left)))
+    return from_matrix((east[0], east[1], east[2], north[0], north[1], north[2], up[0], up[1], up[2]))
+
+
+def new_memory() -> Memory:
+    """Memory for a state."""
+    return Memory(
+        np.zeros((SIZE, SIZE)),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        np.zeros((HISTORY, 8)),
+        np.zeros(WATCHED, np.int64),
+        np.zeros(WATCHED, np.int64),
+        np.zeros(WATCHED, np.int64),
+        np.zeros((WATCHED, 6)),
+        np.zeros(WATCHED),
+    )
+
+
+@kernel
+def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
+    """State of a vehicle that stands still.
+
+    Args:
+        p: `Estimator`.
+        m: memory of the state, as `new_memory` makes it or of a state that is no longer used; it is written over.
+        position_world: [m] where it is thought to stand, good to `p.start_std`.
+        specific_force_body: [m/s^2] a reading of the accelerometers, or a mean of several.
+        field_body: [T] the same of the magnetometer.
+    """
+    covariance = m.covariance
+    covariance[:] = 0.0
+    for i in range(3):
+        covariance[THETA + i, THETA + i] = p.attitude_std**2
+        covariance[VELOCITY + i, VELOCITY + i] = 0.1**2
+        covariance[POSITION + i, POSITION + i] = p.start_std**2
+        covariance[GYRO + i, GYRO + i] = p.gyro_bias_std**2
+        covariance[ACCELEROMETER + i, ACCELEROMETER + i] = p.accelerometer_bias_std**2
+        covariance[WANDER + i, WANDER + i] = p.gps_wander_horizontal**2
+        covariance[IRON + i, IRON + i] = p.magnetometer_bias_std**2
+    covariance[WANDER + 2, WANDER + 2] = p.gps_wander_vertical**2
+    covariance[HEADING, HEADING] = p.heading_std**2
+    covariance[BAROMETER, BAROMETER] = 50.0**2
+    covariance[SCALE, SCALE] = p.sonar_scale_std**2
+    m.correction[:] = m.row[:] = m.product[:] = 0.0
+    m.history[:] = 0.0
+    m.since[:] = NEVER
+    m.refused[:] = m.repeats[:] = 0
+    m.last[:] = math.nan
+    m.nis[:] = 0.0
+    attitude = level(p, specific_force_body, field_body)
+    nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
+    return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False), m)
+
+
+@leaf
+def three(array: np.ndarray, start: int) -> Vec3:
+    """Three neighbouring elements of an array as a vector."""
+    return (array[start], array[start + 1], array[start + 2])
+
+
+@kernel
+def corrected(s: State) -> State:
+    """The state with the gathered correction added to the estimate (theory.md, eq. (3.25))."""
+    n, d = s.nominal, s.memory.correction
+    nominal = Nominal(
+        normalise(multiply(exp(three(d, THETA)), n.attitude)),
+        add(n.velocity_world, three(d, VELOCITY)),
+        add(n.position_world, three(d, POSITION)),
+        add(n.gyro_bias, three(d, GYRO)),
+        add(n.accelerometer_bias, three(d, ACCELEROMETER)),
+        add(n.gps_wander, three(d, WANDER)),
+        add(n.magnetometer_bias, three(d, IRON)),
+        n.heading_bias + d[HEADING],
+        n.barometer_bias + d[BAROMETER],
+        n.sonar_scale + d[SCALE],
+    )
+    d[:] = 0.0
+    return State(nominal, s.inertial, s.memory)
+
+
+@leaf
+def _deviations(covariance: np.ndarray, start: int) -> Vec3:
+    return (
+        math.sqrt(covariance[start, start]),
+        math.sqrt(covariance[start + 1, start + 1]),
+        math.sqrt(covariance[start + 2, start + 2]),
+    )
+
+
+@leaf
+def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
+    """Standard deviation of the attitude error about an axis."""
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += axis_world[i] * covariance[THETA + i, THETA + j] * axis_world[j]
+    return math.sqrt(total)
+
+
+@leaf
+def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> tuple[int, int]:
+    health = 0
+    rejected = 0
+    carried = m.since[FLOW] != NEVER and m.since[FLOW] * p.interval < p.patience
+    for i in range(len(SOURCES)):
+        if m.refused[i] == 1:
+            rejected |= 1 << i
+        lost = m.refused[i] == 1 or m.since[i] * p.interval > p.patience
+        if lost and not (carried and i in (GPS, GPS_VELOCITY)):
+            health |= 1 << i
+    if m.refused[FLOW] == 1:
+        rejected |= 1 << FLOW
+    if max(position_std[0], position_std[1], position_std[2]) > p.position_std:
+        health |= 64
+    if max(attitude_std[0], attitude_std[1], attitude_std[2]) > p.attitude_std:
+        health |= 128
+    return health, rejected
+
+
+@kernel
+def estimate(p: Estimator, s: State) -> StateEstimate:
+    """`StateEstimate` now."""
+    n, i, c = s.nominal, s.inertial, s.memory.covariance
+    r = rotation_matrix(n.attitude)
+    position_std = _deviations(c, POSITION)
+    attitude_std = (
+        _deviation_along(c, (r[0], r[3], r[6])),
+        _deviation_along(c, (r[1], r[4], r[7])),
+        _deviation_along(c, (r[2], r[5], r[8])),
+    )
+    health, rejected = _health(p, s.memory, position_std, attitude_std)
+    return StateEstimate(
+        n.position_world,
+        n.attitude,
+        n.velocity_world,
+        subtract(i.omega, n.gyro_bias),
+        (i.force_world[0], i.force_world[1], i.force_world[2] - p.gravity),
+        n.gyro_bias,
+        n.accelerometer_bias,
+        position_std,
+        _deviations(c, VELOCITY),
+        attitude_std,
+        health,
+        rejected,
+    )

@@ -1,0 +1,82 @@
+"""Velocity over the ground by optical flow, while the satellite receiver gives none (theory.md, eq. (3.45))."""
+
+import math
+
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vector import Mat3, Vec3, cross, dot
+from lapwing.kernels import kernel, leaf
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_state import (
+    FLOW,
+    GPS_VELOCITY,
+    NEVER,
+    THETA,
+    VELOCITY,
+    Memory,
+    State,
+    corrected,
+)
+from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
+from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+
+_ALIKE = 100.0  # readings, 2 s of them, after which an error of scale counts as a new one
+
+
+@leaf
+def flow_row(m: Memory, r: Mat3, velocity_world: Vec3, axis: int, distance: float) -> float:
+    """Fill the row of the flow about the body's x (axis 0) or y (1); returns the flow that is expected [rad/s]."""
+    k = 1.0 / distance if axis == 0 else -1.0 / distance
+    across = (r[1], r[4], r[7]) if axis == 0 else (r[0], r[3], r[6])  # body y, body x: along these the ground passes
+    turned = cross(across, velocity_world)
+    clear(m)
+    for j in range(3):
+        m.row[VELOCITY + j] = k * across[j]
+        m.row[THETA + j] = k * turned[j]
+    return k * dot(across, velocity_world)
+
+
+@kernel
+def update_flow(
+    p: Estimator,
+    s: State,
+    flow: tuple[float, float],
+    rate: tuple[float, float],
+    distance: float,
+    variance: float,
+    valid: bool,
+) -> State:
+    """State after a reading of the optical flow; as it was while velocities of the satellite receiver are taken.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        flow: [rad/s] about the body's x and y.
+        rate: [rad/s] of the camera itself about them.
+        distance: [m] to the ground along the body's -z.
+        variance: [(rad/s)^2] per axis.
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    seen, turned = (flow[0], flow[1], distance), (rate[0], rate[1], 0.0)
+    if not valid or not distance > 0.0 or repeated(m, FLOW, seen, turned, variance > 0.0, p.frozen):
+        judge(m, FLOW, False, 0.0)
+        return s
+    received = m.refused[GPS_VELOCITY] == 0 and m.since[GPS_VELOCITY] != NEVER
+    if received and m.since[GPS_VELOCITY] * p.interval <= p.patience:
+        m.refused[FLOW] = 0
+        return s
+    r, velocity = rotation_matrix(s.nominal.attitude), s.nominal.velocity_world
+    passing = (flow[0] - rate[0], flow[1] - rate[1])
+    expected = math.hypot(flow_row(m, r, velocity, 0, distance), flow_row(m, r, velocity, 1, distance))
+    noise = variance + _ALIKE * (p.flow_scale_std * expected) ** 2  # of what is read, the gate would let all through
+    nis, accepted = 0.0, True
+    for axis in range(2):
+        innovation = passing[axis] - flow_row(m, r, velocity, axis, distance)
+        ratio = innovation * innovation / innovation_variance(m, noise)
+        nis += ratio
+        accepted = accepted and ratio < p.gate**2
+    if accepted:
+        for axis in range(2):
+            fuse(m, passing[axis] - flow_row(m, r, velocity, axis, distance), noise)
+    judge(m, FLOW, accepted, nis)
+    return corrected(s)

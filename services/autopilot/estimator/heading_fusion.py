@@ -1,0 +1,50 @@
+"""Heading by the magnetometer (theory.md, eq. (3.33))."""
+
+import math
+
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vector import ZERO, Vec3, apply, subtract
+from lapwing.kernels import kernel
+from lapwing.services.autopilot.estimator.covariance_inflation import doubt
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_state import HEADING, IRON, MAG, THETA, State, corrected
+from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
+from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+
+
+@kernel
+def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: float, valid: bool) -> State:
+    """State after a reading of the magnetic field; only its direction in the horizontal plane is used.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        field_body: [T].
+        variance: [T^2] per axis.
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    if not valid or repeated(m, MAG, field_body, ZERO, variance > 0.0, p.frozen):
+        judge(m, MAG, False, 0.0)
+        return s
+    bx, by, bz = p.magnetic_field_world
+    horizontal = bx * bx + by * by
+    r = rotation_matrix(s.nominal.attitude)
+    fx, fy, _ = apply(r, subtract(field_body, s.nominal.magnetometer_bias))
+    turn = math.atan2(fx * by - fy * bx, fx * bx + fy * by)  # from the field as it seems to the field as it is
+    clear(m)
+    m.row[THETA] = -bz * bx / horizontal
+    m.row[THETA + 1] = -bz * by / horizontal
+    m.row[THETA + 2] = 1.0
+    for i in range(3):
+        m.row[IRON + i] = (by * r[i] - bx * r[3 + i]) / horizontal
+    m.row[HEADING] = 1.0
+    innovation = turn - s.nominal.heading_bias
+    nis = innovation**2 / innovation_variance(m, variance / horizontal)
+    accepted = nis < p.gate**2
+    if accepted:
+        fuse(m, innovation, variance / horizontal)
+    judge(m, MAG, accepted, nis)
+    if not accepted:
+        doubt(p, m, MAG)
+    return corrected(s)

@@ -1,0 +1,104 @@
+"""Height by the sonar near the ground and by the barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
+
+import math
+
+from lapwing.dynamics.atmosphere import pressure_altitude
+from lapwing.dynamics.lie.quaternion import rotation_matrix
+from lapwing.dynamics.vector import ZERO
+from lapwing.kernels import kernel
+from lapwing.services.autopilot.estimator.covariance_inflation import doubt
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
+from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
+from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+
+_GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] by which the ground under the vehicle may rise and fall
+
+
+@kernel
+def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: float) -> State:
+    """Gate and take in the row."""
+    m = s.memory
+    nis = innovation**2 / innovation_variance(m, variance)
+    accepted = nis < p.gate**2
+    if accepted:
+        fuse(m, innovation, variance)
+    judge(m, source, accepted, nis)
+    if not accepted:
+        doubt(p, m, source)
+    return corrected(s)
+
+
+@kernel
+def update_barometer(p: Estimator, s: State, pressure: float, variance: float, valid: bool) -> State:
+    """State after a pressure reading.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        pressure: [Pa].
+        variance: [Pa^2].
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    if not valid or not pressure > 0.0 or repeated(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
+        judge(m, BARO, False, 0.0)
+        return s
+    altitude = pressure_altitude(p.atmosphere, pressure) - p.home.height
+    slope = pressure_altitude(p.atmosphere, pressure + 1.0) - p.home.height - altitude  # [m/Pa]
+    clear(m)
+    m.row[POSITION + 2] = 1.0
+    m.row[BAROMETER] = 1.0
+    innovation = altitude - s.nominal.position_world[2] - s.nominal.barometer_bias
+    return _scalar(p, s, BARO, innovation, variance * slope * slope)
+
+
+@kernel
+def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid: bool) -> State:
+    """State after an echo.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        distance: [m]; infinite where there is none, which is no fault.
+        variance: [m^2].
+        valid: whether there is a reading.
+    """
+    m = s.memory
+    if not valid:
+        judge(m, SONAR, False, 0.0)
+        return s
+    height = s.nominal.position_world[2] - p.ground_height
+    if math.isinf(distance) or height > p.sonar_height_max:
+        m.refused[SONAR] = 0
+        m.since[SONAR] = 0
+        return s
+    cosine = rotation_matrix(s.nominal.attitude)[8]
+    tilt = math.acos(min(max(cosine, -1.0), 1.0))
+    slant = 1.0 / math.cos(max(0.0, tilt - math.radians(p.sonar_half_beam_deg)))
+    clear(m)
+    factor = slant * (1.0 + s.nominal.sonar_scale)
+    m.row[POSITION + 2] = factor
+    m.row[SCALE] = slant * height
+    return _scalar(p, s, SONAR, distance - factor * height, variance)
+
+
+@kernel
+def follow_ground(p: Estimator, s: State) -> None:
+    """Let the height count from the ground, which is not level: that under the vehicle since the last echo is unknown.
+
+    The barometer keeps its own level, so that what the height loses its bias gains (theory.md, eq. (3.39)).
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+    """
+    c = s.memory.covariance
+    vx, vy, _ = s.nominal.velocity_world
+    dt = max(s.memory.since[SONAR], 1) * p.interval
+    variance = (_GROUND_GRADIENT**2 * (vx * vx + vy * vy) + _GROUND_RATE**2) * dt * dt
+    z = POSITION + 2
+    c[z, z] += variance
+    c[BAROMETER, BAROMETER] += variance
+    c[z, BAROMETER] -= variance
+    c[BAROMETER, z] -= variance

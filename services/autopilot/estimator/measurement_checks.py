@@ -1,0 +1,35 @@
+"""Watching the sources: readings that repeat, readings that are refused."""
+
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import kernel
+from lapwing.services.autopilot.estimator.filter_state import Memory
+
+
+@kernel
+def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
+    """Whether a noisy instrument has repeated the same numbers `often` times in a row: it is frozen.
+
+    Args:
+        m: `Memory`, changed in place.
+        source: index into SOURCES.
+        first: three numbers of the reading.
+        second: three more.
+        noisy: whether the reading claims to have noise; without noise a vehicle at rest repeats rightly.
+        often: repetitions that an instrument with noise cannot give; coarse rounding needs more.
+    """
+    same = noisy
+    for i in range(3):
+        same = same and m.last[source, i] == first[i] and m.last[source, 3 + i] == second[i]
+        m.last[source, i] = first[i]
+        m.last[source, 3 + i] = second[i]
+    m.repeats[source] = m.repeats[source] + 1 if same else 0
+    return m.repeats[source] >= often
+
+
+@kernel
+def judge(m: Memory, source: int, accepted: bool, nis: float) -> None:
+    """Keep the books on a reading that came."""
+    m.refused[source] = 0 if accepted else 1
+    m.nis[source] = nis
+    if accepted:
+        m.since[source] = 0

@@ -1,0 +1,29 @@
+"""Failures of the battery's gauge, as PX4's: off, it reports an empty pack, wrong, a low charge."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import leaf
+from lapwing.services.common.failure_types import OFF, STUCK, WRONG
+from lapwing.services.common.ports import BatteryGauge
+
+
+class BatteryInjection(NamedTuple):
+    """What is wrong."""
+
+    faults: Any  # cell of `Faults`
+
+
+@leaf
+def step(
+    p: BatteryInjection, s: BatteryGauge, tick: int, inputs: tuple[Received, ...]
+) -> tuple[BatteryGauge, tuple, int]:
+    """What arrives of the gauge; the state is what arrived of it before it stuck."""
+    r, kind = inputs[0].value, p.faults.value.battery
+    last = s if kind == STUCK else r
+    x = last
+    if kind == OFF:
+        x = BatteryGauge(0.0, r.voltage, r.current, r.temperature)
+    elif kind == WRONG:
+        x = BatteryGauge(p.faults.value.battery_charge, r.voltage, r.current, r.temperature)
+    return last, (x,), GO_ON

@@ -1,0 +1,58 @@
+"""Failures of gyroscope and accelerometer, which come in one reading: without one of them it counts for nothing."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.noise import Key
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import leaf
+from lapwing.services.autopilot.failure_injection.failure_state import Memory, garbage, silent
+from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
+from lapwing.services.common.ports import ImuReading
+
+TURN, PUSH = 0.2, 2.0  # [rad/s] about x, [m/s^2] along z by which a wrong one is off
+FULL_TURN, FULL_PUSH = 35.0, 160.0  # [rad/s], [m/s^2] full scale, which garbage fills
+_GYRO, _ACCELEROMETER = 0, 1  # lanes of their random numbers
+
+
+class ImuInjection(NamedTuple):
+    """What is wrong."""
+
+    faults: Any  # cell of `Faults`
+    key: Key  # of random numbers
+
+
+@leaf
+def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: Vec3) -> Vec3:
+    if kind == STUCK:
+        return stuck
+    if kind == DELAYED:
+        return late
+    if kind == WRONG:
+        return wrong
+    return random if kind == GARBAGE else now
+
+
+@leaf
+def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+    """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
+    r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer
+    late, turn, push = before.value, r.omega_body, r.specific_force_body
+    omega = _chosen(
+        gyro, turn, s.last.omega_body, late.omega_body, (turn[0] + TURN, turn[1], turn[2]),
+        garbage(p.key, tick, _GYRO, FULL_TURN) if gyro == GARBAGE else turn,
+    )  # fmt: skip
+    force = _chosen(
+        accelerometer, push, s.last.specific_force_body, late.specific_force_body, (push[0], push[1], push[2] + PUSH),
+        garbage(p.key, tick, _ACCELEROMETER, FULL_PUSH) if accelerometer == GARBAGE else push,
+    )  # fmt: skip
+    valid = late.valid and before.due if DELAYED in (gyro, accelerometer) else r.valid
+    valid = valid and not silent(gyro, p.key, _GYRO, s.readings)
+    valid = valid and not silent(accelerometer, p.key, _ACCELEROMETER, s.readings)
+    last = ImuReading(
+        omega if gyro == STUCK else turn,
+        force if accelerometer == STUCK else push,
+        r.omega_variance, r.specific_force_variance, r.valid,
+    )  # fmt: skip
+    x = ImuReading(omega, force, r.omega_variance, r.specific_force_variance, valid)
+    return Memory(last, s.readings + 1), (x,), GO_ON

@@ -1,0 +1,96 @@
+"""The parts that make failures or pass on motor commands from outside, and the ports that carry what arrives."""
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.dynamics.noise import Key, stream_key
+from lapwing.kernels.cell import Cell
+from lapwing.services.autopilot.failure_injection.battery_failures import BatteryInjection
+from lapwing.services.autopilot.failure_injection.failure_state import DELAY, Memory
+from lapwing.services.autopilot.failure_injection.imu_failures import ImuInjection
+from lapwing.services.autopilot.failure_injection.motor_failures import Direct, MotorInjection
+from lapwing.services.autopilot.failure_injection.sensor_failures import SensorInjection
+from lapwing.services.autopilot.motor import Motor
+from lapwing.services.common import ports
+
+_SENSORS: dict[str, Callable[[Any, Key], Any]] = {
+    ports.IMU: ImuInjection,
+    ports.MAGNETOMETER: SensorInjection,
+    ports.BAROMETER: SensorInjection,
+    ports.GPS: SensorInjection,
+    ports.SONAR: SensorInjection,
+    ports.RANGEFINDER: SensorInjection,
+    ports.OPTICAL_FLOW: SensorInjection,
+    ports.AIRSPEED: SensorInjection,
+}
+_UNITS = {
+    ports.IMU: ("gyro", "accelerometer"),
+    ports.MAGNETOMETER: ("magnetometer",),
+    ports.BAROMETER: ("barometer",),
+    ports.GPS: ("gps",),
+    ports.SONAR: ("distance_sensor",),
+    ports.RANGEFINDER: ("distance_sensor",),
+    ports.OPTICAL_FLOW: ("optical_flow",),
+    ports.AIRSPEED: ("airspeed",),
+}
+
+
+class Injection:
+    """Where failures are injected in a run; without a cell of `Faults`, nowhere."""
+
+    def __init__(self, faults: Cell | None, setup: Setup, read: Collection[str], motor: Motor):
+        """`setup`: the run; `read`: ports of the sensors that the autopilot reads; `motor`: of every rotor."""
+        self.faults, self._motor = faults, motor
+        rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
+        self.released = Direct(False, (0.0,) * rotors)  # the controller's command reaches the motors
+        self.direct = None if faults is None else Cell(self.released)
+        self._setup, self._known = setup, setup.ports
+        self._sensors = [name for name in _SENSORS if name in read] if faults is not None else []
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """What can fail."""
+        if self.faults is None:
+            return ()
+        return (*[unit for name in self._sensors for unit in _UNITS[name]], "battery", "motor")
+
+    def received(self, port: str) -> str:
+        """Name of the port on which the autopilot gets what is sent on another."""
+        through = self.faults is not None and (port in self._sensors or port == ports.BATTERY)
+        return f"{port}.received" if through else port
+
+    def commanded(self, actuators: Port) -> Port:
+        """The port that the controller writes, in place of that of the motors."""
+        return actuators if self.faults is None else actuators._replace(name=f"{actuators.name}.commanded")
+
+    def before(self, name: str) -> list[Part]:
+        """The parts between sensors and estimator, and behind the battery."""
+        found = []
+        for port in self._sensors:
+            known = self._known[port]
+            memory = Cell(Memory(known.like, 0))
+            given = known._replace(name=self.received(port))
+            key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
+            late = known.period * max(1, round(DELAY / self._setup.interval / known.period))
+            inputs = Input(port), Input(port, late)
+            parameters = _SENSORS[port](self.faults, key)
+            found.append(Part(f"{name}.inject.{port}", parameters, memory, inputs, (given,), known.period))
+        if self.faults is not None:
+            known = self._known[ports.BATTERY]
+            given = known._replace(name=self.received(ports.BATTERY))
+            battery, memory = BatteryInjection(self.faults), Cell(known.like)
+            reads = (Input(ports.BATTERY),)
+            found.append(Part(f"{name}.inject.battery", battery, memory, reads, (given,), known.period))
+        return found
+
+    def after(self, name: str, actuators: Port) -> list[Part]:
+        """The part between the controller and the motors."""
+        if self.faults is None:
+            return []
+        inputs = (Input(self.commanded(actuators).name),)
+        memory = Cell(Memory(actuators.like.motor_voltage, 0))
+        parameters = MotorInjection(self.faults, self.direct, self._motor)
+        return [Part(f"{name}.inject.motors", parameters, memory, inputs, (actuators,))]

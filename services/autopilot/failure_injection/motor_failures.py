@@ -1,0 +1,60 @@
+"""Between the controller and the motors: voltages from outside in the place of its own, and failures."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each, each_index
+from lapwing.services.autopilot.failure_injection.failure_state import SLOWED, Memory
+from lapwing.services.autopilot.motor import Motor, thrust_at
+from lapwing.services.common.failure_types import OFF, SLOW, STUCK, WRONG
+from lapwing.services.common.ports import MotorCommand, PerRotor
+
+WEAKENED = 0.7  # of its voltage that a wrong motor gets: about half of the thrust
+
+
+class Direct(NamedTuple):
+    """Voltages from outside."""
+
+    on: bool  # whether they hold
+    motor_voltage: PerRotor  # [V]
+
+
+class MotorInjection(NamedTuple):
+    """Where the voltages come from, and what is wrong."""
+
+    faults: Any  # cell of `Faults`
+    direct: Any  # cell of `Direct`
+    motor: Motor
+
+
+@leaf
+def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int, k: int) -> float:
+    """The command that motor k follows: a stuck one its last, a slow one hears one of `SLOWED`."""
+    if kinds[k] == STUCK or (kinds[k] == SLOW and count % SLOWED != 0):
+        return before[k]
+    return volts[k]
+
+
+@leaf
+def _supplied(_: float, kind: int, volts: float) -> float:
+    """The voltage [V] that a motor gets."""
+    if kind == OFF:
+        return 0.0
+    return WEAKENED * volts if kind == WRONG else volts
+
+
+@leaf
+def _thrust_at(motor: Motor, volts: float, _: float) -> float:
+    return thrust_at(motor, volts)
+
+
+@leaf
+def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+    """The command that reaches the motors; the controller is told nothing of it."""
+    c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
+    asked = d.motor_voltage if d.on else c.motor_voltage
+    thrust = each(_thrust_at, p.motor, asked, asked) if d.on else c.thrust
+    heard = each_index(_heard, asked, kinds, s.last, asked, s.readings)
+    volts = each(_supplied, 0.0, kinds, heard)
+    return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), GO_ON

@@ -1,0 +1,142 @@
+"""What is wrong, and what nonsense is, for a sensor of each kind, by the class of its reading."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.noise import Key
+from lapwing.kernels import ByClass, leaf
+from lapwing.services.autopilot.failure_injection.failure_state import garbage
+from lapwing.services.common.failure_types import Faults
+from lapwing.services.common.ports import (
+    AirspeedReading,
+    BarometerReading,
+    DistanceReading,
+    GpsReading,
+    MagnetometerReading,
+    OpticalFlowReading,
+)
+
+EXCESS_PRESSURE = 500.0  # [Pa] of a wrong barometer, which reads some 40 m too low
+EXCESS_RANGE = 1.5  # [m] of a wrong distance sensor
+EXCESS_FLOW = 0.5  # [rad/s] about x of a wrong camera, 2 m/s at 4 m
+EXCESS_DYNAMIC = 100.0  # [Pa] of a wrong airspeed sensor, 13 m/s at rest
+NORTH = 1e-3  # [deg] of a wrong receiver, some 110 m
+PRESSURES, RANGES = 2e5, 100.0  # [Pa], [m] that garbage fills from 0 on
+FIELDS, HEIGHTS, SPEEDS = 1e-3, 1e4, 100.0  # [T], [m], [m/s] that it fills to both sides
+FLOWS, DYNAMICS = 10.0, 1500.0  # [rad/s], [Pa] that it fills to both sides
+
+
+class Failure(NamedTuple):
+    """Of one kind of sensor."""
+
+    kind: Callable[[Faults], int]  # what is wrong with it
+    wrong: Callable[[Any], Any]  # the reading of one that is wrong
+    garbage: Callable[[Any, Key, int], Any]  # the reading with random numbers at a tick
+
+
+@leaf
+def _barometer_kind(faults: Faults) -> int:
+    return faults.barometer
+
+
+@leaf
+def _wrong_barometer(r: BarometerReading) -> BarometerReading:
+    return BarometerReading(r.pressure + EXCESS_PRESSURE, r.variance, r.valid)
+
+
+@leaf
+def _garbage_barometer(r: BarometerReading, key: Key, tick: int) -> BarometerReading:
+    return BarometerReading(abs(garbage(key, tick, 0, PRESSURES)[0]), r.variance, r.valid)
+
+
+@leaf
+def _distance_kind(faults: Faults) -> int:
+    return faults.distance_sensor
+
+
+@leaf
+def _wrong_distance(r: DistanceReading) -> DistanceReading:
+    return DistanceReading(r.range + EXCESS_RANGE, r.variance, r.valid)
+
+
+@leaf
+def _garbage_distance(r: DistanceReading, key: Key, tick: int) -> DistanceReading:
+    return DistanceReading(abs(garbage(key, tick, 0, RANGES)[0]), r.variance, r.valid)
+
+
+@leaf
+def _flow_kind(faults: Faults) -> int:
+    return faults.optical_flow
+
+
+@leaf
+def _wrong_flow(r: OpticalFlowReading) -> OpticalFlowReading:
+    return OpticalFlowReading((r.flow[0] + EXCESS_FLOW, r.flow[1]), r.rate, r.distance, r.variance, r.valid)
+
+
+@leaf
+def _garbage_flow(r: OpticalFlowReading, key: Key, tick: int) -> OpticalFlowReading:
+    x, y, _ = garbage(key, tick, 0, FLOWS)
+    return OpticalFlowReading((x, y), r.rate, r.distance, r.variance, r.valid)
+
+
+@leaf
+def _airspeed_kind(faults: Faults) -> int:
+    return faults.airspeed
+
+
+@leaf
+def _wrong_airspeed(r: AirspeedReading) -> AirspeedReading:
+    return AirspeedReading(r.pressure + EXCESS_DYNAMIC, r.variance, r.valid)
+
+
+@leaf
+def _garbage_airspeed(r: AirspeedReading, key: Key, tick: int) -> AirspeedReading:
+    return AirspeedReading(garbage(key, tick, 0, DYNAMICS)[0], r.variance, r.valid)
+
+
+@leaf
+def _magnetometer_kind(faults: Faults) -> int:
+    return faults.magnetometer
+
+
+@leaf
+def _wrong_magnetometer(r: MagnetometerReading) -> MagnetometerReading:
+    return MagnetometerReading((-r.field_body[1], r.field_body[0], r.field_body[2]), r.variance, r.valid)  # by 90 deg
+
+
+@leaf
+def _garbage_magnetometer(r: MagnetometerReading, key: Key, tick: int) -> MagnetometerReading:
+    return MagnetometerReading(garbage(key, tick, 0, FIELDS), r.variance, r.valid)
+
+
+@leaf
+def _gps_kind(faults: Faults) -> int:
+    return faults.gps
+
+
+@leaf
+def _wrong_gps(r: GpsReading) -> GpsReading:
+    return GpsReading(
+        r.latitude_deg + NORTH, r.longitude_deg, r.height, r.position_variance,
+        r.velocity_world, r.velocity_variance, r.age, r.valid,
+    )  # fmt: skip
+
+
+@leaf
+def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
+    x, y, z = garbage(key, tick, 0, 1.0)
+    return GpsReading(
+        90.0 * x, 180.0 * y, HEIGHTS * z, r.position_variance,
+        garbage(key, tick, 1, SPEEDS), r.velocity_variance, r.age, r.valid,
+    )  # fmt: skip
+
+
+FAILURES = ByClass()
+"""The failures by the class of a reading."""
+FAILURES[BarometerReading] = Failure(_barometer_kind, _wrong_barometer, _garbage_barometer)
+FAILURES[DistanceReading] = Failure(_distance_kind, _wrong_distance, _garbage_distance)
+FAILURES[MagnetometerReading] = Failure(_magnetometer_kind, _wrong_magnetometer, _garbage_magnetometer)
+FAILURES[GpsReading] = Failure(_gps_kind, _wrong_gps, _garbage_gps)
+FAILURES[OpticalFlowReading] = Failure(_flow_kind, _wrong_flow, _garbage_flow)
+FAILURES[AirspeedReading] = Failure(_airspeed_kind, _wrong_airspeed, _garbage_airspeed)

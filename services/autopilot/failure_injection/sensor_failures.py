@@ -1,0 +1,81 @@
+"""Failures of every sensor but the inertial ones, told apart by the class of the reading."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.noise import Key
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import define, implements
+from lapwing.services.autopilot.failure_injection.failure_state import Memory, silent
+from lapwing.services.autopilot.failure_injection.reading_failures import FAILURES
+from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG, Faults
+
+
+class SensorInjection(NamedTuple):
+    """What is wrong."""
+
+    faults: Any  # cell of `Faults`
+    key: Key  # of random numbers
+
+
+def kind_of(faults: Faults, r: Any) -> int:
+    """What is wrong with the sensor that gives `r`."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(kind_of, inline=True)
+def _kind_by(faults: types.Type, r: types.Type) -> Callable:
+    found = FAILURES[r.instance_class].kind
+    return lambda faults, r: found(faults)
+
+
+def wrong(r: Any) -> Any:
+    """The reading of a sensor that is wrong."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(wrong, inline=True)
+def _wrong_by(r: types.Type) -> Any:
+    return FAILURES[r.instance_class].wrong
+
+
+def nonsense(r: Any, key: Key, tick: int) -> Any:
+    """The reading with random numbers at a tick."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(nonsense, inline=True)
+def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
+    return FAILURES[r.instance_class].garbage
+
+
+def lost(r: Any) -> Any:
+    """The reading, as one that does not arrive."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(lost, inline=True)
+def _lost_by(r: types.Type) -> Callable:
+    kept = "".join(f"r.{field}, " for field in r.fields if field != "valid")  # `valid` is the last of every reading
+    return define("lost(r)", {"Reading": r.instance_class}, f"return Reading({kept}False)")
+
+
+@leaf
+def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+    """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
+    r, late = inputs[0].value, inputs[1]
+    kind = kind_of(p.faults.value, r)
+    last = s.last if kind == STUCK else r
+    x = last
+    if kind == WRONG:
+        x = wrong(r)
+    elif kind == GARBAGE:
+        x = nonsense(r, p.key, tick)
+    elif kind == DELAYED:
+        x = late.value
+    if silent(kind, p.key, 0, s.readings) or (kind == DELAYED and not late.due):
+        x = lost(r)
+    return Memory(last, s.readings + 1), (x,), GO_ON

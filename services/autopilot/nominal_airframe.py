@@ -1,0 +1,52 @@
+"""What the autopilot is told of the vehicle of a scene."""
+
+import math
+
+from lapwing.cosim.scene import Scene
+from lapwing.services.autopilot.controller_parameters import Airframe, lift, moments
+from lapwing.services.autopilot.motor import Motor
+from lapwing.services.common import vehicle_schema
+from lapwing.services.common.vehicle_schema import (
+    Effects,
+    airframe,
+    gravity,
+    rotor_constants,
+    start_height,
+    wake_slopes,
+)
+
+
+def known_airframe(scene: Scene) -> Airframe:
+    """What the autopilot is told of the vehicle: nominal numbers, in the air of home."""
+    return scene.once(_known_airframe)
+
+
+def _known_airframe(scene: Scene) -> Airframe:
+    frame = airframe(scene)
+    rotor = rotor_constants(scene)
+    torque_per_thrust = rotor.torque / rotor.thrust
+    thrust_coefficient = vehicle_schema.thrust_coefficient(scene)
+    x, y, z = zip(*frame.rotors.position, strict=True)
+    axis = frame.rotors.tilted_axis
+    engine = frame.motor
+    known = Airframe(
+        frame.mass.total,
+        frame.mass.inertia,
+        x,
+        y,
+        frame.rotors.reaction_sign,
+        torque_per_thrust,
+        Motor(thrust_coefficient, engine.gear_ratio, engine.speed_constant, engine.time_constant),
+        engine.max_voltage,
+        start_height(scene),
+        gravity(scene),
+        rotor_z=z if axis else (),
+        rotor_axis=axis,
+    )
+    alone, known = known, known._replace(wakes=wake_slopes(scene))
+    if "gyroscopic_torque" not in scene[Effects].tables or known.gravity <= 0.0:
+        return known
+    slope = 2.0 * math.sqrt(known.mass * known.gravity / lift(known) * thrust_coefficient)  # [N s/rad] in hover
+    # of tilted rotors the thrust turns, too, and of their spinning up only the part about z
+    torque = moments(known)[2] / lift(alone) if axis or known.wakes.thrust else torque_per_thrust
+    return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

@@ -1,0 +1,93 @@
+"""The `[autopilot]` of a scene: gains, what the controller flies on, and the attitude loop."""
+
+import math
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
+
+from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene.files import laid_over, named
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.autopilot import motor_limits
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import FOLDER, GainSet
+from lapwing.services.autopilot.height_sensor import distance_sensor
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.common import autopilot_parameters as parameters
+from lapwing.services.common import user_code, user_modules
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.parameter_file import parse
+
+ESTIMATORS = ("sensors", "truth")
+NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
+WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unreliable
+
+Option = bool | int | float | str | list[float]
+
+
+class Autopilot(Section):
+    """How the vehicle is flown."""
+
+    TABLE: ClassVar[str] = "autopilot"
+    OPTIONAL: ClassVar[bool] = True
+    gains: str = "tuned"  # one that ships or lies in gains/ beside the scene, or the path of a .toml file
+    estimator: str = "sensors"  # the Kalman filter; "truth": the true state; or "module:Name" of one of the user's own
+    estimator_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
+    attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
+    controller: str | None = None  # "module:Name" of one of the user's own, in the place of the cascaded PID
+    controller_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
+    operator: bool = False  # whether commands from outside are listened to
+    trajectory: bool = True  # follow the scene's [trajectory]; false: stand disarmed and wait for commands
+    parameters: dict[str, float] = Field(default_factory=dict)  # by name; a scene may name a file of them instead
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The gain set becomes the table `gains`, a file of parameters their values."""
+        if isinstance(name := named(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
+            path = files.find("autopilot.gains", "gain set", name, "gains", FOLDER)
+            content = files.toml(GainSet.TABLE, "autopilot.gains", path)
+            tree[GainSet.TABLE] = laid_over(content, tree.get(GainSet.TABLE, {}))
+        for key in ("controller", "estimator"):
+            code, where = named(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
+            if key == "estimator" and isinstance(code, str) and ":" not in code:
+                if code not in ESTIMATORS:
+                    raise KeyedError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
+            elif isinstance(code, str) and (module := user_code.parted(where, code)[0]) != user_code.MEMORY:
+                user_modules.embed(tree, files, where, module)
+        if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
+            path = files.folder / file
+            text = files.text("autopilot.parameters", "autopilot.parameters", path)
+            tree[cls.TABLE]["parameters"] = parse(text, path)
+
+    def check(self, scene: Scene) -> None:
+        """The parameters are sound, the vehicle suits the controller, and the sensors that it needs are carried."""
+        parameters.table(scene)
+        if not self.trajectory and not self.operator:
+            message = "false leaves nobody to say what to fly; set operator = true too"
+            raise KeyedError("autopilot.trajectory", message)
+        told = known_airframe(scene)
+        try:
+            build(scene[GainSet].plain(), told)
+        except KeyedError:
+            raise
+        except ValueError as error:
+            raise KeyedError("airframe", str(error)) from None
+        motor_limits.check(scene, told)
+        for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
+            if unused and getattr(self, f"{key}_options"):
+                message = "nobody to take them"
+                raise KeyedError(f"autopilot.{key}_options", message, f'autopilot.{key} = "module:Name" too')
+        if self.estimator == "sensors":
+            missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
+            if missing:
+                raise KeyedError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
+            horizontal = math.hypot(*environment(scene).magnetic_field_world[:2])
+            if horizontal < WEAKEST_FIELD:
+                message = f"got {horizontal:.1g} T across the vertical, of which the estimator takes its heading"
+                raise KeyedError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
+            reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
+            sensor = parameters.HEIGHT_SENSORS[reference]
+            known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
+            if known not in scene.tables("sensors"):
+                message = f"{reference} takes the height from a sensor that is not carried"
+                raise KeyedError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")

@@ -1,0 +1,33 @@
+"""A warning before the flight: gains that make a loop unstable about hover."""
+
+import math
+
+from lapwing.cosim.scene import Scene
+from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.margins import excess, open_loops
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.autopilot.schema import Autopilot
+from lapwing.services.common.communication_schema import Exchange
+
+MODELS = ("reduced", "multibody", "slung_load")  # of vehicles whose hover the margins are for
+
+
+def unstable_loops(scene: Scene) -> list[str]:
+    """A line for each loop of the scene's autopilot that is unstable about hover, with how far; empty if none is."""
+    if not scene.has(Autopilot) or scene.lookup("vehicle.model") not in MODELS or not known_airframe(scene).gravity:
+        return []
+    if scene[Autopilot].controller is not None:
+        return []  # whose loops are not known
+    config, exchange, airframe = scene[Autopilot], scene[Exchange], known_airframe(scene)
+    p = build(scene[GainSet].plain(), airframe)
+    loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)
+    found = {name: excess(response) for name, response in loops.items()}
+    return [f"gains {config.gains}: {name}: unstable{_by(factor)}" for name, factor in found.items() if factor != 1.0]
+
+
+def _by(factor: float) -> str:
+    if math.isnan(factor):
+        return " at any gain"
+    decibels = 20.0 * math.log10(factor)
+    return f", gain margin {-abs(decibels):.1f} dB: its gain is too {'high' if decibels > 0.0 else 'low'}"

@@ -1,0 +1,203 @@
+"""The `[environment]` of a scene: where and when it flies, in which air, over which ground."""
+
+import datetime
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.environment import FIRST_YEAR, LAST_YEAR, STANDARD, Environment, magnetic_field
+from lapwing.dynamics.geodesy import Home, normal_gravity
+from lapwing.dynamics.terrain import Level, Relief, relief
+from lapwing.services.common import height_file
+
+Length = Annotated[float, Field(gt=0.0, le=1e4)]
+Place = Annotated[float, Field(ge=-1e5, le=1e5)]
+Height = Annotated[float, Field(ge=-1e4, le=1e4)]
+Rise = Annotated[float, Field(ge=-1.0, le=1.0)]
+Turn = Annotated[float, Field(ge=-6.2832, le=6.2832)]
+Tesla = Annotated[float, Field(ge=-1e-4, le=1e-4)]
+MagneticField = Annotated[tuple[Tesla, Tesla, Tesla], Field(strict=False)]
+Heights = Annotated[tuple[float, ...], Field(strict=False)]
+Pair = Annotated[tuple[Place, Place], Field(strict=False)]
+
+
+class Table(BaseModel):
+    """A table within `[environment]`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class Steps(Table):
+    """Level treads and upright risers across a direction, from home on."""
+
+    distance: tuple[Length, ...] = Field(strict=False)  # [m] from home to each riser, growing
+    rise: tuple[Height, ...] = Field(strict=False)  # [m] of each, negative where it goes down
+    heading: Turn = 0.0  # [rad] in which they follow one another, 0 along x
+
+    def pairs(self) -> list[tuple[float, float]]:
+        """(distance, rise) of each; KeyedError where there are not as many of one as of the other."""
+        if len(self.distance) != len(self.rise):
+            raise KeyedError("steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}")
+        return list(zip(self.distance, self.rise, strict=True))
+
+
+class Grid(Table):
+    """Heights of points of a grid, bilinear between them, beyond it as at its edge; they count from that at home."""
+
+    file: str | None = None  # path relative to the scene: an .npy array, rows along world y, columns along x; a GeoTIFF
+    heights: tuple[Heights, ...] | None = Field(default=None, strict=False)  # [m] the same here; one of both
+    corner: Pair | None = None  # [m] world x and y of the first row and column; (0, 0), or what follows from reach
+    spacing: Length = 1.0  # [m] between neighbours
+    reach: Length | None = None  # [m] from home to each side of the square that is taken out of a GeoTIFF
+
+
+class Box(Table):
+    """A box that stands on the ground, its top level: something to land on, or to run into."""
+
+    position: Pair  # [m] world x and y of its centre
+    size: Annotated[tuple[Length, Length], Field(strict=False)]  # [m] length along its heading, width across
+    top: Height  # [m] world z of its top
+    heading: Turn = 0.0  # [rad] of its length, 0 along x
+
+
+class Cylinder(Table):
+    """An upright cylinder that stands on the ground, its top level."""
+
+    position: Pair  # [m] world x and y of its axis
+    radius: Length  # [m]
+    top: Height  # [m] world z of its top
+
+
+class Terrain(Table):
+    """The ground: the sum of slope, bumps and grid, or steps; boxes and cylinders stand on it. Level without keys."""
+
+    slope: Annotated[tuple[Rise, Rise], Field(strict=False)] = (0.0, 0.0)  # rise of the ground along world x and y
+    bump_height: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0  # [m] amplitude A of bumps A sin(k x) sin(k y)
+    bump_length: Annotated[float, Field(ge=0.01, le=1e4)] = 1.0  # [m] their wavelength 2 pi / k
+    steps: Steps | None = None
+    grid: Grid | None = None
+    box: tuple[Box, ...] = Field(default=(), strict=False)  # each with a level top: to land on, or to run into
+    cylinder: tuple[Cylinder, ...] = Field(default=(), strict=False)  # the same, round
+
+    def ground(self) -> Level | Relief:
+        """What kernels are given. Raises KeyedError, the key seen from this table."""
+        grid, steps = self.grid, self.steps
+        if grid and grid.heights is None:
+            raise KeyedError("grid", "got neither", "heights, or a file of them")
+        rows = [len(row) for row in grid.heights or ()] if grid else []
+        if len(set(rows)) > 1:
+            raise KeyedError("grid.heights", f"got rows of {min(rows)} to {max(rows)} numbers", "rows of equal length")
+        return relief(
+            self.slope,
+            self.bump_height,
+            self.bump_length,
+            steps.pairs() if steps else (),
+            steps.heading if steps else 0.0,
+            [(*box.position, *box.size, box.heading, box.top) for box in self.box],
+            [(*cylinder.position, cylinder.radius, cylinder.top) for cylinder in self.cylinder],
+            np.array(grid.heights) if grid else None,
+            grid.corner or (0.0, 0.0) if grid else (0.0, 0.0),
+            grid.spacing if grid else 1.0,
+        )
+
+
+class EnvironmentTable(Section):
+    """Where and when: home on the Earth, the day's air, gravity, the magnetic field, the ground."""
+
+    TABLE: ClassVar[str] = "environment"
+    SHARED: ClassVar[bool] = True
+    date: str = Field(default="2025-07-01", pattern=r"^\d{4}-\d{2}-\d{2}$")  # of the magnetic field
+    gravity_model: Literal["standard", "wgs84"] = "standard"  # 9.80665 m/s^2, or that of home's latitude
+    gravity: float | None = Field(default=None, ge=0.0, le=30.0)  # [m/s^2] at sea level, in the place of a model's
+    magnetic_field: MagneticField | None = None  # [T] east, north, up; if left out, the World Magnetic Model's at home
+    home: Home = STANDARD.home
+    atmosphere: Atmosphere = STANDARD.atmosphere
+    terrain: Terrain = Terrain()
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """The heights of a grid's file become its `heights`."""
+        try:
+            given = cls.model_validate(tree.get(cls.TABLE, {}))
+        except ValidationError:
+            return  # refused with its key once all tables are there
+        grid, key = given.terrain.grid, "environment.terrain.grid"
+        if grid is None or grid.file is None:
+            if grid and grid.reach is not None:
+                raise KeyedError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
+            return
+        if grid.heights is not None:
+            raise KeyedError(key, "has file and heights", "one of them")
+        path, table = files.folder / grid.file, tree[cls.TABLE]["terrain"]["grid"]
+        if path.suffix in height_file.GEOTIFF:
+            points = _points(grid, key)
+            heights = height_file.of_geotiff(f"{key}.file", path, given.home, points, grid.spacing)
+            table["corner"] = [-points * grid.spacing] * 2
+        elif path.suffix != ".npy":
+            raise KeyedError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")
+        elif grid.reach is not None:
+            raise KeyedError(f"{key}.reach", "of an array all is taken", "none, or a GeoTIFF")
+        else:
+            heights = height_file.of_array(f"{key}.file", path)
+        table["heights"] = heights.tolist()
+
+    def check(self, scene: Scene) -> None:
+        """There is such a day, and such a ground."""
+        try:
+            _resolved(self)
+        except KeyedError as error:
+            raise error.under(self.TABLE) from None
+
+    def resolved(self) -> dict[str, Any]:
+        """As of any table."""
+        return {**super().resolved(), "home": self.home._asdict(), "atmosphere": self.atmosphere._asdict()}
+
+
+@lru_cache(maxsize=16)
+def _resolved(table: EnvironmentTable) -> Environment:
+    """In numbers. Raises KeyedError, the key seen from the table."""
+    try:
+        terrain = table.terrain.ground()
+    except KeyedError as error:
+        raise error.under("terrain") from None
+    field = table.magnetic_field or magnetic_field(table.home, _day(table.date))
+    gravity = table.gravity
+    if gravity is None:
+        gravity = normal_gravity(table.home.latitude_deg) if table.gravity_model == "wgs84" else STANDARD.gravity
+    return Environment(table.home, table.atmosphere, gravity, field, terrain)
+
+
+def _day(date: str) -> datetime.date:
+    try:
+        day = datetime.date.fromisoformat(date)
+    except ValueError as error:
+        raise KeyedError("date", f"got {date}: {error}", "a day, as 2025-07-01") from None
+    if not FIRST_YEAR <= day.year <= LAST_YEAR:
+        expected = f"a day of {FIRST_YEAR} to {LAST_YEAR}, or magnetic_field"
+        raise KeyedError("date", f"got {date}, of which no World Magnetic Model is known", expected)
+    return day
+
+
+def _points(grid: Grid, key: str) -> int:
+    """How many points of a GeoTIFF's grid there are from home to each side."""
+    if grid.reach is None:
+        raise KeyedError(f"{key}.reach", "missing", "[m] from home to each side of what is taken out of the GeoTIFF")
+    if grid.corner is not None:
+        raise KeyedError(f"{key}.corner", "follows from reach", "none beside a GeoTIFF")
+    points = int(grid.reach / grid.spacing)
+    if points < 1:
+        raise KeyedError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
+    if (2 * points + 1) ** 2 > height_file.MOST:
+        expected = f"at most {height_file.MOST} points: a shorter reach or a wider spacing"
+        raise KeyedError(f"{key}.spacing", f"got {grid.spacing:g} over a reach of {grid.reach:g} m", expected)
+    return points
+
+
+def environment(scene: Scene) -> Environment:
+    """What all services of the scene's run agree on."""
+    return _resolved(scene[EnvironmentTable])

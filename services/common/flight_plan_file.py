@@ -1,0 +1,174 @@
+"""Missions from files: QGroundControl's .plan (JSON) and .waypoints (QGC WPL 110), in the autopilot's terms.
+
+Sources: MAVLink guide, "File formats"; QGroundControl developer guide, "Plan file format". Places are relative to the
+home of the simulated world; altitudes of frame 3 count from where the vehicle stands, those of frame 0 from the sea.
+"""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.messages import MissionItem, OperatorCommand, Vector3
+
+OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # overrides of a scene that flies a plan
+READY_TIMEOUT = 60.0  # [s] the vehicle gets to become ready for take-off
+SOURCE = "plan"
+HEADER = "QGC WPL 110"
+_ABOVE_SEA, _ABOVE_HOME, _NO_PLACE = (0, 5), (3, 6), 2  # MAV_FRAME
+
+_Params = Sequence[float]
+_ACTIONS: dict[int, tuple[str, Callable[[_Params], dict[str, Any]]]] = {  # by MAV_CMD
+    16: ("waypoint", lambda p: {"hold": _zero(p[0]), "radius": p[1] if p[1] > 0.0 else math.nan, "yaw": _yaw(p[3])}),
+    19: ("loiter_time", lambda p: {"hold": _zero(p[0])}),
+    20: ("return", lambda p: {}),
+    21: ("land", lambda p: {"yaw": _yaw(p[3])}),
+    22: ("takeoff", lambda p: {"yaw": _yaw(p[3])}),
+    93: ("delay", lambda p: {"hold": _zero(p[0])}),
+    112: ("delay", lambda p: {"hold": _zero(p[0])}),
+    115: ("yaw", lambda p: {"yaw": _yaw(p[0])}),
+    177: ("jump", lambda p: {"values": (p[0], p[1])}),
+    178: ("speed", lambda p: {"values": (p[1],)}),
+}
+
+
+class _Datum(NamedTuple):
+    """What places in a plan count from."""
+
+    home: Home
+    ground: float  # [m] world z of the vehicle where it stands
+
+
+def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -> list[OperatorCommand]:
+    """The commands that upload a plan, fly it, and end the run with the landing.
+
+    Args:
+        path: of the file.
+        standing_height: world z [m] of the vehicle where it stands, from which altitudes above home count.
+        home: origin of the world frame.
+
+    Raises:
+        ValueError: (one line) no such file, not of these formats, or an item that cannot be flown.
+    """
+    datum = _Datum(home, standing_height)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
+    try:
+        if text.startswith(HEADER):
+            items, fence, rally = _waypoints(text, datum)
+        else:
+            items, fence, rally = _plan(json.loads(text), datum)
+    except (KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
+        raise ValueError(f"{path}: not a plan: {type(error).__name__} at {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: not a plan: nested too deeply") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{path}: neither JSON (.plan) nor {HEADER} (.waypoints): {error}") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if not items:
+        raise ValueError(f"{path}: holds no mission item")
+
+    steps: list[tuple[str, tuple[float, ...], Sequence[Any]]] = [
+        ("mission_upload", (), items),
+        ("fence_upload", (), fence),
+        ("rally_upload", (), rally),
+        ("mission", (), ()),
+        ("arm", (0.0, READY_TIMEOUT), ()),
+        ("finish", (), ()),
+    ]
+    return [
+        OperatorCommand(kind, SOURCE, number, values, "", tuple(given))
+        for number, (kind, values, given) in enumerate(steps, start=1)
+    ]
+
+
+def _waypoints(text: str, datum: _Datum) -> tuple[list[Any], list[Any], list[Any]]:
+    rows = [line.split() for line in text.splitlines()[1:] if line.strip()]
+    items = []
+    for number, row in enumerate(rows):
+        if len(row) != 12:
+            raise ValueError(f"item {number}: expected 12 columns, got {len(row)}")
+        place = [float(v) for v in row[8:11]]
+        if number == 0 and row[3] == "16" and row[2] == "0":
+            continue  # by custom the first row is home
+        items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place, datum))
+    return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
+
+
+def _jump_back(item: Any, left_out: int) -> Any:
+    """Jumps count the rows with home."""
+    return item._replace(values=(item.values[0] - left_out, item.values[1])) if item.action == "jump" else item
+
+
+def _plan(data: dict, datum: _Datum) -> tuple[list[Any], list[Any], list[Any]]:
+    if data.get("fileType") != "Plan":
+        raise ValueError('expected "fileType": "Plan"')
+    items, numbers = [], {}
+    for number, raw in enumerate(data["mission"]["items"]):
+        if raw.get("type") != "SimpleItem":
+            raise ValueError(f"item {number}: expected a SimpleItem, got {raw.get('type')}")
+        params = [math.nan if v is None else float(v) for v in raw["params"]]
+        numbers[raw.get("doJumpId", number + 1)] = number
+        items.append(_item(number, raw["command"], raw["frame"], params[:4], params[4:7], datum))
+    items = [
+        i._replace(values=(float(numbers[int(i.values[0])]), i.values[1])) if i.action == "jump" else i for i in items
+    ]
+    fence = data.get("geoFence", {})
+    shapes = [_item_of(datum, "fence_circle_in" if c["inclusion"] else "fence_circle_out", *c["circle"]["center"],
+                       radius=float(c["circle"]["radius"])) for c in fence.get("circles", ())]  # fmt: skip
+    for polygon in fence.get("polygons", ()):
+        action = "fence_inclusion" if polygon["inclusion"] else "fence_exclusion"
+        count = (float(len(polygon["polygon"])),)
+        shapes += [_item_of(datum, action, *corner, values=count) for corner in polygon["polygon"]]
+    rally = [
+        _item_of(datum, "rally", x, y, datum.ground + z) for x, y, z in data.get("rallyPoints", {}).get("points", ())
+    ]
+    return items, shapes, rally
+
+
+def _item(number: int, command: int, frame: int, params: list[float], place: list[float], datum: _Datum) -> Any:
+    if command not in _ACTIONS:
+        raise ValueError(f"item {number}: unknown command {command}; known: {', '.join(map(str, _ACTIONS))}")
+    if frame not in (*_ABOVE_SEA, *_ABOVE_HOME, _NO_PLACE):
+        raise ValueError(f"item {number}: unknown frame {frame}; expected 0, 2 or 3")
+    action, told = _ACTIONS[command]
+    latitude, longitude, height = place
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0) and action == "waypoint":
+        raise ValueError(f"item {number}: expected a latitude and a longitude, got {latitude:g}, {longitude:g}")
+    if frame in _ABOVE_SEA:
+        height -= datum.home.height
+    else:
+        height += datum.ground
+    if action in ("waypoint", "land", "takeoff", "loiter_time"):
+        return _item_of(datum, action, latitude, longitude, height, **told(params))
+    return _made(action, (math.nan,) * 3, **told(params))
+
+
+def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:
+    """An item at a place on the Earth, at a world z of `height` [m]; without a place, NaN."""
+    if math.isnan(latitude) or (latitude, longitude) == (0.0, 0.0):
+        return _made(action, (math.nan, math.nan, height), **more)
+    x, y, _ = geodetic_to_enu(datum.home, float(latitude), float(longitude), datum.home.height + height)
+    return _made(action, (x, y, height), **more)
+
+
+def _made(action: str, place: tuple[float, float, float], **more: Any) -> Any:
+    item = MissionItem(action, Vector3(*place), math.nan, math.nan, 0.0, ())
+    return item._replace(**more)
+
+
+def _zero(value: float) -> float:
+    return 0.0 if math.isnan(value) else value
+
+
+def _yaw(heading_deg: float) -> float:
+    """World yaw [rad] of a heading [deg]."""
+    return math.nan if math.isnan(heading_deg) else math.remainder(0.5 * math.pi - math.radians(heading_deg), math.tau)

@@ -1,0 +1,76 @@
+"""The tables of a scene that more than one service reads."""
+
+import importlib.resources
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, field_validator
+
+import lapwing.scenes
+from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.dynamics.config_error import KeyedError
+
+SHIPPED = Path(str(importlib.resources.files(lapwing.scenes)))  # folder of the scenes that ship
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
+
+Pair = Annotated[tuple[float, float], Field(strict=False)]  # along x and y
+Names = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class Run(Section):
+    """What ends a run, and the seed of all its randomness."""
+
+    TABLE: ClassVar[str] = "run"
+    SHARED: ClassVar[bool] = True
+    title: str = ""  # one line for `lapwing scenes`
+    seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
+    duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
+    settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
+    restart: bool | Names = ()  # services that are started again where they are killed; true: all of the lock step
+    speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
+
+    @field_validator("restart", mode="before")
+    @classmethod
+    def _all_or_names(cls, value: object) -> object:
+        names = isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
+        if not (names or isinstance(value, bool)):
+            raise KeyedError("", f"got {value!r}", "true, false or a list of services")
+        return value
+
+
+def title(scene: Path) -> str:
+    """What a scene's file calls it; no other of its keys is looked at.
+
+    Raises:
+        SceneError: it is not a TOML file.
+    """
+    run = Files(scene.parent).toml("scene", "scene", scene).get(Run.TABLE, {})
+    return str(run.get("title", "")) if isinstance(run, dict) else ""
+
+
+class CooperativeLoad(Section):
+    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); a tuple has an entry for each."""
+
+    TABLE: ClassVar[str] = "cooperative_load"
+    OPTIONAL: ClassVar[bool] = True
+    quad_mass: tuple[float, ...] = Field(min_length=2, strict=False)  # [kg]
+    quad_inertia: tuple[Triple, ...] = Field(min_length=2, strict=False)  # [kg m^2] principal moments
+    link_length: tuple[float, ...] = Field(min_length=2, strict=False)  # [m]
+    link_start: tuple[Triple, ...] = Field(min_length=2, strict=False)  # unit vectors from quadrotor to load
+    load_mass: float  # [kg]
+    load_start: Triple  # [m] world frame
+    load_velocity_start: Triple = (0.0, 0.0, 0.0)  # [m/s] world frame
+    gravity: float = 9.81  # [m/s^2]
+
+
+class Published(Section):
+    """Figures from the literature that a run's figures are shown beside."""
+
+    TABLE: ClassVar[str] = "published"
+    source: str = "published"  # where the figures are from
+    rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
+
+
+def follows_trajectory(scene: Scene) -> bool:
+    """Whether the vehicle flies along the scene's `[trajectory]`: there is one, and no operator takes its place."""
+    return scene.has("trajectory") and not (scene.has("autopilot") and not scene.lookup("autopilot.trajectory"))

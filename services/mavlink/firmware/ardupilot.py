@@ -1,0 +1,75 @@
+"""ArduPilot's copter: modes by number; whole numbers travel as floats of the same value."""
+
+from collections.abc import Sequence
+
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.mode_entry import FlightMode
+from lapwing.services.mavlink.px4_facts import Fact
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+AUTOPILOT = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+HOME_FIRST = GUIDED = True
+TAKEOFF_ABOVE_SEA = EVENTS = False
+PARAMETER_ENCODING = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
+
+_STABILIZE, _ACRO, _CIRCLE = 0, 1, 7
+_ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
+_SHOWN = {  # what a mode looks like
+    "takeoff": _GUIDED,
+    "hold": _GUIDED,
+    "goto": _GUIDED,
+    "offboard": _GUIDED,
+    "mission": _AUTO,
+    "return": _RTL,
+    "land": _LAND,
+    "descend": _LAND,
+    "position_control": _LOITER,
+    "altitude_control": _ALT_HOLD,
+    "stabilized": _STABILIZE,
+    "acro": _ACRO,
+    "orbit": _CIRCLE,
+}
+MODES = (
+    FlightMode("stabilized", "STABILIZE", _STABILIZE),
+    FlightMode("acro", "ACRO", _ACRO),
+    FlightMode("altitude_control", "ALT_HOLD", _ALT_HOLD, advanced=False),
+    FlightMode("mission", "AUTO", _AUTO, mavlink.MAV_STANDARD_MODE_MISSION),
+    FlightMode("hold", "GUIDED", _GUIDED),
+    FlightMode("position_control", "LOITER", _LOITER, advanced=False),
+    FlightMode("return", "RTL", _RTL, mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
+    FlightMode("land", "LAND", _LAND, mavlink.MAV_STANDARD_MODE_LAND),
+    FlightMode("position_control", "POSHOLD", _POSHOLD, advanced=False),
+    FlightMode("hold", "BRAKE", _BRAKE),
+)
+_KINDS = {mode.number: mode.kind for mode in MODES}
+
+
+def facts(description: VehicleDescription) -> Sequence[Fact]:
+    """None: ArduPilot's ground stations ask for other ones."""
+    return ()
+
+
+def custom_mode(main: float, sub: float) -> int:
+    """The number of a mode."""
+    return int(main)
+
+
+def mode_number(mode: str) -> int:
+    """The custom mode that shows a mode of ours; what is none of ArduPilot's shows as GUIDED."""
+    return _SHOWN.get(mode, _GUIDED)
+
+
+def mode_kind(number: int) -> str | None:
+    """The kind of command that enters a custom mode."""
+    return _KINDS.get(number)
+
+
+def param_float(value: float, integer: bool) -> float:
+    """A parameter as it travels."""
+    return float(round(value)) if integer else value
+
+
+def param_value(value: float, integer: bool) -> float:
+    """A parameter that has travelled."""
+    return float(round(value)) if integer else value

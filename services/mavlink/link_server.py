@@ -1,0 +1,118 @@
+"""An adapter with its sockets: waits for endpoints and for the vehicle at once, and lets neither starve the other."""
+
+import os
+import selectors
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from lapwing.messages import OperatorInput, header
+from lapwing.messages.topics import ESTIMATE, TOPICS, Topic
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.link_options import Options
+from lapwing.services.mavlink.links import Link, open_link
+from lapwing.services.mavlink.telemetry_timing import Pacing
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+WAIT = 0.05  # [s] at most until something else is looked at
+
+
+class Hub:
+    """Links of one vehicle; a context manager. Those of several vehicles wait together.
+
+    Attributes:
+        selector: of the sockets of all that wait together.
+    """
+
+    def __init__(
+        self,
+        description: VehicleDescription,
+        options: Options,
+        operate: Callable[[bytes], None] | None,
+        beside: "Hub | None" = None,
+    ):
+        """Open every link.
+
+        Args:
+            description: what flies.
+            options: the links, and who may command.
+            operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
+            beside: that of another vehicle, whose `wait` serves the sockets of this one, too.
+
+        Raises:
+            ValueError: a link cannot be opened.
+        """
+
+        def put(command: Any) -> None:
+            assert operate
+            operate(OperatorInput(header(0, description.name), (command,)).encode())
+
+        operator = put if operate else None
+        self.adapter = Adapter(description, operator, options.key, options.insecure, options.log)
+        self._pacing = Pacing(options.speed)
+        self._topics = {topic.key(description.name): topic for topic in TOPICS}
+        self.selector: selectors.BaseSelector = beside.selector if beside else selectors.DefaultSelector()
+        self._owns = beside is None
+        self._woken = os.eventfd(0, os.EFD_NONBLOCK)
+        if self._owns:
+            self.selector.register(self._woken, selectors.EVENT_READ, self._drain)
+        self._links: list[Link] = []
+        try:
+            for url in options.urls:
+                self._links.append(open_link(url, self.adapter, self.selector))
+        except ValueError:
+            self.close()
+            raise
+
+    def wake(self) -> None:
+        """End the present wait; may be called from any thread."""
+        with suppress(OSError):  # this is the end
+            os.eventfd_write(self._woken, 1)
+
+    def _drain(self) -> None:
+        os.eventfd_read(self._woken)
+
+    def wait(self, seconds: float = WAIT) -> None:
+        """Serve the endpoints once, as soon as there is something; or until woken, or for so long."""
+        ready = self.selector.select(seconds)
+        self.adapter.tick(time.monotonic())
+        for key, _ in ready:
+            key.data()
+
+    def replay(self, key: str, time_ns: int, payload: bytes) -> None:
+        """A recorded message of a topic, by its name in the log; serves the endpoints now and then."""
+        topic = self._topics.get(key)
+        if topic:
+            self.take(topic, time_ns, payload)
+        if topic is ESTIMATE:
+            self.wait(0.0)
+
+    def take(self, topic: Topic, time_ns: int, payload: bytes) -> None:
+        """The vehicle has published a message."""
+        wall = time.monotonic()
+        self.adapter.take(topic, time_ns, payload, wall)
+        if topic is ESTIMATE:
+            self._pacing.note(time_ns * 1e-9, wall)
+
+    def report(self) -> Sequence[str]:
+        """What there is to tell at the end."""
+        lines = [self._pacing.report()]
+        counts = self.adapter.counts
+        if refused := ", ".join(f"{count} {what}" for what, count in sorted(counts.items()) if what != "received"):
+            lines.append(f"endpoints: {counts['received']} messages received; {refused}")
+        return lines
+
+    def close(self) -> None:
+        """Close every link."""
+        for link in self._links:
+            link.close()
+        if self._owns:
+            self.selector.close()
+        os.close(self._woken)
+
+    def __enter__(self) -> "Hub":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

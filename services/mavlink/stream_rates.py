@@ -1,0 +1,66 @@
+"""Which messages of the telemetry one endpoint gets, and when the next of each is due."""
+
+from typing import Any
+
+from lapwing.services.mavlink.telemetry import streams
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+
+SECOND = 1_000_000_000
+MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] that MESSAGE_INTERVAL can hold
+
+
+class Schedule:
+    """Intervals of the streams to one endpoint: of the telemetry's table, unless it has asked for others."""
+
+    def __init__(self, vehicle: VehicleView):
+        """The intervals of a ground station, all due now."""
+        self._vehicle = vehicle
+        self._asked: dict[int, int] = {}  # interval [ns] by message that the endpoint has asked for; 0: never
+        self._onboard = False
+        self._intervals: dict[int, int] = {}
+        self._due: dict[int, int] = {}
+        self._plan()
+
+    def set_onboard(self, onboard: bool) -> None:
+        """Whether the endpoint is a companion computer, which gets other rates than a ground station."""
+        if onboard != self._onboard:
+            self._onboard = onboard
+            self._plan()
+
+    def set_interval(self, number: int, interval_us: float) -> None:
+        """Send a message every so many microseconds; 0: as usual, negative: never.
+
+        Raises:
+            OverflowError: an infinite interval.
+        """
+        if interval_us == 0.0:
+            self._asked.pop(number, None)
+        else:
+            self._asked[number] = 0 if interval_us < 0.0 else max(1, min(MAX_INTERVAL, round(interval_us * 1e3)))
+        self._plan()
+
+    def interval_us(self, number: int) -> int:
+        """Interval of a message [us], -1 for never."""
+        return self._intervals.get(number, 0) // 1000 or -1
+
+    def due(self, built: dict[int, list[Any]]) -> list[Any]:
+        """The messages that are due; `built` holds those of this moment, which all endpoints share."""
+        now, found = self._vehicle.time_ns, []
+        for number, interval in self._intervals.items():
+            due = self._due[number]
+            if interval and now >= due:
+                self._due[number] = max(due + interval, now - interval)  # keeps the mean rate, catches up no more
+                if number not in built:
+                    built[number] = streams()[number].messages(self._vehicle)
+                found += built[number]
+        return found
+
+    def _plan(self) -> None:
+        """Set all intervals anew."""
+        for number, stream in streams().items():
+            rate = stream.onboard if self._onboard else stream.ground
+            rate = self._vehicle.flavour.RATES.get(stream.name, rate)
+            interval = self._asked.get(number, round(SECOND / rate) if rate else 0)
+            if self._intervals.get(number) != interval:
+                self._intervals[number] = interval
+                self._due[number] = self._vehicle.time_ns

@@ -1,0 +1,118 @@
+"""What the sensors that look outside read: distances, optical flow, and the air that comes along."""
+
+import math
+from typing import Any
+
+from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, RANGEFINDER, SONAR
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import Quaternion, from_euler, saturated
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+
+CENTIMETRE = 0.01
+SONAR_ID, RANGEFINDER_ID = 0, 1
+SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] that an airspeed is indicated for
+EIGHTH = 45.0  # [deg] between two of MAV_SENSOR_ROTATION's headings
+QUALITY = 255  # of a flow that is seen
+NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # of an orientation that has a name
+DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
+
+
+def good_distance(v: VehicleView) -> bool:
+    """Whether every sensor of distances gives readings."""
+    found = [v.get(topic) for topic in (SONAR, RANGEFINDER)]
+    return any(found) and not any(math.isnan(m.range) for m in found if m)
+
+
+def good_flow(v: VehicleView) -> bool:
+    """Whether the camera sees the ground pass by."""
+    m = v.get(OPTICAL_FLOW)
+    return m is not None and math.isfinite(m.flow[0])
+
+
+def _airspeed(v: VehicleView) -> Any:
+    """What the autopilot has got of the airspeed; what the sensor reads where no operator is listened to."""
+    return v.get(AIRSPEED_RECEIVED) or v.get(AIRSPEED)
+
+
+def good_airspeed(v: VehicleView) -> bool:
+    """Whether the newest reading is one."""
+    m = _airspeed(v)
+    return m is not None and math.isfinite(m.fluid_pressure)
+
+
+def indicated_airspeed(v: VehicleView) -> float | None:
+    """Speed [m/s] of the air along the tube by its pressure, at the density of the sea; None without a reading."""
+    return math.sqrt(max(0.0, 2.0 * _airspeed(v).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
+
+
+def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaternion]:
+    """MAV_SENSOR_ORIENTATION of a ray, and where it has no number of its own the turn in FRD that leads there from x.
+
+    Args:
+        azimuth_deg: from body x towards y, which is to the left.
+        elevation_deg: above the body's xy plane.
+    """
+    if abs(elevation_deg) == 90.0:
+        return (mavlink.MAV_SENSOR_ROTATION_PITCH_90, NO_ROTATION) if elevation_deg > 0.0 else DOWN
+    if elevation_deg == 0.0 and azimuth_deg % EIGHTH == 0.0:
+        return round(-azimuth_deg / EIGHTH) % 8, NO_ROTATION  # YAW_45 and so on, clockwise from above
+    turn = from_euler(0.0, math.radians(elevation_deg), math.radians(-azimuth_deg))
+    return mavlink.MAV_SENSOR_ROTATION_CUSTOM, turn
+
+
+@stream("DISTANCE_SENSOR", 5.0, 10.0)
+def distance_sensors(v: VehicleView) -> Any:
+    """Distance that each sees; nothing in reach reads just beyond it."""
+    found = []
+    if (sonar := v.get(SONAR)) is not None:
+        found.append(_distance(v, sonar, SONAR_ID, mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND, DOWN))
+    if (laser := v.get(RANGEFINDER)) is not None:
+        towards = orientation(*v.description.ray_deg)
+        found.append(_distance(v, laser, RANGEFINDER_ID, mavlink.MAV_DISTANCE_SENSOR_LASER, towards))
+    return [message for message in found if message is not None]
+
+
+def _distance(v: VehicleView, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:
+    if math.isnan(m.range):
+        return None
+    minimum, maximum = (saturated(metres / CENTIMETRE, 16, unsigned=True) for metres in (m.min_range, m.max_range))
+    distance = maximum + 1 if m.range == math.inf else 0 if m.range == -math.inf else round(m.range / CENTIMETRE)
+    return mavlink.MAVLink_distance_sensor_message(
+        v.boot_ms,
+        minimum,
+        maximum,
+        min(distance, 0xFFFF),
+        kind,
+        number,
+        towards[0],
+        saturated(m.variance / CENTIMETRE**2, 8, unsigned=True),
+        m.field_of_view,
+        m.field_of_view,
+        list(towards[1]),
+    )
+
+
+@stream("OPTICAL_FLOW_RAD", 1.0, 10.0)
+def optical_flow(v: VehicleView) -> Any:
+    """The flow of the newest reading over the time between two; without texture its quality is 0."""
+    m = v.get(OPTICAL_FLOW)
+    if m is None:
+        return None
+    interval, seen = v.description.flow_interval, good_flow(v)
+    flow_x, flow_y = m.flow if seen else (0.0, 0.0)
+    turn_x, turn_y = m.rate
+    return mavlink.MAVLink_optical_flow_rad_message(
+        v.boot_us,
+        0,
+        round(1e6 * interval),
+        interval * flow_x,  # about FRD's x, and about its y, which points the other way than FLU's
+        -interval * flow_y,
+        interval * turn_x,
+        -interval * turn_y,
+        0.0,  # its gyroscopes are those of x and y
+        0,
+        QUALITY if seen else 0,
+        0,
+        m.distance if seen else -1.0,
+    )

@@ -1,0 +1,59 @@
+"""The true state, for clients that test estimators and log analyses."""
+
+import math
+from typing import Any
+
+from lapwing.messages.topics import TRUTH
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.frames import saturated, swap_world
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+
+MILLI_G = 9.80665e-3  # [m/s^2]
+
+
+@stream("HIL_STATE_QUATERNION", 15.0)
+def true_state(v: VehicleView) -> Any:
+    """The true state; the acceleration is dv/dt along the body's axes."""
+    m, truth = v.truth, v.get(TRUTH)
+    if m is None:
+        return None
+    latitude, longitude, altitude = m.geodetic
+    air_speed = saturated(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
+    acceleration = _to_body(m.attitude, swap_world(tuple(truth.acceleration)))
+    return mavlink.MAVLink_hil_state_quaternion_message(
+        v.boot_us,
+        list(m.attitude),
+        *m.omega_frd,
+        saturated(latitude * 1e7, 32),
+        saturated(longitude * 1e7, 32),
+        saturated(altitude * 1e3, 32),
+        *[saturated(u * 1e2, 16) for u in m.velocity_ned],
+        air_speed,
+        air_speed,
+        *[saturated(a / MILLI_G, 16) for a in acceleration],
+    )
+
+
+@stream("WIND_COV", 0.5, 1.0)
+def wind(v: VehicleView) -> Any:
+    """The wind that blows where the vehicle is: the velocity of the air, and the altitude above the sea."""
+    m, truth = v.truth, v.get(TRUTH)
+    if m is None:
+        return None
+    return mavlink.MAVLink_wind_cov_message(
+        v.boot_us, *swap_world(tuple(truth.wind)), 0.0, 0.0, m.geodetic[2], 0.0, 0.0
+    )
+
+
+def _to_body(q: tuple[float, float, float, float], a: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Components along the body's axes of a vector given along the world's."""
+    w, x, y, z = q
+    # v' = v - 2 u x (w v - u x v) with u the vector part: the inverse rotation
+    c = (y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0])
+    d = (w * a[0] - c[0], w * a[1] - c[1], w * a[2] - c[2])
+    return (
+        a[0] - 2.0 * (y * d[2] - z * d[1]),
+        a[1] - 2.0 * (z * d[0] - x * d[2]),
+        a[2] - 2.0 * (x * d[1] - y * d[0]),
+    )

@@ -1,0 +1,59 @@
+"""How a message of the telemetry is declared: its name, its rates, and the function that builds it."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from lapwing.services.mavlink.dialect import id_of
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+
+Builder = Callable[[VehicleView], Any]  # the message, None while there is nothing to say, or a list of several
+
+
+class Stream(NamedTuple):
+    """A message that is sent again and again, or on request only where its rates are 0."""
+
+    name: str
+    ground: float  # [Hz] to a ground station, as PX4 sends it there
+    onboard: float  # [Hz] to a companion computer
+    build: Builder
+
+    def messages(self, vehicle: VehicleView) -> list[Any]:
+        """What there is to say now."""
+        found = self.build(vehicle)
+        if found is None:
+            return []
+        return found if isinstance(found, list) else [found]
+
+
+STREAMS: dict[int, Stream] = {}
+"""Every stream by the number of its message: what the dialect lacks is not here."""
+
+
+Requested = Callable[[VehicleView, float], list[Any]]  # the messages for parameter 2 of the request
+
+ON_REQUEST: dict[int, Requested] = {}
+"""Messages that are sent on request only and depend on a parameter of it, by number."""
+
+
+def on_request(name: str) -> Callable[[Requested], Requested]:
+    """Declare the builder of messages that a request's second parameter chooses."""
+
+    def declare(build: Requested) -> Requested:
+        number = id_of(name)
+        if number is not None:
+            ON_REQUEST[number] = build
+        return build
+
+    return declare
+
+
+def stream(name: str, ground: float = 0.0, onboard: float | None = None) -> Callable[[Builder], Builder]:
+    """Declare the builder of a message; `onboard` is `ground` where it is left out."""
+
+    def declare(build: Builder) -> Builder:
+        number = id_of(name)
+        if number is not None:
+            STREAMS[number] = Stream(name, ground, ground if onboard is None else onboard, build)
+        return build
+
+    return declare

@@ -1,0 +1,149 @@
+"""What the vehicle is doing, and whether it is well."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from lapwing.messages.topics import ESTIMATE
+from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.telemetry.external_sensors import good_airspeed, good_distance, good_flow
+from lapwing.services.mavlink.telemetry.message_stream import stream
+from lapwing.services.mavlink.telemetry.power import power
+from lapwing.services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
+from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_type import vehicle_type
+
+NONE = 0xFFFF  # no item of a mission
+MANUAL = ("position_control", "altitude_control", "stabilized", "acro")  # modes under the sticks
+CRITICAL = 2  # Status.battery_warning
+
+_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_LOGGING
+)
+_SENSORS = {  # with the name that the estimator has for them
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: (good_imu, "imu"),
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: (good_mag, "magnetometer"),
+    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: (good_baro, "barometer"),
+    mavlink.MAV_SYS_STATUS_SENSOR_GPS: (good_gps, "gps"),
+}
+_OPTIONAL = {  # by the sensors that they stand for, and only where one of them is fitted
+    ("sonar", "rangefinder"): (mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION, good_distance, "sonar"),  # any distance
+    ("optical_flow",): (mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW, good_flow, "optical_flow"),
+    ("airspeed",): (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, good_airspeed, "airspeed"),
+}
+
+
+_BETWEEN = {  # ground and air, by the mode or the item of a mission
+    "takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF,
+    mavlink.MAV_CMD_NAV_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    "land": mavlink.MAV_LANDED_STATE_LANDING,
+    "descend": mavlink.MAV_LANDED_STATE_LANDING,
+    mavlink.MAV_CMD_NAV_LAND: mavlink.MAV_LANDED_STATE_LANDING,
+    mavlink.MAV_CMD_NAV_VTOL_LAND: mavlink.MAV_LANDED_STATE_LANDING,
+}
+
+
+@stream("HEARTBEAT", 1.0)
+def heartbeat(v: VehicleView) -> Any:
+    """I am here, in this mode."""
+    s = v.status
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+    if s.armed:
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    if s.mode in MANUAL:
+        base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+    else:
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+    state = mavlink.MAV_STATE_ACTIVE if s.armed else mavlink.MAV_STATE_STANDBY
+    if v.get(ESTIMATE) is None:
+        state = mavlink.MAV_STATE_BOOT
+    if s.failsafe:
+        state = mavlink.MAV_STATE_CRITICAL
+    return mavlink.MAVLink_heartbeat_message(
+        vehicle_type(len(v.description.rotors)), v.flavour.AUTOPILOT, base, v.flavour.mode_number(s.mode), state, 3
+    )
+
+
+def healthy(v: VehicleView) -> bool:
+    """Whether the estimate is to be trusted."""
+    e = v.get(ESTIMATE)
+    return e is not None and e.health == 0
+
+
+def _refused(v: VehicleView, source: str) -> bool:
+    """Whether the estimator has no use for the newest reading of a sensor, or has got none."""
+    e = v.get(ESTIMATE)
+    return e is not None and source in e.rejected
+
+
+def sensor_health(v: VehicleView) -> Iterator[tuple[str, int, bool]]:
+    """Each sensor that is there or that the true state stands for: its name, its bits of SYS_STATUS, if it is sound."""
+    for bits, (good, source) in _SENSORS.items():
+        yield source, bits, good(v) and not _refused(v, source) if v.description.sensors else healthy(v)
+    for sensors, (bit, good, source) in _OPTIONAL.items():
+        if set(sensors) & set(v.description.sensors):
+            yield source, bit, good(v) and not _refused(v, source)
+
+
+@stream("SYS_STATUS", 1.0, 5.0)
+def sys_status(v: VehicleView) -> Any:
+    """Which sensors are there and sound, whether it may be armed, and the battery."""
+    present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
+    sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
+    sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
+    for _, bits, good in sensor_health(v):
+        present |= bits
+        sound |= bits if good else 0
+    sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
+    sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)
+
+
+@stream("EXTENDED_SYS_STATE", 1.0, 5.0)
+def extended_state(v: VehicleView) -> Any:
+    """On the ground, in the air, or between."""
+    s = v.status
+    if s.landed:
+        state = mavlink.MAV_LANDED_STATE_ON_GROUND
+    else:
+        items = v.mission() if s.mode == "mission" else ()
+        doing = items[s.mission_current].command if s.mission_current < len(items) else s.mode
+        state = _BETWEEN.get(doing, mavlink.MAV_LANDED_STATE_IN_AIR)
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
+
+
+@stream("MISSION_CURRENT", 1.0)
+def mission_current(v: VehicleView) -> Any:
+    """How far the mission is."""
+    s = v.status
+    item = 0 if s.mission_current == NONE else s.mission_current
+    flying = 1 if s.mode == "mission" else 2
+    return mavlink.MAVLink_mission_current_message(item, s.mission_count, s.mission_state, flying)
+
+
+@stream("SYSTEM_TIME", 1.0)
+def system_time(v: VehicleView) -> Any:
+    """Time of day, and since the start."""
+    return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, v.boot_ms)
+
+
+@stream("TIMESYNC", 10.0)
+def timesync(v: VehicleView) -> Any:
+    """What is your clock?"""
+    return mavlink.MAVLink_timesync_message(0, v.time_ns)
+
+
+@stream("EKF_STATUS_REPORT")
+def ekf_status(v: VehicleView) -> Any:
+    """ArduPilot's word for a sound estimate."""
+    # attitude, velocities, absolute and relative positions: bits 0 to 5 and 8, 9 of EKF_STATUS_FLAGS
+    return mavlink.MAVLink_ekf_status_report_message(0x33F if healthy(v) else 0, *(0.0,) * 5)

@@ -1,0 +1,136 @@
+"""The newest state of the vehicle: every message that it publishes, decoded when somebody asks."""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.vector import Vec3
+from lapwing.messages import Status, nanoseconds
+from lapwing.messages.topics import ESTIMATE, STATUS, TRUTH, Topic
+from lapwing.services.mavlink import firmware
+from lapwing.services.mavlink.event_log import EventLog
+from lapwing.services.mavlink.flight_times import FlightTimes
+from lapwing.services.mavlink.frames import Quaternion, euler, saturated, swap_attitude, swap_body, swap_world
+from lapwing.services.mavlink.geo_coordinates import Datum, enu_to_geodetic, to_local
+from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+ON_GROUND = Status(landed=True)  # before the vehicle has published a status
+
+
+class NedMotion:
+    """Where the vehicle is and how it moves, in MAVLink's frames: NED, FRD, degrees."""
+
+    def __init__(self, message: Any, home: Home, standing_height: float):
+        """From a message with pose, velocity and angular velocity: the estimate or the truth."""
+        self._stamp, self._home = message.header.stamp, home
+        p, q, v, w = message.pose.position, message.pose.orientation, message.velocity, message.angular_velocity
+        self.position_world: Vec3 = (p.x, p.y, p.z)
+        self.position_ned = to_local(standing_height, self.position_world)
+        self.velocity_ned = swap_world(tuple(v))
+        self.omega_frd = swap_body(tuple(w))
+        self.attitude: Quaternion = swap_attitude((q.w, q.x, q.y, q.z))
+
+    @cached_property
+    def time_ns(self) -> int:
+        """Simulation time that it holds for [ns]."""
+        return nanoseconds(self._stamp)
+
+    @cached_property
+    def angles(self) -> Vec3:
+        """Roll, pitch, yaw [rad] from NED to FRD."""
+        return euler(self.attitude)
+
+    @cached_property
+    def geodetic(self) -> Vec3:
+        """Latitude [deg], longitude [deg], altitude [m]."""
+        return enu_to_geodetic(self._home, self.position_world)
+
+
+class VehicleView:
+    """A vehicle as its links see it: its description, simulation time, and the newest message of each topic."""
+
+    def __init__(self, description: VehicleDescription):
+        """A vehicle that has published nothing yet."""
+        self.description = description
+        self.flavour = firmware.get(description.flavour)
+        self.time_ns = 0
+        self.flight = FlightTimes()
+        self.events = EventLog()
+        self.reports_asked = 0  # of what hinders arming, by stations; one that is new asks, too
+        latitude, longitude, height = description.home
+        # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
+        altitude = height + description.standing_height
+        self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
+        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # the items that it holds, as endpoints wrote them
+        self._home_heading = 0.0
+        self._payloads: dict[Topic, bytes] = {}
+        self._decoded: dict[Topic, Any] = {}
+        self._motions: dict[Topic, NedMotion] = {}
+
+    def put(self, topic: Topic, payload: bytes) -> None:
+        """A newer message of a topic, encoded."""
+        self._payloads[topic] = payload
+        self._decoded.pop(topic, None)
+        self._motions.pop(topic, None)
+        if topic is STATUS:
+            self.flight.update(self.status, nanoseconds(self.status.header.stamp))
+        elif topic is ESTIMATE and not self.status.armed and (estimate := self.estimate):
+            self._home_heading = estimate.angles[2]
+
+    def get(self, topic: Topic) -> Any:
+        """The newest message of a topic, None before the first."""
+        if topic not in self._decoded:
+            if topic not in self._payloads:
+                return None
+            self._decoded[topic] = topic.message.decode(self._payloads[topic])
+        return self._decoded[topic]
+
+    def _motion(self, topic: Topic) -> NedMotion | None:
+        if topic not in self._motions:
+            message = self.get(topic)
+            if message is None:
+                return None
+            self._motions[topic] = NedMotion(message, self.description.home, self.description.standing_height)
+        return self._motions[topic]
+
+    @property
+    def estimate(self) -> NedMotion | None:
+        """Where the autopilot estimates the vehicle to be."""
+        return self._motion(ESTIMATE)
+
+    @property
+    def truth(self) -> NedMotion | None:
+        """Where it is."""
+        return self._motion(TRUTH)
+
+    @property
+    def status(self) -> Status:
+        """What the autopilot is doing."""
+        return self.get(STATUS) or ON_GROUND
+
+    @property
+    def home_world(self) -> Vec3:
+        """Home in the world frame [m]: the body frame's origin where the vehicle stood when it was armed."""
+        x, y, ground = self.status.home
+        return x, y, ground + self.description.standing_height
+
+    @property
+    def home_heading(self) -> float:
+        """Heading [rad] from north, to the right, with which it was armed; before that, its heading now."""
+        return self._home_heading
+
+    @property
+    def datum(self) -> Datum:
+        """What latitudes, longitudes and altitudes of messages count from."""
+        return Datum(self.description.home, self.home_world[2], self.description.standing_height)
+
+    @property
+    def boot_ms(self) -> int:
+        """Time since the start [ms], as fields of 32 bits hold it."""
+        return self.time_ns // 1_000_000 & 0xFFFFFFFF
+
+    @property
+    def boot_us(self) -> int:
+        """Time since the start [us]."""
+        return self.time_ns // 1000

@@ -1,0 +1,45 @@
+"""All that the MAVLink link knows of a vehicle before it flies: one frozen value, made from a scene or from a log."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.vector import Vec3
+from lapwing.services.common.autopilot_parameters import Parameter
+
+
+class Battery(NamedTuple):
+    """A battery that is modelled."""
+
+    cells: int  # in series
+    capacity: float  # [A s]
+    resistance: float  # [ohm] of all cells
+    charged_voltage: float  # [V] of one full cell without load
+    empty_voltage: float  # [V] of one cell, below which the motors stop
+
+
+class Rotor(NamedTuple):
+    """A rotor, as the autopilot numbers them."""
+
+    position_body: Vec3  # [m]
+    counterclockwise: bool  # seen from above
+
+
+class VehicleDescription(NamedTuple):
+    """A vehicle as its ground stations are told of it."""
+
+    name: str = "drone1"  # first part of its topics' names
+    system: int = 1  # MAVLink system id
+    flavour: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/flavours
+    home: Home = Home()  # origin of the world frame on the Earth
+    air_temperature: float = 15.0  # [deg C] at home
+    standing_height: float = 0.0  # [m] of the body frame's origin above the ground when it stands
+    rotors: tuple[Rotor, ...] = ()
+    max_voltage: float | None = None  # [V] of its motors, None where they are not modelled
+    battery: Battery | None = None  # None where none is modelled: the motors get what they ask for
+    sensors: tuple[str, ...] = ()  # fitted; none: the vehicle flies on its true state
+    ray_deg: tuple[float, float] = (0.0, -90.0)  # azimuth and elevation of the rangefinder's
+    flow_interval: float = 0.0  # [s] between two readings of the optical flow
+    parameters: tuple[Parameter, ...] = ()  # the autopilot's, with the values that it starts with
+    gripper: bool = False  # a payload that can be let go
+    accepts_commands: bool = False  # an operator is listened to
+    tick_ns: int = 4_000_000  # length of a tick of the lock step [ns]

@@ -1,0 +1,57 @@
+"""The single bodies of a multirotor of five, with the forces in their hinges."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.multibody.five_bodies import FiveBodies
+from lapwing.dynamics.vehicles import multirotor_euler
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import implements
+from lapwing.services.common.ports import BodyMotions, PerRotor
+
+
+class FiveBodiesView(NamedTuple):
+    """The vehicle whose bodies are told."""
+
+    vehicle: MultirotorParameters
+    interval: float  # [s] a tick
+    off: PerRotor  # [V] before the first command
+
+
+def on_se3(x: Any) -> FiveBodies:
+    """The bodies' poses, in whichever coordinates they are."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(on_se3)
+def _on_se3(x: types.Type) -> Callable:
+    if x.instance_class is FiveBodies:
+        return lambda x: x
+    return lambda x: multirotor_euler.five(x)
+
+
+@leaf
+def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[BodyMotions], int]:
+    """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
+    actuators = inputs[0]
+    command = actuators.value.motor_voltage if actuators.due else p.off
+    g, memory = p.vehicle, s.vehicle.memory
+    drive = MultirotorDrive(g, hooks.all_body(g.effects, memory, g.body), memory, command)
+    x = on_se3(s.vehicle.motion)
+    j = joints(drive, tick * p.interval, x)
+    a, (b, c, d, e) = x.chassis, x.propellers
+    told = BodyMotions(
+        (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),
+        (a.attitude, b.attitude, c.attitude, d.attitude, e.attitude),
+        (a.velocity_world, b.velocity_world, c.velocity_world, d.velocity_world, e.velocity_world),
+        (a.omega_body, b.omega_body, c.omega_body, d.omega_body, e.omega_body),
+        (j[0][0], j[1][0], j[2][0], j[3][0], j[4][0]),
+        (j[0][1], j[1][1], j[2][1], j[3][1], j[4][1]),
+    )
+    return s, (told,), GO_ON

@@ -1,0 +1,94 @@
+"""The load that vehicles of a fleet carry together: a point mass under the pull of their cables."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.integrators import RATES, march
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
+from lapwing.dynamics.vehicles.multirotor_slung import Sling, load_acceleration, tension
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+from lapwing.services.common.ports import BodyMotions
+
+
+class LoadPlant(NamedTuple):
+    """The load and how it is integrated; tuples have an entry for each cable."""
+
+    slings: tuple[Sling, ...]
+    field: Vec3  # [m/s^2] of gravity
+    method: Any  # `Method()` of an integrator
+    step: float  # [s]
+    steps: int  # of a tick
+    interval: float  # [s] a tick
+
+
+class LoadMotion(NamedTuple):
+    """World frame ENU."""
+
+    load_position: Vec3  # [m]
+    load_velocity: Vec3  # [m/s]
+
+
+class LoadDrive(NamedTuple):
+    """What holds the load over an exchange interval."""
+
+    load: LoadPlant
+    carriers: tuple[Presence, ...]  # at its beginning
+    start: float  # [s]
+
+
+@leaf
+def _pull(c: Any, sling: Sling, carrier: Presence) -> Vec3:
+    """Force [N] of a cable on its hook, which goes on as it was accelerated at the beginning of the interval."""
+    x, ahead = c
+    velocity = add(carrier.hook_velocity, scale(ahead, carrier.hook_acceleration))
+    way = scale(ahead, add(carrier.hook_velocity, scale(0.5 * ahead, carrier.hook_acceleration)))
+    hook = add(carrier.hook_world, way)
+    force, _ = tension(sling, subtract(x.load_position, hook), subtract(x.load_velocity, velocity))
+    return force
+
+
+@leaf
+def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
+    """Force [N] of the load on all cables together, at time t [s]."""
+    total = (0.0, 0.0, 0.0)
+    for force in each(_pull, (x, t - p.start), p.load.slings, p.carriers):
+        total = add(total, force)
+    return total
+
+
+@leaf
+def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
+    """Tangent of the load (theory.md, eq. (1.23))."""
+    air = Air(p.carriers[0].air_density, p.carriers[0].wind_world)
+    return LoadMotion(x.load_velocity, load_acceleration(p.load.slings[0], p.load.field, air, pulls(p, t, x), x))
+
+
+RATES[LoadDrive] = rate
+
+
+@leaf
+def _presence(_: float, received: Received, same: Received) -> Presence:
+    return received.value
+
+
+@leaf
+def step(
+    p: LoadPlant, s: LoadMotion, tick: int, inputs: tuple[Received, ...]
+) -> tuple[LoadMotion, tuple[Presence, BodyMotions], int]:
+    """The load at `tick`, given where its carriers were a tick ago; and the force of the cables on it."""
+    x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if inputs[0].due:
+        drive = LoadDrive(p, each(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
+        x = march(p.method, drive, drive.start, x, p.step, p.steps)
+        acceleration = rate(drive, tick * p.interval, x).load_velocity
+        force = scale(-1.0, pulls(drive, tick * p.interval, x))
+    place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
+    told = Presence(
+        place, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, place, velocity, acceleration, ZERO,
+        tick * p.interval, True,
+    )  # fmt: skip
+    return x, (told, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), GO_ON

@@ -1,0 +1,35 @@
+"""The forces on the single feet of a multirotor, where a scene asks for them."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.vector import Vec3
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, seen
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each
+from lapwing.services.common.ports import ContactForces
+
+
+class ContactView(NamedTuple):
+    """The vehicle whose feet are told of."""
+
+    vehicle: MultirotorParameters
+
+
+@leaf
+def _place(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
+    return push[0]
+
+
+@leaf
+def _force(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
+    return push[1]
+
+
+@leaf
+def step(p: ContactView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[ContactForces], int]:
+    """Where each point of the vehicle is at `tick`, and what the ground does to it."""
+    vehicle, state = p.vehicle, s.vehicle
+    pushes = hooks.all_contact_forces(vehicle.effects, state.memory, seen(vehicle.layout, state.motion))
+    return s, (ContactForces(each(_place, 0.0, pushes, pushes), each(_force, 0.0, pushes, pushes)),), GO_ON

@@ -1,0 +1,65 @@
+"""The plant of quadrotors that carry a point mass by rigid links: thrusts and moments in, all bodies' states out."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.dynamics.integrators import march
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vehicles.cooperative_load import (
+    CooperativeLoadParameters,
+    CooperativeLoadState,
+    LiftCommand,
+    quad_position,
+    quad_velocity,
+)
+from lapwing.kernels import leaf
+from lapwing.kernels.codegen import each_index
+from lapwing.kernels.state_tree import finite
+from lapwing.services.common.ports import BodyMotions, RotorWrenches, TrueState
+from lapwing.services.plant.blocks.termination import signal
+
+
+class CooperativePlant(NamedTuple):
+    """The formation and how it is integrated."""
+
+    formation: CooperativeLoadParameters  # its drive is the command before the first one
+    method: Any  # `Method()` of an integrator
+    steps: int  # of a tick
+    step: float  # [s]
+    interval: float  # [s] a tick
+    last: int  # tick of the run
+    off: RotorWrenches  # before the first command
+
+
+@leaf
+def _zero(values: tuple, i: int) -> Vec3:
+    return ZERO
+
+
+@leaf
+def step(
+    p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
+    """March to `tick` under the command given; the load tells of the vehicle's own motion."""
+    g = p.formation
+    lift = inputs[0].value if inputs[0].due else p.off
+    g = CooperativeLoadParameters(
+        g.quad_mass, g.quad_inertia, g.link_length, g.load_mass, g.gravity, LiftCommand(lift.thrust, lift.moment_body)
+    )
+    x = s
+    if tick > 0:
+        x = march(p.method, g, (tick - 1) * p.interval, x, p.step, p.steps)
+    truth = TrueState(
+        x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO
+    )
+    nothing = each_index(_zero, x.link, x.link)
+    bodies = BodyMotions(
+        (x.load_position,) + each_index(quad_position, x.link, g, x),  # noqa: RUF005 (compiled tuples have no unpacking)
+        (NO_ROTATION,) + x.attitude,  # noqa: RUF005
+        (x.load_velocity,) + each_index(quad_velocity, x.link, g, x),  # noqa: RUF005
+        (ZERO,) + x.omega_body,  # noqa: RUF005
+        (ZERO,) + nothing,  # noqa: RUF005
+        (ZERO,) + nothing,  # noqa: RUF005
+    )
+    return x, (truth, bodies), signal(tick, p.last, finite(x))

@@ -1,0 +1,62 @@
+"""The plant of a multirotor, as one rigid body or as five: motor voltages in, the true state out."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.dynamics import effects
+from lapwing.dynamics.noise import Key
+from lapwing.dynamics.vehicles.multirotor import advance, observe
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
+from lapwing.kernels import leaf
+from lapwing.kernels.state_tree import finite
+from lapwing.services.common.ports import BatteryGauge, PerRotor, TrueState
+from lapwing.services.plant.blocks.gripper import let_go
+from lapwing.services.plant.blocks.termination import signal
+
+for _name in effects.names():
+    effects.get(_name)  # registers its hooks: a set-up names an effect by the class of its parameters alone
+
+
+class MultirotorPlant(NamedTuple):
+    """A vehicle and how it is integrated."""
+
+    method: Any  # `Method()` of an integrator
+    vehicle: MultirotorParameters
+    key: Key  # of its random numbers
+    step: float  # [s]
+    steps: int  # of a tick
+    interval: float  # [s] a tick
+    off: PerRotor  # [V] before the first command
+    settle: int  # ticks recorded after the mission has ended
+
+
+class MultirotorPlantState(NamedTuple):
+    """What the plant remembers."""
+
+    vehicle: MultirotorState
+    last: int  # tick of the run
+
+
+@leaf
+def step(
+    p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[Received, ...]
+) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryGauge], int]:
+    """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is."""
+    actuators, status = inputs
+    command = actuators.value.motor_voltage if actuators.due else p.off
+    vehicle = s.vehicle
+    if status.due and status.value.released:
+        vehicle = MultirotorState(vehicle.motion, let_go(p.vehicle.effects, vehicle.memory))
+    if tick > 0:
+        vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
+    motion = seen(p.vehicle.layout, vehicle.motion)
+    o = observe(p.vehicle, tick, p.interval, vehicle, command)
+    last = min(s.last, tick + p.settle) if status.due and status.value.finished else s.last
+    truth = TrueState(
+        motion.position_world, motion.attitude, motion.velocity_world, motion.omega_body, o.acceleration_world,
+        motion.rotor_speed, o.motor_voltage, o.motor_current, o.motor_power, o.thrust, o.torque,
+        o.wind_world, o.air_density, o.in_contact, o.angular_acceleration_body,
+    )  # fmt: skip
+    gauge = BatteryGauge(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
+    sound = finite(vehicle.motion)
+    return MultirotorPlantState(vehicle, last), (truth, gauge), signal(tick, last, sound)

@@ -1,0 +1,58 @@
+"""A plant that nobody commands: a system of lapwing/dynamics/vehicles that any integrator marches from tick to tick."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.dynamics.integrators import Controlled, march, march_controlled
+from lapwing.kernels import ByClass, leaf
+from lapwing.kernels.codegen import implements
+from lapwing.kernels.state_tree import finite
+from lapwing.services.plant.blocks.termination import signal
+
+
+class AutonomousPlant(NamedTuple):
+    """The system and how it is integrated."""
+
+    system: Any  # parameters, a class of lapwing.dynamics.integrators.RATES
+    method: Any  # `Method()` of an integrator, or one whose error is `Controlled`
+    steps: int  # of a tick
+    step: float  # [s]
+    interval: float  # [s] a tick
+    last: int  # tick of the run
+
+
+def told(p: Any, t: float, x: Any) -> tuple:
+    """What is told of the state x at time t [s]: a tuple of port values, chosen by the class of the parameters p."""
+    raise NotImplementedError("compiled code only")
+
+
+TOLD = ByClass()
+"""The compiled function of `told` by the class of a system's parameters."""
+
+
+@implements(told, inline=True)
+def _told(p: types.Type, t: types.Type, x: types.Type) -> Any:
+    return TOLD[p.instance_class]
+
+
+def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_marched, inline=True)
+def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
+    if getattr(method, "instance_class", None) is Controlled:
+        return lambda method, p, t, x: march_controlled(method, p.system, t, x, p.step, t + p.interval)
+    return lambda method, p, t, x: march(method, p.system, t, x, p.step, p.steps)
+
+
+@leaf
+def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
+    """March to `tick`; at tick 0 leave the system where it is."""
+    x = s
+    if tick > 0:
+        x = _marched(p.method, p, (tick - 1) * p.interval, x)
+    return x, told(p.system, tick * p.interval, x), signal(tick, p.last, finite(x))

@@ -1,0 +1,34 @@
+"""What is told of the crate that unloads its pack: the motion of the pack."""
+
+from lapwing.dynamics.vector import ZERO
+from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
+from lapwing.kernels import leaf
+from lapwing.services.common.ports import TrueState
+from lapwing.services.plant.blocks.uncontrolled import TOLD
+
+
+@leaf
+def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState]:
+    """The pack's motion."""
+    return (
+        TrueState(
+            x.position_world,
+            x.attitude,
+            x.velocity_world,
+            x.omega_body,
+            ZERO,
+            (),
+            (),
+            (),
+            (),
+            (),
+            (),
+            ZERO,
+            0.0,
+            False,
+            ZERO,
+        ),
+    )
+
+
+TOLD[UnloadingParameters] = told

@@ -1,0 +1,197 @@
+"""The plant's state as messages."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import lapwing.messages
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.dynamics.atmosphere import FREEZING
+from lapwing.dynamics.lie.quaternion import conjugate, rotate
+from lapwing.kernels import uncompiled
+from lapwing.messages import (
+    BatteryState,
+    BodyStates,
+    Clock,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
+    TFMessage,
+    TransformStamped,
+    Vector3,
+    VehicleState,
+    header,
+)
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
+from lapwing.services.common import ports
+from lapwing.services.common.ports import BatteryGauge, BodyMotions, ContactForces, TrueState
+
+WORLD = "world"
+AMPERE_HOUR = 3600.0  # [A s]
+
+
+class PlantWiring(NamedTuple):
+    """What the plant's messages say besides its state."""
+
+    pose_every: int  # ticks between poses, transforms and clocks
+    odometry: bool  # whether there is odometry
+    cells: int  # of the battery, 0 without one
+    capacity: float  # [A s], NaN without a battery
+    bodies: tuple[str, ...]  # names, in the order of the port
+
+
+def wires(setup: Setup, wiring: PlantWiring) -> list[Wire]:
+    """The plant's topics."""
+    truth, given, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
+    found = [
+        Wire(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
+        Wire(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
+        Wire(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
+        Wire(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
+    ]
+    if wiring.odometry:
+        sample = Odometry(header(0, WORLD), setup.vehicle)
+        found.append(Wire(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
+    if ports.BATTERY in given:
+        battery = _battery_sample(setup.vehicle, wiring)
+        found.append(Wire(topic.BATTERY, ports.BATTERY, given[ports.BATTERY].period, _battery(wiring), lambda: battery))
+    if ports.BODIES in given:
+        sample_bodies = _bodies_sample(wiring.bodies)
+        found.append(Wire(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies))
+    if ports.CONTACT in given:
+        n = len(given[ports.CONTACT].like.force_world)
+        sample_contact = lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
+        found.append(Wire(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact))
+    return found
+
+
+def _truth_sample(like: TrueState) -> Any:
+    return VehicleState(
+        header(0, WORLD),
+        rotor_speed=like.rotor_speed,
+        motor_voltage=like.motor_voltage,
+        motor_current=like.motor_current,
+        motor_power=like.motor_power,
+        rotor_thrust=like.rotor_thrust,
+        rotor_torque=like.rotor_torque,
+    )
+
+
+def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
+    """The whole true state."""
+    return {
+        **stamp_columns(time_ns),
+        "pose.position": x.position_world,
+        "pose.orientation": quaternion_columns(x.attitude),
+        "velocity": x.velocity_world,
+        "angular_velocity": x.omega_body,
+        "acceleration": x.acceleration_world,
+        **{name: value for name in _PER_ROTOR if np.size(value := getattr(x, name))},
+        "wind": x.wind_world,
+        "air_density": x.air_density,
+        "ground_contact": x.ground_contact,
+    }
+
+
+_PER_ROTOR = ("rotor_speed", "motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque")
+
+
+def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
+    """Pose of the body in the world."""
+    return {
+        **stamp_columns(time_ns),
+        "pose.position": x.position_world,
+        "pose.orientation": quaternion_columns(x.attitude),
+    }
+
+
+def _odometry(x: TrueState, time_ns: np.ndarray) -> Fields:
+    """Pose in the world, velocities in the body frame, as nav_msgs defines them; both exact."""
+    q = uncompiled(conjugate)(np.asarray(x.attitude).T)
+    velocity_body = uncompiled(rotate)(q, np.asarray(x.velocity_world).T)
+    return {
+        **stamp_columns(time_ns),
+        "pose.pose.position": x.position_world,
+        "pose.pose.orientation": quaternion_columns(x.attitude),
+        "twist.twist.linear": np.column_stack(velocity_body),
+        "twist.twist.angular": x.omega_body,
+    }
+
+
+def _transform_sample(vehicle: str) -> Any:
+    return TFMessage((TransformStamped(header(0, WORLD), vehicle),))
+
+
+def _transform(x: TrueState, time_ns: np.ndarray) -> Fields:
+    """The frame tree: world to body."""
+    return {
+        **stamp_columns(time_ns, "transforms.0.header.stamp"),
+        "transforms.0.transform.translation": x.position_world,
+        "transforms.0.transform.rotation": quaternion_columns(x.attitude),
+    }
+
+
+def _battery_sample(vehicle: str, wiring: PlantWiring) -> Any:
+    return BatteryState(
+        header(0, vehicle),
+        temperature=math.nan,
+        capacity=math.nan,
+        design_capacity=wiring.capacity / AMPERE_HOUR,
+        power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+        power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
+        present=True,
+        cell_voltage=(0.0,) * wiring.cells,
+    )
+
+
+def _battery(wiring: PlantWiring) -> Any:
+    capacity, cells = wiring.capacity / AMPERE_HOUR, wiring.cells
+
+    def fields(x: BatteryGauge, time_ns: np.ndarray) -> Fields:
+        """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it."""
+        voltage = np.asarray(x.voltage)
+        found: dict[str, Any] = {
+            **stamp_columns(time_ns),
+            "voltage": voltage,
+            "current": -np.asarray(x.current),
+            "charge": np.asarray(x.charge) * capacity,
+            "percentage": x.charge,
+            "temperature": np.asarray(x.temperature) - FREEZING,
+        }
+        if cells:
+            found["cell_voltage"] = np.repeat((voltage / cells)[:, None], cells, axis=1)
+        return found
+
+    return fields
+
+
+def _bodies_sample(names: tuple[str, ...]) -> Any:
+    n = len(names)
+    return BodyStates(
+        header(0, WORLD), names, (Pose(),) * n, *[(Vector3(),) * n for _ in ("velocity", "rate", "force", "torque")]
+    )
+
+
+def _bodies(x: BodyMotions, time_ns: np.ndarray) -> Fields:
+    """Every body of a vehicle, with the contacts' or joints' force and torque."""
+    found: dict[str, Any] = dict(stamp_columns(time_ns))
+    for i in range(len(x.position_world)):
+        found[f"pose.{i}.position"] = x.position_world[i]
+        found[f"pose.{i}.orientation"] = quaternion_columns(x.attitude[i])
+        found[f"velocity.{i}"] = x.velocity_world[i]
+        found[f"angular_velocity.{i}"] = x.omega_body[i]
+        found[f"force.{i}"] = x.force_world[i]
+        found[f"torque.{i}"] = x.torque_body[i]
+    return found
+
+
+def _contact(x: ContactForces, time_ns: np.ndarray) -> Fields:
+    """Every point that may touch the ground, with the force on it."""
+    found: dict[str, Any] = dict(stamp_columns(time_ns))
+    for i, (place, force) in enumerate(zip(x.position_world, x.force_world, strict=True)):
+        found[f"position.{i}"], found[f"force.{i}"] = place, force
+    return found

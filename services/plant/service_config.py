@@ -1,0 +1,38 @@
+"""What the plant is given: its core, its start, and what its messages say."""
+
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.services.plant.encoders import PlantWiring
+
+
+class PlantEvent(NamedTuple):
+    """What becomes of a propeller in flight, after the state of `tick` was told."""
+
+    tick: int
+    propeller: int  # from 0, in the order of the airframe
+    becomes: str  # "locked", "free" or "torn_off"
+
+
+class Others(NamedTuple):
+    """What a plant's effects know of the fleet."""
+
+    ports: tuple[str, ...]  # of the others' presence, as this vehicle calls them; that of a load among them
+    presence: Presence  # what these may know of its vehicle, with the numbers that do not change
+    load: Any = None  # parameters of the load that this plant moves beside its vehicle, None without it
+    load_start: Any = None  # its state at tick 0
+    load_inputs: tuple[str, ...] = ()  # ports of its carriers' presence
+
+
+class PlantSetup(NamedTuple):
+    """A plant."""
+
+    model: str  # for people
+    core: Any  # parameters of a part of services/plant/cores
+    start: Any  # the state at tick 0
+    wiring: PlantWiring
+    bodies: Any = None  # parameters of the part that tells of single bodies, None without it
+    events: tuple[PlantEvent, ...] = ()
+    euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
+    others: Others | None = None
+    contact: Any = None  # parameters of the part that tells of forces on feet, None without it

@@ -1,0 +1,187 @@
+"""One process of a run: what it is given, and how it takes part. `python -m lapwing.services.process_main NAME`, or a fork that
+calls `main`, reads that from standard input, as the launcher writes it."""
+
+import importlib
+import json
+import os
+import struct
+import sys
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from lapwing.cosim.config import user_module
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.serialise import from_json, to_json
+from lapwing.cosim.processes.run_monitor import WATCHER
+
+_LENGTH = struct.Struct("<Q")
+LONGEST = 15  # characters that the system keeps of a process's name
+
+
+class Participation(NamedTuple):
+    """What a process of a run is given."""
+
+    name: str
+    setup: Setup
+    peers: dict[str, str]  # endpoint of every participant
+    key_prefix: str  # key prefix
+    secret: str = ""  # of a run on one machine (lapwing.cosim.access.publisher_ids)
+    speed: float | None = None  # simulated seconds per second, None for as fast as it goes
+    core: int | None = None  # core that all services of a sequential lock step share
+    log: str = ""  # path of the recorder's log
+    sources: dict[str, str] | None = None  # the files that were resolved, for the log; text by name
+    mode: str = "processes"  # of the run, for the log
+    open: tuple[str, ...] = ()  # endpoints for clients
+    mavlink: tuple[str, ...] = ()  # URLs of links
+    mavlink_key: str = ""  # path of a passphrase
+    foxglove: str = ""  # address for viewers
+    ros2: int | None = None  # ROS_DOMAIN_ID of a graph
+    ros2_router: str = ""  # HOST:PORT of its router
+    insecure: bool = False  # unsigned commands from other machines are taken
+    external: dict[str, str] | None = None  # endpoints of services that are programs of somebody else's, by name
+    keys: str = ""  # path of a folder of certificates
+    realtime: bool = False  # services of the lock step run in the scheduler's real-time class
+    restarts: bool = False  # some service of the run is started again where it is killed
+    journal: int = -1  # open file of this service's journal, if it is one of them
+    with_parent: bool = False  # ends when standard input closes
+
+
+def hand_over(given: Participation, stream: IO[bytes]) -> None:
+    """Write what a process is given; the stream stays open."""
+    data = to_json(given).encode()
+    stream.write(_LENGTH.pack(len(data)) + data)
+    stream.flush()
+
+
+def take_over() -> Participation:
+    """Read what this process is given, from standard input."""
+    text = _read(_LENGTH.unpack(_read(_LENGTH.size))[0]).decode()
+    modules = json.loads(text)["setup"]["resolved"].get("modules", {})  # the set-up may name their classes
+    user_module.install(modules)
+    found: Any = from_json(text, modules)
+    return found
+
+
+def _read(size: int) -> bytes:
+    data = b""
+    while len(data) < size:
+        part = os.read(0, min(1 << 20, size - len(data)))
+        if not part:
+            raise SystemExit(1)  # the launcher is gone
+        data += part
+    return data
+
+
+def take_part(given: Participation) -> None:
+    """Take part in a run to its end.
+
+    Raises:
+        ValueError: what the user can mend.
+        LockStepError: the lock step cannot go on.
+    """
+    from lapwing.cosim.access import private_sockets
+    from lapwing.cosim.access.publisher_ids import Participants
+    from lapwing.cosim.executors.lockstep import run_encoder, run_lockstep
+    from lapwing.cosim.executors.participant import Process, Stopped
+    from lapwing.cosim.run_errors import LockStepError
+    from lapwing.cosim.transport.bus import ZenohBus, mesh
+    from lapwing.cosim.transport.input_journal import Journal
+    from lapwing.services import process_table
+    from lapwing.services.security import door_settings, settings
+
+    setup, encoded = given.setup, process_table.encoded(given.name)
+    entry = process_table.entry(encoded or given.name)
+    participants = Participants(given.key_prefix, given.secret, tuple(given.external or ()))
+    listen, connect = mesh(given.name, given.peers)
+    if given.with_parent:
+        security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
+    else:
+        security = settings(setup, given.name, given.key_prefix, given.keys)
+    # All wait for one another later (`Process.join`); only one that is started again asks others before
+    awaits = given.journal >= 0
+    with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security, awaits) as bus:
+        watched = WATCHER in given.peers and not given.with_parent
+        others = [*process_table.needed(setup, given.external or ()), *([WATCHER] if WATCHER in given.peers else [])]
+        if given.with_parent and process_table.ROUTER in given.peers:
+            others.append(process_table.ROUTER)  # one that cannot listen ends the run
+        # all that one launcher has started have the same set-up; a program of somebody else's may have another
+        compares = others if not given.with_parent else [encoded] if encoded else []
+        pace = (given.speed, given.core, compares, given.realtime)
+        journal = Journal(given.name, given.journal) if given.journal >= 0 else None
+        process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
+        if given.with_parent:
+            process.end_with_parent(given.peers[given.name])
+        elif watched:
+            process.end_with(WATCHER)
+        try:
+            if encoded:
+                run_encoder(process, process_table.create(setup, encoded))
+            elif entry.lock_step:
+                operators = _heard(process) if given.name == "autopilot" else {}
+                service = process_table.create(setup, given.name, operators)
+                run_lockstep(process, service, given.name == process_table.TIME_OWNER, process_table.RECORDER)
+            else:
+                module = __import__(f"{entry.package}.service", fromlist=["run"])
+                module.run(process, given)
+        except Stopped:
+            if process.abandoned:
+                raise LockStepError(f"{given.name}: {process.abandoned} is gone before the run has ended") from None
+    if process.orphaned:
+        private_sockets.remove(given.peers[given.name])
+
+
+def import_ahead(names: Iterable[str]) -> None:
+    """Import what processes of these names will need, which may be before the scene is read."""
+    from lapwing.services import process_table
+
+    importlib.import_module("lapwing.cosim.executors.lockstep")
+    for name in names:
+        importlib.import_module(f"{process_table.entry(process_table.encoded(name) or name).package}.service")
+
+
+def _heard(process: Any) -> dict[str, Any]:
+    """The operator commands that have come on the bus for each vehicle, from the processes that give any."""
+    from lapwing.cosim.transport.input_journal import NOTHING
+    from lapwing.services.common.operator_inbox import OPERATOR_KEY, Mailbox
+    from lapwing.services.process_table import MAVLINK, ROS2
+
+    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
+
+    def come() -> tuple[int, bytes]:
+        return get(0.0) or NOTHING
+
+    def arrived() -> tuple[int, bytes] | None:
+        found = process.journal.take(come) if process.journal else come()
+        return None if found == NOTHING else found
+
+    mailbox = Mailbox(process.setup.vehicles, arrived)
+    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
+
+
+def main(name: str) -> None:
+    """Take part as the launcher says, most likely under this name."""
+    from lapwing.cosim.processes.gc_tuning import leave_garbage
+    from lapwing.cosim.run_errors import BusError, LockStepError
+
+    leave_garbage()
+    with suppress(OSError):  # what `ps` and `top` call it, where the system has that
+        Path("/proc/self/comm").write_text(name[:LONGEST])
+    import_ahead([name])
+    try:
+        take_part(take_over())
+    except (ValueError, BusError) as error:
+        _end(str(error), 2)
+    except LockStepError as error:
+        _end(str(error), 1)
+
+
+def _end(message: str, code: int) -> None:
+    print(f"lapwing: {' '.join(message.split())}", file=sys.stderr)
+    raise SystemExit(code)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

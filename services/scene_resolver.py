@@ -1,0 +1,180 @@
+"""From a scene to a run: what a scene may say, and the set-up that all services of a run are given."""
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Collection, Mapping
+from functools import cache
+from operator import index
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+import lapwing.services
+from lapwing.cosim import scene as scenes
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram import multi_vehicle
+from lapwing.cosim.scene import Overrides, Scene, SceneError, Vocabulary
+from lapwing.services.common import communication_schema as exchange
+from lapwing.services.common import environment_schema, mesh_schema, run_schema, success_criteria, user_modules
+from lapwing.services.common import vehicle_schema as vehicle
+from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.run_schema import Run
+from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.plant import models
+from lapwing.services.process_table import PROCESSES, entry
+
+
+def _configurations() -> list[ModuleType]:
+    """The module `config` of every service that has one."""
+    folders = sorted(p.name for p in pkgutil.iter_modules(lapwing.services.__path__) if p.ispkg)
+    paths = [f"services.{name}.config" for name in folders]
+    return [importlib.import_module(path) for path in paths if importlib.util.find_spec(path)]
+
+
+@cache
+def vocabulary() -> Vocabulary:
+    """Every table that a scene may have: of several services, of one, and of the plant's models."""
+    shared = [run_schema, success_criteria, exchange, environment_schema, vehicle, user_modules, mesh_schema]
+    tables = [*shared, *_configurations(), *map(models.get, models.names())]
+    return Vocabulary.of(tables, models.check)
+
+
+def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
+    """Read a scene and all that it names, override, and validate.
+
+    Args:
+        scene: path of its TOML file, or the name of one that ships; or one that is loaded, to which more is to be done.
+        overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key; of any
+            key that the scene resolves to: "airframe.mass.total=9.5".
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+    """
+    if isinstance(scene, Scene):
+        return scenes.again(scene, overrides, vocabulary()) if overrides else scene
+    return scenes.load(scene, overrides, vocabulary(), run_schema.SHIPPED)
+
+
+def load_one(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
+    """`load` of a scene for what works on one vehicle; SceneError where it lists several."""
+    loaded = load(scene, overrides)
+    loaded[Vehicle]  # refused there
+    return loaded
+
+
+def parse(path: Path, text: str, overrides: Overrides = ()) -> Scene:
+    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    return scenes.parse(path, text, overrides, vocabulary())
+
+
+def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
+    """The scene whose `resolved` is `tree`, without opening a file; SceneError if it is no longer a sound one."""
+    return scenes.from_resolved(tree, vocabulary(), name)
+
+
+def reseed(setup: Setup, seed: int) -> Setup:
+    """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again.
+
+    Raises:
+        SceneError: no such seed.
+    """
+    if not hasattr(seed, "__index__") or not 0 <= (number := index(seed)) < 2**63:
+        raise SceneError("run.seed", f"got {seed!r}", "a whole number from 0 to 2^63 - 1")
+    seed = number
+    if not setup.vehicle:
+        resolved = {**setup.resolved, Run.TABLE: {**setup.resolved[Run.TABLE], "seed": seed}}
+        return multi_vehicle.joined([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
+    services_of = dict(setup.services)
+    for name, given in services_of.items():
+        module = importlib.import_module(f"{entry(name).package}.resolve")
+        if hasattr(module, "reseed"):
+            services_of[name] = module.reseed(given, seed, setup.vehicle)
+    run = {**setup.resolved[Run.TABLE], "seed": seed}
+    return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
+
+
+def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> Setup:
+    """The set-up of a run of this scene.
+
+    Args:
+        scene: what to fly.
+        plans: operator commands that the autopilot of a vehicle gets at the first tick, by the vehicle's name.
+
+    Raises:
+        SceneError: what is wrong with which key, and what would be right.
+    """
+    if scene.vehicles:
+        members = []
+        for vehicle in scene.vehicles:
+            with vehicle.located():
+                members.append(_resolve(vehicle, plans))
+        with scene.located():
+            names = dict.fromkeys(name for member in members for name in member.services)
+            return multi_vehicle.joined(_acquainted(members, "vehicle.{}."), _restarts_listed(scene, names))
+    with scene.located():
+        (setup,) = _acquainted([_resolve(scene, plans)], "")
+        return setup._replace(resolved=_restarts_listed(scene, setup.services))
+
+
+def _acquainted(members: list[Setup], key: str) -> list[Setup]:
+    """The set-ups of a run's vehicles, once services whose `resolve.py` has `fleet` have seen those of all.
+
+    `key`: what the keys of a vehicle begin with, with its number for {}.
+    """
+    keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
+    for name in dict.fromkeys(name for member in members for name in member.services):
+        module = importlib.import_module(f"{entry(name).package}.resolve")
+        if hasattr(module, "fleet"):
+            shares = {member.vehicle: member.services[name] for member in members if name in member.services}
+            found = module.fleet(shares, keys)
+            members = [
+                member._replace(services={**member.services, name: found[member.vehicle]})
+                if member.vehicle in found
+                else member
+                for member in members
+            ]
+    return members
+
+
+def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
+    exchange, run = scene[Exchange], scene[Run]
+    found: dict[str, Any] = {}
+    beside: dict[str, Any] = {}
+    for process in PROCESSES:
+        if process.lock_step or process.resolves:
+            given = importlib.import_module(f"{process.package}.resolve").resolve(scene)
+            if given is not None:
+                (found if process.lock_step else beside)[process.name] = given
+    if plan := plans.get(scene[Vehicle].name):
+        autopilot = found["autopilot"]
+        found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
+    return Setup(
+        scene.name,
+        run.title,
+        run.seed,
+        round(run.duration * exchange.rate),
+        exchange.rate,
+        exchange.interval_ns,
+        exchange.coupling,
+        scene[Vehicle].name,
+        found,
+        beside,
+        dict(scene.resolved),
+    )
+
+
+def _restarts_listed(scene: Scene, services: Collection[str]) -> dict[str, Any]:
+    """What a scene of these services resolves to, with a list of those that are started again.
+
+    Raises:
+        SceneError: one of them is none of these services.
+    """
+    wanted = scene[Run].restart
+    names = (list(lapwing.services) if wanted else []) if isinstance(wanted, bool) else list(wanted)
+    if unknown := [name for name in names if name not in lapwing.services]:
+        raise SceneError(
+            "run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(lapwing.services)}"
+        )
+    run = {**scene.resolved[Run.TABLE], "restart": names}
+    return {**scene.resolved, Run.TABLE: run}

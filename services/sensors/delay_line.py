@@ -1,0 +1,92 @@
+"""The way from an instrument to the wire: latency in whole samples, and faults by schedule.
+
+A faulty instrument still sends: a reading that is lost says so with `valid = False`.
+"""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.noise import Key, normal3, uniform
+from lapwing.dynamics.vector import ZERO, Vec3, add, multiply, scale
+from lapwing.kernels import kernel, leaf
+
+DEPTH = 16  # samples that a line remembers
+Line = tuple[Vec3, ...]  # the last DEPTH values, newest first
+
+BLANK: Line = (ZERO,) * DEPTH
+
+KINDS = ("none", "dropout", "freeze", "bias", "spikes", "drift", "scale", "delay")
+NONE, DROPOUT, FREEZE, BIAS, SPIKES, DRIFT, SCALE, DELAY = range(len(KINDS))
+ALL_CHANNELS = -1
+_SPIKE_LANE = 100  # draws of spikes, clear of the instruments' own lanes
+
+
+class Fault(NamedTuple):
+    """One fault as the kernels see it."""
+
+    kind: int = NONE  # index into KINDS
+    channel: int = ALL_CHANNELS
+    start: int = 0  # [tick]
+    stop: int = 0  # [tick], the first one without the fault
+    size: Vec3 = ZERO  # bias and spikes: unit of the channel; drift: that per tick; scale: factor
+    probability: float = 0.0  # of a spike, per sample
+    samples: int = 0  # of delay, on top of the latency
+
+
+@leaf
+def new_line(value: Vec3) -> Line:
+    """A line that has carried only this value."""
+    four = (value, value, value, value)
+    return four + four + four + four  # DEPTH of them; compiled tuples have no `*`
+
+
+@leaf
+def _pushed(line: Line, value: Vec3) -> Line:
+    return (value,) + line[:-1]  # noqa: RUF005 (compiled tuples have no unpacking)
+
+
+@kernel
+def carry(
+    faults: tuple[Fault, ...] | None, line: Line, latency: int, channel: int, key: Key, tick: int, value: Vec3
+) -> tuple[Line, Vec3, bool]:
+    """Send one value of a channel down its line.
+
+    Args:
+        faults: tuple of `Fault`, or None (compiled away).
+        line: the channel's `Line`.
+        latency: [samples], less than DEPTH.
+        channel: index of the channel among its instrument's.
+        key: of the instrument's random stream.
+        tick: now.
+        value: what the instrument measured now.
+
+    Returns:
+        The line with the value in it, the value that arrives now, and whether one arrives.
+    """
+    if faults is None:
+        line = _pushed(line, value)
+        return line, line[latency], True
+    age = latency
+    valid = True
+    frozen = False
+    for i in range(len(faults)):
+        f = faults[i]
+        if not (f.start <= tick < f.stop and (f.channel == channel or f.channel == ALL_CHANNELS)):
+            continue
+        if f.kind == DROPOUT:
+            valid = False
+        elif f.kind == FREEZE:
+            frozen = True
+        elif f.kind == BIAS:
+            value = add(value, f.size)
+        elif f.kind == SPIKES:
+            if uniform(key, tick, _SPIKE_LANE + 2 * (8 * i + channel)) < f.probability:
+                value = add(value, multiply(f.size, normal3(key, tick, _SPIKE_LANE + 2 * (8 * i + channel) + 1)))
+        elif f.kind == DRIFT:
+            value = add(value, scale(float(tick - f.start), f.size))
+        elif f.kind == SCALE:
+            value = multiply(value, f.size)
+        elif f.kind == DELAY:
+            age = min(age + f.samples, DEPTH - 1)
+    if not frozen:
+        line = _pushed(line, value)
+    return line, line[age], valid

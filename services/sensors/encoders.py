@@ -1,0 +1,173 @@
+"""Readings as messages. A reading that is not there is said in each type's own way, never by silence."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.kernels.row_packing import width
+from lapwing.messages import (
+    FluidPressure,
+    Imu,
+    MagneticField,
+    NavSatFix,
+    NavSatStatus,
+    Range,
+    Reading,
+    TwistWithCovarianceStamped,
+    header,
+)
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.services.common import ports
+from lapwing.services.common.ports import BarometerReading, DistanceReading, GpsReading, ImuReading, MagnetometerReading
+
+UNKNOWN = -1.0  # first element of a covariance: there is no such measurement
+
+
+PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)  # others make their own topics
+
+
+class SonarWiring(NamedTuple):
+    """What a sonar's messages say of the instrument."""
+
+    field_of_view: float  # [rad]
+    range_min: float  # [m]
+    range_max: float  # [m]
+
+
+def wires(setup: Setup, sonar: SonarWiring | None, fix: int) -> list[Wire]:
+    """The topics of the sensors of `PORTS` that the vehicle carries; `fix` is the NavSatStatus of what GPS finds."""
+    frame, given = setup.vehicle, setup.ports
+    known: list[tuple[Any, str, Callable, Any]] = [
+        (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
+        (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),
+        (topic.GPS, ports.GPS, partial(_gps, fix), _gps_sample(frame)),
+        (topic.GPS_VELOCITY, ports.GPS, _gps_velocity, TwistWithCovarianceStamped(header(0, "world"))),
+        (topic.BARO, ports.BAROMETER, _barometer, FluidPressure(header(0, frame))),
+        (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
+    ]
+    return [
+        Wire(which, port, given[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
+        for which, port, fields, sample in known
+        if port in given
+    ]
+
+
+def own_wire(frame: str, port: Port) -> Wire:
+    """The topic of a sensor of the user's own."""
+    return Wire(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
+
+
+def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
+    """Covariances in row order, (n, size^2), with the first three of the diagonal given, (n, 3)."""
+    found = np.zeros((len(values), size * size))
+    for i in range(3):
+        found[:, i * (size + 1)] = values[:, i]
+    return found
+
+
+def _three(values: np.ndarray) -> np.ndarray:
+    return np.repeat(np.asarray(values)[:, None], 3, axis=1)
+
+
+def _own_sample(frame: str, port: Port) -> Any:
+    return Reading(header(0, frame), port.name, (0.0,) * width(port.like))
+
+
+def _own(reading: Any, time_ns: np.ndarray) -> Fields:
+    """The numbers of a reading of the user's own."""
+
+    def leaves(part: Any) -> list[np.ndarray]:
+        return [leaf for item in part for leaf in leaves(item)] if isinstance(part, tuple) else [part]
+
+    return {**stamp_columns(time_ns), "values": np.column_stack(leaves(reading))}
+
+
+def _imu(r: ImuReading, time_ns: np.ndarray) -> Fields:
+    """Rates and specific force in the body frame; no reading: both covariances begin with -1."""
+    valid = np.asarray(r.valid) != 0.0
+    omega, force = diagonal(_three(r.omega_variance)), diagonal(_three(r.specific_force_variance))  # type: ignore[arg-type]
+    omega[~valid] = force[~valid] = (UNKNOWN,) + (0.0,) * 8
+    return {
+        **stamp_columns(time_ns),
+        "angular_velocity": r.omega_body,
+        "angular_velocity_covariance": omega,
+        "linear_acceleration": r.specific_force_body,
+        "linear_acceleration_covariance": force,
+    }
+
+
+def _magnetometer(r: MagnetometerReading, time_ns: np.ndarray) -> Fields:
+    """Field in the body frame; no reading: NaN."""
+    valid = (np.asarray(r.valid) != 0.0)[:, None]
+    return {
+        **stamp_columns(time_ns),
+        "magnetic_field": np.where(valid, r.field_body, math.nan),
+        "magnetic_field_covariance": diagonal(_three(r.variance)),  # type: ignore[arg-type]
+    }
+
+
+def _late(r: GpsReading, time_ns: np.ndarray) -> np.ndarray:
+    """The instants [ns] that fixes are valid for."""
+    # what was measured before the start is as true at the start: the vehicle stood there
+    return np.maximum(time_ns - np.round(np.asarray(r.age) * 1e9).astype(np.int64), 0)
+
+
+def _gps_sample(frame: str) -> Any:
+    return NavSatFix(
+        header(0, frame),
+        NavSatStatus(NavSatStatus.STATUS_NO_FIX, NavSatStatus.SERVICE_GPS),
+        position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
+    )
+
+
+def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
+    """A fix, stamped with the time that it is valid for; no reading: no fix."""
+    valid = np.asarray(r.valid) != 0.0
+    return {
+        **stamp_columns(_late(r, time_ns)),
+        "status.status": np.where(valid, fix, NavSatStatus.STATUS_NO_FIX),
+        "latitude": r.latitude_deg,
+        "longitude": r.longitude_deg,
+        "altitude": r.height,
+        "position_covariance": diagonal(np.asarray(r.position_variance)),
+    }
+
+
+def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
+    """Velocity in the world frame; no reading: the covariance begins with -1."""
+    valid = np.asarray(r.valid) != 0.0
+    return {
+        **stamp_columns(_late(r, time_ns)),
+        "twist.twist.linear": r.velocity_world,
+        "twist.covariance": diagonal(_three(np.where(valid, r.velocity_variance, UNKNOWN)), size=6),
+    }
+
+
+def _barometer(r: BarometerReading, time_ns: np.ndarray) -> Fields:
+    """Absolute pressure; no reading: NaN."""
+    return {
+        **stamp_columns(time_ns),
+        "fluid_pressure": np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan),
+        "variance": r.variance,
+    }
+
+
+def _sonar_sample(frame: str, sonar: SonarWiring | None) -> Any:
+    view, least, most = sonar or (0.0, 0.0, 0.0)
+    return Range(header(0, frame), radiation_type=Range.ULTRASOUND, field_of_view=view, min_range=least, max_range=most)
+
+
+def _sonar(r: DistanceReading, time_ns: np.ndarray) -> Fields:
+    """Distance downwards; no echo +Inf, too near -Inf, no reading NaN."""
+    return {
+        **stamp_columns(time_ns),
+        "range": np.where(np.asarray(r.valid) != 0.0, r.range, math.nan),
+        "variance": r.variance,
+    }

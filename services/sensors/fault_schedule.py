@@ -1,0 +1,75 @@
+"""Fault schedules: from a scene's tables to what the kernels read."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Le, Len
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.validation import fault
+from lapwing.services.sensors.delay_line import ALL_CHANNELS, DEPTH, DRIFT, KINDS, Fault
+
+SLOTS = 4  # faults of one sensor; the number is fixed, so that schedules share their machine code
+_FOREVER = 2**62  # [tick]
+
+
+class FaultTable(BaseModel):
+    """One fault of a sensor, as a scene has it.
+
+    `dropout`: the reading says that there is none. `freeze`: the last value again. `bias`: plus `size`. `spikes`: with
+    `probability`, plus a normal draw of deviation `size`. `drift`: plus `size` for each second since `start`. `scale`:
+    times `size`. `delay`: by `samples` more.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    kind: Literal["dropout", "freeze", "bias", "spikes", "drift", "scale", "delay"]  # what goes wrong
+    start: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
+    stop: float = math.inf  # [s] simulation time; for good if left out
+    channel: str = "all"  # of the sensor; all of them if left out
+    size: float | Annotated[list[float], Len(3, 3)] = 0.0  # SI unit of the channel; spikes: deviation; drift: per s
+    probability: Annotated[float, Ge(0), Le(1)] = 0.1  # of a spike, per sample
+    samples: Annotated[int, Field(ge=0, lt=DEPTH)] = 0  # of delay, on top of the latency
+
+
+def compile_faults(
+    tables: Sequence[Mapping[str, Any]], channels: Sequence[str], tick: float
+) -> tuple[Fault, ...] | None:
+    """The faults of one sensor, or None where there are none.
+
+    Args:
+        tables: as `FaultTable`.
+        channels: names of the sensor's channels.
+        tick: length of a tick [s].
+
+    Raises:
+        KeyedError: of the key `faults.0.kind`, for example.
+    """
+    if not isinstance(tables, Sequence) or len(tables) > SLOTS:
+        raise KeyedError("faults", f"got {tables!r}", f"a list of at most {SLOTS} tables")
+    faults = [_fault(i, table, channels, tick) for i, table in enumerate(tables)]
+    return tuple(faults + [Fault()] * (SLOTS - len(faults))) if faults else None
+
+
+def _fault(number: int, table: Mapping[str, Any], channels: Sequence[str], tick: float) -> Fault:
+    try:
+        t = FaultTable.model_validate(table)
+    except ValidationError as error:
+        raise fault(error, FaultTable).under(f"faults.{number}") from None
+    if t.channel not in ("all", *channels):
+        raise KeyedError.unknown(f"faults.{number}.channel", "channel", t.channel, ("all", *channels))
+    if not t.stop > t.start:
+        raise KeyedError(f"faults.{number}.stop", f"got {t.stop:g} s", f"later than start = {t.start:g} s")
+    kind = KINDS.index(t.kind)
+    size = t.size if isinstance(t.size, list) else [t.size] * 3
+    x, y, z = (tick * component if kind == DRIFT else component for component in size)
+    return Fault(
+        kind,
+        ALL_CHANNELS if t.channel == "all" else channels.index(t.channel),
+        math.ceil(t.start / tick - 1e-9),
+        _FOREVER if math.isinf(t.stop) else math.ceil(t.stop / tick - 1e-9),
+        (x, y, z),
+        t.probability,
+        t.samples,
+    )

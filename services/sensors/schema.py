@@ -1,0 +1,34 @@
+"""The `[sensors]` of a scene: a table for each sensor that the vehicle carries."""
+
+from typing import Any, ClassVar
+
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.common.communication_schema import Exchange, ticks
+from lapwing.services.common.named_tables import NamedTables
+from lapwing.services.sensors.registry import parameters
+
+
+class Sensors(NamedTables):
+    """Sensors by name (imu, gps, ...): `preset`, parameters that differ from it, and `faults`."""
+
+    TABLE: ClassVar[str] = "sensors"
+
+    def lookup(self, keys: list[str]) -> Any:
+        """A parameter of a sensor; "imu.rate" is that of its preset unless the scene says otherwise."""
+        name, key = keys
+        return getattr(parameters(name, self.tables[name], 1.0), key)
+
+    def check(self, scene: Scene) -> None:
+        """Every sensor exists, its parameters are sound, and its rate divides the exchange rate."""
+        super().check(scene)
+        for name, table in self.tables.items():
+            if "module" in table and not name.isidentifier():
+                raise KeyedError(f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _")
+        self.load(scene)
+        for name, table in self.tables.items():
+            try:
+                rate = parameters(name, table, scene[Exchange].interval).rate
+            except KeyedError as error:
+                raise error.under("sensors") from None
+            ticks(scene, rate, f"sensors.{name}.rate")

@@ -1,0 +1,37 @@
+"""What the sensors measure: the true motion at one instant, and the surroundings."""
+
+from typing import Annotated, Any, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.vector import ZERO, Vec3
+
+Arm = Annotated[float, Ge(-10.0), Le(10.0)]
+Place = tuple[Arm, Arm, Arm]  # [m] of an instrument, body coordinates
+
+
+class Truth(NamedTuple):
+    """True state of a vehicle and what is around it."""
+
+    position_world: Vec3 = ZERO  # [m]
+    attitude: Quaternion = NO_ROTATION  # wxyz, body to world
+    velocity_world: Vec3 = ZERO  # [m/s]
+    omega_body: Vec3 = ZERO  # [rad/s]
+    acceleration_world: Vec3 = ZERO  # [m/s^2], dv/dt
+    height_above_ground: float = 0.0  # [m], of the body's origin, straight down
+    gravity: float = 9.81  # [m/s^2], positive, along -z of the world
+    home: Home = STANDARD.home
+    atmosphere: Atmosphere = STANDARD.atmosphere
+    magnetic_field_world: Vec3 = STANDARD.magnetic_field_world  # [T]
+    terrain: Any = STANDARD.terrain  # Level or Relief
+    angular_acceleration_body: Vec3 = ZERO  # [rad/s^2]
+    dynamic_pressure: float = 0.0  # [Pa] of the air that the vehicle flies through
+    motor_current: float = 0.0  # [A] of all motors
+    air_velocity_world: Vec3 = ZERO  # [m/s] of the vehicle through the air
+    air_density: float = 1.225  # [kg/m^3]
+    thrust: float = 0.0  # [N] of all rotors
+    rotor_speed: float = 0.0  # [rad/s] mean of the rotors

@@ -1,0 +1,28 @@
+"""The trajectory, compiled: the reference at every tick."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.kernels import leaf
+from lapwing.services.common.ports import Reference
+from lapwing.services.trajectory import polynomial_piece
+
+
+class TrajectoryPath(NamedTuple):
+    """A compiled trajectory."""
+
+    path: polynomial_piece.Parameters
+    final: int  # the first phase after which none ends in the air
+    interval: float  # [s] a tick
+
+
+@leaf
+def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Reference], int]:
+    """The reference at `tick`; it has no state."""
+    r = polynomial_piece.evaluate(p.path, tick * p.interval)
+    return s, (
+        Reference(
+            r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate, r.phase, r.phase >= p.final,
+            p.path.phase_release[r.phase] > 0.0,
+        ),
+    ), GO_ON  # fmt: skip

@@ -1,0 +1,63 @@
+"""The trajectory of a vehicle that follows another one, compiled: the leader's reference and a way relative to it."""
+
+import math
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.dynamics.vector import Vec3, add
+from lapwing.kernels import leaf
+from lapwing.services.common.ports import Reference
+from lapwing.services.trajectory import polynomial_piece
+from lapwing.services.trajectory.block import TrajectoryPath
+
+
+class FollowedPath(NamedTuple):
+    """Two compiled trajectories."""
+
+    leader: TrajectoryPath  # as the leader flies it
+    relative: TrajectoryPath  # from the leader, along its heading; the origin is how far they stand apart
+    heading: bool  # whether the way turns with the leader; otherwise it keeps its direction in the world
+
+
+@leaf
+def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, Vec3]:
+    """(position, velocity, acceleration) in the world of a way in a frame at an angle, with its two rates, about z."""
+    angle, rate, acceleration = heading
+    s, c = math.sin(angle), math.cos(angle)
+    (x, y, z), (vx, vy, vz), (ax, ay, az) = way.position_world, way.velocity_world, way.acceleration_world
+    vx, vy, ax, ay = (  # in the frame, by Coriolis' theorem
+        vx - rate * y,
+        vy + rate * x,
+        ax - 2.0 * rate * vy - rate * rate * x - acceleration * y,
+        ay + 2.0 * rate * vx - rate * rate * y + acceleration * x,
+    )
+    return (
+        (c * x - s * y, s * x + c * y, z),
+        (c * vx - s * vy, s * vx + c * vy, vz),
+        (c * ax - s * ay, s * ax + c * ay, az),
+    )
+
+
+@leaf
+def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Reference], int]:
+    """The reference at `tick`, with the phases of the vehicle's own way (theory.md, eq. (4.1a)); it has no state."""
+    t = tick * p.relative.interval
+    leader, way = polynomial_piece.evaluate(p.leader.path, t), polynomial_piece.evaluate(p.relative.path, t)
+    heading = polynomial_piece.channel_at(p.leader.path.yaw, t) if p.heading else (0.0, 0.0, 0.0)
+    position, velocity, acceleration = turned(heading, way)
+    return (
+        s,
+        (
+            Reference(
+                add(leader.position_world, position),
+                add(leader.velocity_world, velocity),
+                add(leader.acceleration_world, acceleration),
+                leader.yaw + way.yaw,
+                leader.yaw_rate + way.yaw_rate,
+                way.phase,
+                way.phase >= p.relative.final and leader.phase >= p.leader.final,
+                p.relative.path.phase_release[way.phase] > 0.0,
+            ),
+        ),
+        GO_ON,
+    )

@@ -1,9 +1,0 @@
-"""The report of a flight: a page whose plots are drawn in the reader's browser, or the same plots on paper.
-
-Each plot is a file of `studies.report.plots`; adding one is adding a file. It says what is to be seen (`plot`);
-`browser` and `paper` draw it.
-"""
-
-from studies.report.write import check_format, write
-
-__all__ = ["check_format", "write"]

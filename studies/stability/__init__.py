@@ -1,8 +1,0 @@
-"""What stays numerically stable and what would have broken: hard cases, each beside a naive method that fails it.
-
-`lapwing stability [CASE]`; a case is a file of `cases/`.
-"""
-
-from studies.stability.case import Curve, Found, Plot, Row, Sweep
-
-__all__ = ["Curve", "Found", "Plot", "Row", "Sweep"]

@@ -1,0 +1,57 @@
+"""A run resolved once: as text and back it is the same run, to the bit of its flight."""
+
+import pytest
+
+from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.config.serialise import digest, first_difference, from_json, to_json
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.services.scene_resolver import load, resolve
+from tests.cosim.memory_log import fly
+from tests.cosim.small_graph import setup_of
+from tests.golden.cases import CASES
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_set_up_of_every_scene_is_read_back_as_it_was_written(name):
+    setup = CASES[name].resolve()
+    text = to_json(setup)
+    again = from_json(text)
+    assert type(again) is type(setup)
+    assert first_difference(setup, again) is None
+    assert to_json(again) == text
+    assert digest(again) == digest(setup)
+
+
+def test_resolving_a_scene_twice_gives_the_same_and_an_override_another():
+    def resolved(*overrides):
+        return resolve(load("hover", [*overrides]))
+
+    assert digest(resolved()) == digest(resolved())
+    assert first_difference(resolved(), resolved("run.seed=7"))[0] == "seed"
+    path, before, after = first_difference(resolved(), resolved("airframe.mass.total=9.5"))
+    assert path == "lapwing.services.autopilot.parameters.airframe.mass"
+    assert after == 9.5 != before
+
+
+def test_a_set_up_from_its_text_flies_to_the_same_digest():
+    setup = resolve(load("hover", ["run.duration=0.4", "effects.wind_random.sigma=1.0"]))
+    assert fly(from_json(to_json(setup))).digest == fly(setup).digest
+
+
+def test_ports_and_their_producers_are_found_by_name():
+    port = Port("wind", (0.0, 0.0), 5)
+    setup = setup_of((port,))
+    assert setup.port("wind") == port
+    assert setup.producers == {"wind": "test"}
+    assert (setup.interval, setup.duration) == (0.01, 100.0)
+    with pytest.raises(LockStepError, match=r"^no service of this scene gives rain$"):
+        setup.port("rain")
+
+
+def test_the_order_of_the_services_follows_their_ports():
+    services = {
+        "controller": ServiceSetup(None, (Input("wind"),), ()),
+        "weather": ServiceSetup(None, (), (Port("wind", 0.0),)),
+    }
+    assert setup_of()._replace(services=services).order == ["weather", "controller"]

@@ -1,0 +1,183 @@
+"""Graphs: Python parts among compiled ones, parts replaced in flight, pages of messages."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from lapwing.cosim.diagram.block_diagram import NEVER
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port
+from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.kernels.cell import Cell
+from lapwing.messages import Clock, Setpoint, header
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.messages.topics import CLOCK, COMMAND_ACKS, SETPOINT, TRAJECTORY
+from tests.cosim.parts.readings import LIKE, Readings, expected
+from tests.cosim.parts.running_sum import Number, RunningSum
+from tests.cosim.small_graph import graph_of
+
+READINGS = Port("readings", LIKE)
+NUMBERS, TOTAL = Port("numbers", Number(0.0), KEPT), Port("total", Number(0.0))
+
+
+class Acting:
+    """A part in Python that writes down when it acts, and names its next tick by a rule."""
+
+    def __init__(self, name, following=lambda tick: NEVER, outputs=(), does=lambda graph, tick: None):
+        self.name, self.outputs, self.ticks = name, outputs, []
+        self._following, self._does = following, does
+
+    def bind(self, graph):
+        self._graph = graph
+
+    def act(self, tick):
+        self.ticks.append(tick)
+        self._does(self._graph, tick)
+        return self._following(tick)
+
+
+def readings(**signals):
+    return Part("readings", Readings(2.0, **signals), Cell(0), (), (READINGS,))
+
+
+def test_a_python_part_acts_first_at_tick_0_and_then_at_the_ticks_that_it_names():
+    seldom, once, always = Acting("a", lambda t: t + 7), Acting("b"), Acting("c", lambda t: t)
+    graph = graph_of(seldom, readings(), once, always, page=32)
+    graph.advance(3)
+    graph.advance(30)
+    assert seldom.ticks == [0, 7, 14, 21, 28]
+    assert once.ticks == [0]
+    assert always.ticks == list(range(30))  # a tick that has been is the next one
+
+
+def test_a_part_that_calls_is_heard_by_the_python_parts_after_it_at_that_tick():
+    before, after, last = Acting("before"), Acting("after"), Acting("last", lambda t: t + 4)
+    graph = graph_of(before, readings(look_every=10), after, last, page=32)
+    graph.advance(31)
+    assert before.ticks == [0]
+    assert after.ticks == [0, 10, 20, 30]
+    assert last.ticks == [0, 4, 8, 10, 14, 18, 20, 24, 28, 30]
+
+
+def test_a_python_part_acts_between_the_parts_before_and_after_it():
+    def number(graph, tick):
+        graph.put("numbers", tick, Number(graph.latest("readings", tick).number))
+
+    acting = Acting("number", lambda t: t + 1, (NUMBERS,), number)
+    total = Part("total", RunningSum(1.0), Cell(0.0), (Input("numbers"),), (TOTAL,))
+    graph = graph_of(readings(), acting, total, page=32)
+    graph.advance(20)
+    assert graph.latest("total", 19).value == sum(2.0 * tick for tick in range(20))
+
+
+def test_a_part_that_is_replaced_hands_its_state_on():
+    total = Part("total", RunningSum(1.0), Cell(0.0), (Input("numbers"),), (TOTAL,))
+
+    def exchange(graph, tick):
+        if tick == 6:
+            other = replace(graph.part("total"), parameters=RunningSum(-1.0))
+            graph.replace(other, graph.prepare(other))
+
+    graph = graph_of(Acting("exchange", lambda t: 6, (), exchange), total, ports=(NUMBERS,), page=32)
+    graph.put("numbers", 0, Number(1.0))
+    graph.advance(16)
+    assert [graph.latest("total", tick).value for tick in (5, 6, 15)] == [6.0, 5.0, -4.0]
+    assert graph.part("total").parameters == RunningSum(-1.0)
+
+
+def test_between_two_messages_the_latest_is_the_one_before():
+    slow = Port("readings", LIKE, 5)
+    graph = graph_of(Part("readings", Readings(2.0), Cell(0), (), (slow,), 5), page=16)
+    graph.advance(13)
+    assert graph.latest("readings", 4) == expected(2.0, 0, 1)
+    assert graph.latest("readings", 12) == expected(2.0, 10, 3)
+
+
+def test_what_nobody_gives_is_named():
+    part = Part("total", RunningSum(1.0), Cell(0.0), (Input("wind"),), (TOTAL,))
+    with pytest.raises(LockStepError, match=r"^no service of this scene gives wind$"):
+        graph_of(part)
+
+
+def wire(topic=SETPOINT, period=1):
+    """The readings' count as a phase that has one of two texts."""
+    texts = ("climb", "on the way")
+    return Wire(
+        topic, "readings", period,
+        lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
+        lambda good: Setpoint(header(0, "world"), phase=texts[good]),
+        lambda x: [x.good],
+    )  # fmt: skip
+
+
+def messages(pages):
+    """{topic name: [(tick, payload)]} in order."""
+    found = {}
+    for page in pages:
+        of_topic = found.setdefault(page.topic.name, [])
+        of_topic += [(int(t), p.tobytes()) for t, p in zip(page.ticks, page.payloads, strict=True)]
+    return {name: sorted(of_topic) for name, of_topic in found.items()}
+
+
+def test_pages_are_the_same_whatever_their_lengths():
+    def flown(stops):
+        graph = graph_of(readings(end=50), wires=[wire(), wire(COMMAND_ACKS, 4)], page=64)
+        pages = []
+        for stop in stops:
+            first = graph.tick
+            graph.advance(stop)
+            pages += graph.pages(first, graph.tick)
+        return messages(pages)
+
+    whole = flown([64])
+    assert [len(whole[topic.name]) for topic in (SETPOINT, COMMAND_ACKS)] == [51, 13]
+    assert flown(range(1, 64)) == flown([7, 8, 30, 31, 60]) == flown([50, 51]) == whole
+    for tick, payload in whole[SETPOINT.name]:
+        message = Setpoint.decode(payload)
+        assert message == Setpoint(
+            header(10_000_000 * tick, "world"), yaw=2.0 * tick, phase="on the way" if tick % 5 == 0 else "climb"
+        )
+
+
+def test_only_what_is_recorded_is_given_unless_a_topic_is_asked_for():
+    graph = graph_of(readings(), wires=[wire(), wire(TRAJECTORY)], page=16)
+    graph.advance(4)
+    assert [page.topic for page in graph.pages(2, 4)] == [SETPOINT]
+    assert {page.topic for page in graph.pages(0, 4, [TRAJECTORY])} == {TRAJECTORY}
+
+
+def test_single_messages_come_once_and_in_the_ticks_asked_for():
+    def say(graph, tick):
+        graph.services[0].messages.append((CLOCK, tick, Clock().encode()))
+        graph.services[0].messages.append((COMMAND_ACKS, tick, bytes(8 + tick)))
+
+    graph = graph_of(Acting("talker", lambda t: t + 2, (), say), page=16)
+    graph.advance(8)
+    assert list(messages(graph.pages(0, 3, keep=True))) == [CLOCK.name, COMMAND_ACKS.name]
+    assert [tick for tick, _ in messages(graph.pages(0, 3))[CLOCK.name]] == [0, 2]
+    assert [(tick, len(p)) for tick, p in messages(graph.pages(3, 8))[COMMAND_ACKS.name]] == [(4, 12), (6, 14)]
+    assert graph.pages(0, 8) == []
+
+
+class Pair(NamedTuple):
+    """A port of two numbers."""
+
+    left: float
+    right: float
+
+
+def test_rows_are_put_and_read_as_numbers_too():
+    port = Port("pair", Pair(0.0, 0.0), 2)
+    user = Acting("user")
+    user.inputs = (Input("pair", 6),)
+    graph = graph_of(user, ports=(port,))
+    for tick in range(0, 8, 2):
+        graph.put_row("pair", tick, np.array([tick, -tick]))
+    assert graph.row("pair", 6).tolist() == [6.0, -6.0]
+    assert graph.rows("pair", np.array([2, 4])).tolist() == [[2.0, -2.0], [4.0, -4.0]]
+    assert graph.latest("pair", 5) == Pair(4.0, -4.0)
+    assert graph.has("pair")
+    assert not graph.has("wind")

@@ -1,0 +1,130 @@
+"""Vehicles that nothing couples step one after the other, a page at a time: as if they took turns at every tick."""
+
+import pytest
+
+from lapwing.cosim.diagram.block_diagram import NEVER
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.execution_groups import groups
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.run_errors import DivergedError
+from lapwing.kernels.cell import Cell
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from tests.cosim.parts.counter import Counter
+from tests.cosim.small_graph import graph_of
+
+TOGETHER = {"together": True, "apart": False}
+
+
+def counters(together, **parameters):
+    """A part of each vehicle; together: the first takes what the last one gives."""
+    names = list(parameters)
+    taken = (Input(names[-1], 1),) if together else ()
+    return [
+        Part(name, p, Cell(0), taken if name == names[0] else (), (Port(name, 0),), vehicle=name)
+        for name, p in parameters.items()
+    ]
+
+
+def counted(graph, *names):
+    """What each has given at every tick before the graph's."""
+    return [[graph.latest(name, tick) for tick in range(max(0, graph.tick - 8), graph.tick)] for name in names]
+
+
+def test_who_steps_together():
+    alone = counters(False, a=Counter(3), b=Counter(3))
+    assert groups(alone) == [[0], [1]]
+    assert groups(counters(True, a=Counter(3), b=Counter(3), c=Counter(3))) == [[0, 1, 2]]
+    elsewhere = Part("c", Counter(3), Cell(0), (Input("from another process"),), vehicle="a")
+    assert groups([*alone, elsewhere]) == [[0, 1, 2]]
+    fleet, carried = (
+        [part for service in create_all(resolve(load(name))) for part in service.parts]
+        for name in ("fleet", "carried_load")
+    )
+    assert len(groups(fleet)) == 3
+    assert len(groups(carried)) == 1
+
+
+@pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
+@pytest.mark.parametrize("last", [(7, 9), (9, 7), (3, 9), (9, 3)])
+@pytest.mark.parametrize("pages", [(100,), (4, 8, 12), range(1, 20)])
+def test_the_run_ends_with_the_last_vehicle_and_all_have_come_as_far(last, pages, together):
+    graph = graph_of(*counters(together, a=Counter(last[0]), b=Counter(last[1])), page=16)
+    for stop in pages:
+        graph.advance(stop)
+    assert (graph.ended, graph.tick) == (True, 10)
+    assert counted(graph, "a", "b") == [list(range(2, 10))] * 2
+
+
+@pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
+@pytest.mark.parametrize(
+    ("a", "b", "c"),
+    [
+        (Counter(20, 5), Counter(20), Counter(20)),
+        (Counter(20), Counter(20), Counter(20, 5)),
+        (Counter(20, 6), Counter(20, 5), Counter(20, 7)),
+        (Counter(2), Counter(3), Counter(20, 5)),  # two are over before
+        (Counter(2, 5), Counter(20), Counter(20)),  # one fails that is over
+        (Counter(2, 5), Counter(20, 7), Counter(20)),
+    ],
+)
+def test_the_first_failure_is_told_and_all_have_come_as_far(a, b, c, together):
+    graph = graph_of(*counters(together, a=a, b=b, c=c), page=16)
+    failing = next(name for name, p in (("a", a), ("b", b), ("c", c)) if p.fails == 5)
+    with pytest.raises(DivergedError, match=f"^{failing}: .* at tick 5$"):
+        graph.advance(12)
+    assert (graph.ended, graph.tick) == (False, 5)
+    assert counted(graph, "a", "b", "c") == [list(range(5))] * 3
+
+
+class Speaker:
+    """A part in Python that says something at every third tick."""
+
+    outputs = ()
+
+    def __init__(self, vehicle, messages):
+        self.name = self.vehicle = vehicle
+        self._messages = messages
+
+    def bind(self, graph):
+        pass
+
+    def act(self, tick):
+        self._messages.append((self.vehicle, tick, b""))
+        return tick + 3 if tick < 9 else NEVER
+
+
+@pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
+def test_what_is_said_is_in_the_order_of_ticks(together):
+    graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)))
+    said = graph.services[0].messages
+    speakers = [Speaker(name, said) for name in "ab"]
+    graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)), *speakers)
+    graph.services[0].messages = said
+    graph.advance(6)
+    graph.advance(12)
+    assert said == [(name, tick, b"") for tick in (0, 3, 6, 9) for name in "ab"]
+
+
+class Clock:
+    """A part in Python that owns time."""
+
+    name, outputs = "clock", ()
+
+    def __init__(self, last):
+        self._last = last
+
+    def bind(self, graph):
+        self._graph = graph
+
+    def act(self, tick):
+        if tick == self._last:
+            self._graph.finish()
+        return tick + 1
+
+
+def test_a_part_in_python_that_owns_time_ends_the_run():
+    graph = graph_of(Clock(3), Part("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
+    graph.advance(100)
+    assert (graph.ended, graph.tick) == (True, 4)
+    assert graph.latest("a", 3) == 3

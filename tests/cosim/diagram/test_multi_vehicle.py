@@ -1,0 +1,195 @@
+"""Several vehicles in one scene: each flies to the bit as it would alone, in one graph and in one for each service."""
+
+import re
+
+import pytest
+
+from lapwing.cosim.config.serialise import first_difference, from_json, to_json
+from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.multi_vehicle import joined_service, member, members
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.run_errors import DivergedError
+from lapwing.cosim.scene import SceneError
+from lapwing.kernels import on_compile
+from lapwing.kernels.cell import Cell
+from lapwing.messages.topics import CLOCK, IMU, TF, of_vehicle, own_sensor, topic_named
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import from_resolved, load, parse, reseed, resolve
+from tests.cosim.memory_log import fly
+from tests.cosim.parts.signals import Signals
+from tests.cosim.small_graph import graph_of
+from tests.cosim.test_agreement import fly_apart
+
+WIND = ["effects.wind_random.sigma=1.0", "effects.wind_random.beside_drag=true"]
+SHORT = ["run.duration=1.0", *WIND]
+COMMON = """
+[run]
+duration = 1.0
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.ground_contact]
+[autopilot]
+gains = "tuned"
+estimator = "truth"
+[[trajectory.phase]]
+name = "climb"
+z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
+"""
+
+
+def fleet_of(n, tmp_path):
+    """n vehicles of one type, 2 m apart."""
+    entries = [f'[[vehicle]]\nairframe = "delivery_drone"\nstart = [0.0, {2.0 * i}]\n' for i in range(n)]
+    return parse(tmp_path / "many.toml", COMMON + "".join(entries))
+
+
+@pytest.fixture(scope="module")
+def setup():
+    return resolve(load("fleet", SHORT))
+
+
+@pytest.fixture(scope="module")
+def flown(setup):
+    return fly(setup)
+
+
+@pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
+def test_a_vehicle_says_in_a_fleet_what_it_says_alone(vehicle, setup, flown):
+    alone = fly(member(setup, vehicle))
+    own = {name: topic for name, topic in alone.topics.items() if topic not in (CLOCK, TF)}
+    assert {name for name in flown.topics if name.startswith(f"{vehicle}/")} == {f"{vehicle}/{name}" for name in own}
+    for name in own:
+        assert flown.payloads(f"{vehicle}/{name}") == alone.payloads(name), name
+    assert alone.payloads("clock") == flown.payloads("clock")
+    transforms = [payload for _, payload in flown.payloads("tf")]
+    assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
+
+
+def test_random_numbers_go_by_the_vehicle(flown):
+    """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
+    left, right = (flown.view(f"{name}/truth").wind for name in ("left", "right"))
+    assert (left != right).any()
+
+
+def test_a_vehicle_stands_where_it_starts_and_its_path_begins_there(flown):
+    for name, (x, y) in {"left": (0.0, 3.0), "right": (0.0, -3.0), "scout": (-3.0, 0.0)}.items():
+        assert flown.view(f"{name}/truth").position[0, :2] == pytest.approx((x, y))
+        assert flown.view(f"{name}/setpoint").position[0, :2] == pytest.approx((x, y))
+    assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
+
+
+def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+    apart = fly_apart(setup, None)
+    assert apart.topics.keys() == flown.topics.keys()
+    assert apart.digest == flown.digest
+
+
+def test_more_vehicles_of_a_type_compile_nothing_more(tmp_path):
+    two, three = (resolve(fleet_of(n, tmp_path)) for n in (2, 3))
+    Graph(two, create_all(two), PAGE).advance(1)
+    compiled = []
+    on_compile(compiled.append)
+    Graph(three, create_all(three), PAGE).advance(1)
+    assert compiled == []
+
+
+class Asked:
+    """A part in Python that keeps at which ticks it was asked."""
+
+    name, outputs = "asked", ()
+
+    def __init__(self, vehicle):
+        self.vehicle, self.ticks = vehicle, []
+
+    def bind(self, graph):
+        pass
+
+    def act(self, tick):
+        self.ticks.append(tick)
+        return NEVER
+
+
+def test_a_vehicle_calls_its_own_python_and_the_run_ends_with_the_last_vehicle():
+    asked = Asked("a"), Asked("b")
+    signals = {"a": Signals(5, 7), "b": Signals(2, 9)}
+    compiled = [Part(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
+    graph = graph_of(*compiled, *asked)
+    graph.advance(100)
+    assert (graph.ended, graph.tick) == (True, 10)
+    assert [part.ticks for part in asked] == [[0, 5], [0, 2]]
+
+
+def test_a_set_up_is_that_of_its_vehicles_and_survives_text_and_another_seed(setup):
+    scene = load("fleet", SHORT)
+    for vehicle, found in zip(scene.vehicles, members(setup), strict=True):
+        assert first_difference(found, resolve(vehicle)) is None
+    assert first_difference(from_json(to_json(setup)), setup) is None
+    assert first_difference(resolve(from_resolved(setup.resolved, "fleet")), setup) is None
+    assert first_difference(reseed(setup, 7), resolve(load("fleet", [*SHORT, "run.seed=7"]))) is None
+
+
+def test_a_state_that_is_not_sound_is_told_with_its_vehicle(setup):
+    part = Part("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
+    joined = joined_service("plant", [(member(setup, "right"), Service("plant", [part], []))])
+    error = joined.parts[0].failure(3)
+    assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")
+
+
+def test_names_and_systems_are_numbered(tmp_path):
+    scene = fleet_of(3, tmp_path)
+    assert [vehicle.lookup("vehicle.name") for vehicle in scene.vehicles] == ["drone1", "drone2", "drone3"]
+    assert [vehicle.lookup("mavlink.system") for vehicle in scene.vehicles] == [1, 2, 3]
+
+
+def test_topics_of_a_vehicle_of_a_fleet():
+    assert of_vehicle(IMU, "left") is topic_named("left/imu")
+    assert (topic_named("left/imu").key(), of_vehicle(TF, "left")) == ("/left/imu", TF)
+    assert topic_named("left/own_sensor/x") is of_vehicle(own_sensor("x"), "left")
+    with pytest.raises(ValueError, match=r"^no topic \{vehicle\}/imuu$"):
+        topic_named("left/imuu")
+
+
+WRONG = {
+    "vehicle.7.name=x": "--set vehicle.7.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
+    "vehicle.left.start=[0,0]": (
+        "--set vehicle.left.start=[0,0]: which vehicle? expected vehicle.N.start, N from 0 to 2"
+    ),
+    "vehicle.left.airframe.mass.total=3": (
+        "--set vehicle.left.airframe.mass.total=3: which vehicle? expected vehicle.N.airframe.mass.total, N from 0 to 2"
+    ),
+    "vehicle.name=x": "--set vehicle.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
+    "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share it; expected a table [run] of the scene",
+    "vehicle.1.name=left": "--set vehicle.1.name: left is also that of vehicle.0; expected another",
+    "vehicle.1.mavlink.system=1": "--set vehicle.1.mavlink.system: 1 is also that of vehicle.0; expected another",
+    "vehicle.2.autopilot.gains=x": "--set vehicle.2.autopilot.gains: unknown gain set 'x'",
+    "vehicle.0.nam=3": "--set vehicle.0.nam: unknown key 'nam'; did you mean name?",
+    "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3",
+    "autopilot.gains=x": "--set autopilot.gains: unknown gain set 'x'",
+}
+
+
+@pytest.mark.parametrize("override", WRONG)
+def test_a_fault_names_the_vehicle_and_the_key(override):
+    with pytest.raises(SceneError, match=f"^{re.escape(WRONG[override])}"):
+        load("fleet", [override])
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("[vehicle.exchange]\nrate = 100\n", "many.toml:15: vehicle.0.exchange: all vehicles share it"),
+        ("[vehicle.effects.gravty]\n", "many.toml:15: vehicle.0.effects.gravty: unknown effect 'gravty'"),
+        ("[[vehicle]]\nairframe = 3\n", "many.toml:16: vehicle.1.airframe: expected a text, got 3"),
+        ("[[vehicle]]\n" * 50, "vehicle: 51 vehicles; expected 1 to 50"),
+    ],
+)
+def test_a_fault_is_told_with_its_line(entry, said, tmp_path):
+    with pytest.raises(SceneError) as error:
+        parse(tmp_path / "many.toml", COMMON + '[[vehicle]]\nairframe = "delivery_drone"\n' + entry)
+    assert said in str(error.value)
+
+
+def test_what_is_for_one_vehicle_only_says_so():
+    with pytest.raises(SceneError, match=r"vehicle: there are 3; expected a scene of one vehicle"):
+        load("fleet").tables("effects")

@@ -1,0 +1,95 @@
+"""The rule of what is due when, in Python and compiled; and the order in which services step."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lapwing.cosim.diagram.tick_schedule import KEPT, Input, due, execution_order
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.services.scene_resolver import load, resolve
+
+SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
+
+
+def stamps(period, stop):
+    """The ticks before `stop` at which a producer gives a message, or keeps one."""
+    return range(0, stop, max(1, period))
+
+
+@given(st.integers(0, 5000), st.integers(0, 60), st.integers(0, 60))
+def test_a_message_is_due_its_delay_after_its_stamp(tick, period, delay):
+    expected = tick - delay if tick - delay in stamps(period, tick + 1) else -1
+    assert due.py_func(tick, period, delay) == expected
+
+
+def test_compiled_and_in_python_it_is_the_same():
+    random = np.random.default_rng(3)
+    for tick, period, delay in random.integers(0, 200, (500, 3)).tolist():
+        for p in (period, KEPT, 1):
+            assert due(tick, p, delay) == due.py_func(tick, p, delay)
+
+
+@pytest.mark.parametrize(
+    ("tick", "period", "delay", "stamp"),
+    [
+        (0, 1, 0, 0),
+        (0, 1, 1, -1),  # nothing before the first tick
+        (1, 1, 1, 0),
+        (10, 5, 0, 10),
+        (11, 5, 0, -1),
+        (11, 5, 1, 10),  # late by one tick
+        (3, 5, 4, -1),
+        (7, KEPT, 0, 7),
+        (7, KEPT, 3, 4),
+    ],
+)
+def test_examples(tick, period, delay, stamp):
+    assert due.py_func(tick, period, delay) == stamp
+
+
+def order(needs, gives):
+    return execution_order({name: [Input(*i) for i in inputs] for name, inputs in needs.items()}, gives)
+
+
+GIVES = {"plant": ["truth"], "sensors": ["imu"], "autopilot": ["actuators"]}
+
+
+def test_everybody_comes_after_those_whose_undelayed_messages_it_needs():
+    loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators", 1)]}
+    assert order(loop, GIVES) == ["plant", "sensors", "autopilot"]
+    beside = loop | {"formation": [("truth",)]}
+    assert order(beside, GIVES | {"formation": []}) == ["plant", "formation", "sensors", "autopilot"]
+
+
+def test_the_order_does_not_depend_on_who_is_named_first():
+    loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators", 1)]}
+    assert order(dict(reversed(loop.items())), dict(reversed(GIVES.items()))) == order(loop, GIVES)
+
+
+def test_what_a_service_gives_itself_holds_nobody_up():
+    assert order({"plant": [("truth",)]}, {"plant": ["truth"]}) == ["plant"]
+
+
+def test_a_loop_without_delay_names_those_in_it():
+    loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators",)], "clock": []}
+    with pytest.raises(LockStepError, match=r"^a loop without delay: autopilot, plant, sensors$"):
+        order(loop, GIVES | {"clock": ["time"]})
+
+
+def test_an_input_that_nobody_gives_is_named_with_who_needs_it():
+    with pytest.raises(LockStepError, match=r"^sensors needs wind, which no service of this scene gives$"):
+        order({"sensors": [("wind", 1)]}, {"sensors": ["imu"]})
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("coupling", ["sequential", "parallel"])
+def test_every_scene_has_an_order(path, coupling):
+    setup = resolve(load(path, [f"exchange.coupling={coupling}"]))
+    assert sorted(setup.order) == sorted(setup.services)
+    place = {name: i for i, name in enumerate(setup.order)}
+    for name, service in setup.services.items():
+        for needed in service.inputs:
+            assert needed.delay > 0 or place[setup.producers[needed.port]] < place[name]

@@ -1,0 +1,161 @@
+"""Pages of messages are, byte for byte, the messages of the single values; their texts may change from row to row."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Wire, due_ticks, encode
+from lapwing.kernels.row_packing import reader, to_row
+from lapwing.messages import Setpoint, header
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, of_all
+from lapwing.services.autopilot.commander.commander_output import Status as Words
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.services.sensors.rangefinder import Rangefinder
+from tests.cosim.scalar_encoding import BUILDERS
+
+SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
+FIRST, COUNT = 10_000, 40  # ticks
+WORDS = (
+    Words("mission", "", False, False, "", 0, 0, 65535, 1, False, (), (0.0, 0.0, 0.0), False, 0),
+    Words(
+        "hold",
+        "",
+        False,
+        False,
+        "the position is lost",
+        2,
+        7,
+        1,
+        3,
+        True,
+        ("not ready", "no GPS"),
+        (1.5, -2.0, 0.5),
+        False,
+        0,
+    ),
+    Words("land", "", False, False, "", 1, 7, 0, 4, False, ("not ready",), (0.5, 0.25, 0.0), False, 2),
+)
+
+
+def random_value(like, random):
+    """A tree like another, of random numbers; integers are 0, 1 or 2."""
+    if isinstance(like, tuple):
+        items = [random_value(item, random) for item in like]
+        return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
+    if isinstance(like, bool | int):
+        return type(like)(random.integers(2 if isinstance(like, bool) else 3))
+    return abs(random.standard_normal())
+
+
+def known(setup, services):
+    """What messages say besides values, as the set-up has it."""
+    given = {name: service.parameters for name, service in setup.services.items()}
+    commander = next((p for s in services for p in s.parts if p.name == "autopilot.commander"), None)
+    phases, words = given["trajectory"].phases if "trajectory" in given else (), WORDS
+    if commander is not None:
+        for words in WORDS:
+            commander.words.number(words)
+        for text in ("up", "along", "down"):
+            commander.phases.number(text)
+        phases, words = commander.phases.table, commander.words.table
+    wiring = given["plant"].wiring
+    sensors = [instrument.sensor for instrument in given["sensors"].instruments] if "sensors" in given else []
+    return SimpleNamespace(
+        vehicle=setup.vehicle, cells=wiring.cells, capacity=wiring.capacity, bodies=wiring.bodies,
+        sonar=given["sensors"].sonar if "sensors" in given else None, phases=phases, words=words,
+        rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
+    )  # fmt: skip
+
+
+def fitting(value, texts, random):
+    """A value whose numbers of texts are among these, and whose bits of refused sources are any."""
+    if "rejected" in value._fields:
+        return value._replace(rejected=int(random.integers(128)))
+    return value._replace(phase=value.phase % len(texts)) if "phase" in value._fields else value
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_every_topic_of_a_scene_is_its_values_one_by_one(path):
+    for setup in members(resolve(load(path))):
+        check_every_topic(setup, np.random.default_rng(5))
+
+
+def check_every_topic(setup, random):
+    services = create_all(setup)
+    given = known(setup, services)
+    for wire in (wire for service in services for wire in service.wires):
+        ticks = due_ticks(FIRST, FIRST + COUNT * wire.period, wire.period)
+        port = setup.port(wire.port)
+        trajectory = setup.services.get("trajectory")
+        texts = trajectory.parameters.phases if wire.port == "trajectory" else given.phases
+        values = [fitting(random_value(port.like, random), texts, random) for _ in ticks]
+        rows = np.array([to_row(value) for value in values])
+        pages = list(encode(wire, port, setup, ticks, rows))
+        found = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
+        assert sum(len(page.ticks) for page in pages) == len(found) == len(ticks)
+        for tick, value in zip(ticks, values, strict=True):
+            assert reader(port.like)(to_row(value)) == value
+            expected = BUILDERS[wire.topic](given, int(tick) * setup.interval_ns, value)
+            assert found[tick] == expected.encode(), wire.topic.name
+
+
+def test_forces_on_feet_are_their_values_one_by_one():
+    check_every_topic(resolve(load("hover", ["rates.contact=50"])), np.random.default_rng(5))
+
+
+def test_the_scenes_that_ship_and_one_that_is_asked_for_more_speak_on_every_topic():
+    asked = load("bridge", ["autopilot.operator=true", "rates.contact=50"])  # tells what it got of the airspeed, too
+    scenes = [*map(load, SCENES), asked]
+    spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
+    assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}
+
+
+class Named(NamedTuple):
+    """A number and which text goes with it."""
+
+    number: float
+    text: int
+
+
+def test_a_page_falls_into_parts_of_the_same_texts_each_in_order():
+    texts = ["climb", "on the way", "climb again"]
+    setup = SimpleNamespace(interval_ns=4_000_000)
+    wire = Wire(
+        SETPOINT, "it", 1,
+        lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
+        lambda text: Setpoint(header(0, "world"), phase=texts[text]),
+        lambda x: [x.text],
+    )  # fmt: skip
+    rows = np.array([(0.5, 1), (1.5, 0), (2.5, 1), (3.5, 2), (4.5, 0)])
+    pages = list(encode(wire, Port("it", Named(0.0, 0)), setup, np.arange(7, 12), rows))
+    found = [
+        (int(tick), Setpoint.decode(payload.tobytes()))
+        for page in pages
+        for tick, payload in zip(page.ticks, page.payloads, strict=True)
+    ]
+    assert [(tick, m.phase, m.yaw) for tick, m in found] == [
+        (8, "climb", 1.5), (11, "climb", 4.5), (7, "on the way", 0.5), (9, "on the way", 2.5), (10, "climb again", 3.5)
+    ]  # fmt: skip
+    assert all(m.header == header(4_000_000 * tick, "world") for tick, m in found)
+
+
+@pytest.mark.parametrize(
+    ("first", "stop", "period", "ticks"),
+    [
+        (0, 4, 1, [0, 1, 2, 3]),
+        (1, 11, 5, [5, 10]),
+        (5, 11, 5, [5, 10]),
+        (6, 10, 5, []),
+        (-3, 2, 1, [0, 1]),
+        (3, 3, 1, []),
+    ],
+)
+def test_ticks_at_which_a_message_is_due(first, stop, period, ticks):
+    assert due_ticks(first, stop, period).tolist() == ticks

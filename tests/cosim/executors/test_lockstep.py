@@ -1,0 +1,30 @@
+"""How the scheduler is asked to treat the processes of a lock step."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from lapwing.cosim.executors.lockstep import batch
+
+TOLD = """
+import os, threading
+from lapwing.cosim.executors.lockstep import batch
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+batch()
+print(*{os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")})
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
+def test_all_threads_of_an_ordinary_process_are_batch_work():
+    told = subprocess.run([sys.executable, "-c", TOLD], capture_output=True, text=True, check=True).stdout
+    assert told.split() == [str(os.SCHED_BATCH)]
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
+def test_what_somebody_has_set_is_left(monkeypatch):
+    monkeypatch.setattr(os, "sched_getscheduler", lambda process: os.SCHED_IDLE)
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: pytest.fail("it was changed"))
+    batch()

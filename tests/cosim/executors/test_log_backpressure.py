@@ -1,0 +1,105 @@
+"""A run is held while it is too far ahead of its log, and says what it waits for."""
+
+import struct
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.executors import log_backpressure
+from lapwing.cosim.executors.log_backpressure import AHEAD, LEAST, LOOK, Backlog, Teller, waits_for_disk
+from lapwing.cosim.log import LogWriter
+from lapwing.cosim.log.log_sequencer import SHORTEST
+from lapwing.cosim.transport.packet_exchange import PAGE
+from lapwing.messages import Clock, stamp
+
+
+class Bus:
+    """A bus to oneself."""
+
+    def __init__(self):
+        self.said = []
+
+    def publisher(self, key):
+        return lambda payload, time_ns: self.said.append(payload)
+
+    def receive(self, senders):
+        return self
+
+    def get(self, timeout):
+        return (0, self.said.pop(0)) if self.said else None
+
+
+class Process:
+    """A participant that is told that 3000 ticks more are recorded whenever it has to wait."""
+
+    participants = Participants("test")
+
+    def __init__(self, vehicles=1):
+        self.bus, self.waits = Bus(), []
+        self.setup = SimpleNamespace(vehicles=["drone"] * vehicles)
+
+    def patient(self, get, waiting_for):
+        self.waits.append(waiting_for())
+        return 0, struct.pack("<q?", 3000 * len(self.waits), True)
+
+
+def test_a_run_is_held_until_its_log_has_come_nearer():
+    process = Process()
+    held, teller = Backlog(process, "recorder"), Teller(process.bus, "test", "recorder")
+    for tick in range(0, 10 * AHEAD, LOOK):  # nobody records
+        held.hold(tick)
+    assert process.waits == []
+    teller.recorded(0)
+    held.hold(AHEAD - LOOK)
+    assert process.waits == []
+    held.hold(AHEAD)
+    assert process.waits == ["the log, recorded up to tick 0"]
+    held.hold(AHEAD + 6144)
+    assert process.waits[1:] == ["the log, recorded up to tick 3000", "the log, recorded up to tick 6000"]
+
+
+@pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
+def test_the_more_vehicles_a_run_has_the_fewer_ticks_wait_for_its_log(vehicles, ahead):
+    process = Process(vehicles)
+    held, teller = Backlog(process, "recorder"), Teller(process.bus, "test", "recorder")
+    teller.recorded(0)
+    held.hold(ahead - LOOK)
+    assert process.waits == []
+    held.hold(ahead)
+    assert process.waits
+
+
+def test_who_waits_has_been_handed_all_that_the_log_needs_to_come_nearer():
+    assert LEAST >= PAGE + LOOK + SHORTEST  # a batch that is not yet handed over, and a chunk that is not yet full
+
+
+def test_progress_says_whether_the_disk_is_waited_for():
+    bus = Bus()
+    teller = Teller(bus, "test", "recorder")
+    teller.recorded(7)
+    teller.waiting()
+    assert [waits_for_disk(payload) for payload in bus.said] == [False, True]
+    assert log_backpressure._PROGRESS.unpack(bus.said[1])[0] == 7
+
+
+def test_a_writer_whose_disk_is_slow_says_so_and_keeps_one_chunk_at_most(tmp_path, monkeypatch):
+    monkeypatch.setattr("lapwing.cosim.log.log_writer.FLUSH_PERIOD", 0.01)
+    go_on, told = threading.Event(), threading.Event()
+    with LogWriter(tmp_path / "log", {}, {}, told.set) as writer:
+        write = writer._container.add_chunk
+        monkeypatch.setattr(writer._container, "add_chunk", lambda *given: (go_on.wait(), write(*given)))
+
+        def say(time_ns):
+            writer.write("/clock", Clock, Clock(stamp(time_ns)).encode(), time_ns)
+            writer._cut()
+
+        say(0)
+        waiting = threading.Thread(target=say, args=(1,))
+        waiting.start()
+        assert told.wait(30.0)
+        assert waiting.is_alive()  # the second chunk waits for the first
+        go_on.set()
+        waiting.join(30.0)
+        assert writer.waited > 0.0

@@ -1,0 +1,102 @@
+"""Processes that are started before it is known what they are given."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.processes.child_process import started_early
+from lapwing.cosim.processes.forked_process import Forked
+
+
+def test_one_that_nobody_needs_ends_with_the_context_and_one_that_is_taken_goes_on():
+    with started_early(["mavlink", "recorder"]) as early:
+        taken, left = early.pop("mavlink"), early["recorder"]
+        assert taken.process.poll() is None
+    assert left.process.poll() is not None
+    assert left.said.closed
+    try:
+        assert taken.process.poll() is None
+        taken.process.stdin.close()
+        assert taken.process.wait(60.0) == 1  # nobody will tell it what to do
+        taken.said.seek(0)
+        assert taken.said.read() == b""
+    finally:
+        taken.process.kill()
+        taken.process.wait()
+        taken.said.close()
+
+
+def code_of(run):
+    with tempfile.TemporaryFile() as said:
+        child = Forked(run, said)
+        code = child.wait(60.0)
+        child.stdin.close()
+        said.seek(0)
+        return code, said.read().decode()
+
+
+def test_a_fork_ends_as_a_program_of_its_own_would():
+    def leave(value):
+        raise SystemExit(value)
+
+    def fail():
+        raise KeyError("rotor")
+
+    def say():
+        print("own session" if os.getsid(0) == os.getpid() else "session of its parent", flush=True)
+        os.write(2, os.read(0, 1) + b"end of input")
+
+    assert code_of(lambda: None) == (0, "")
+    assert code_of(lambda: leave(2)) == (2, "")
+    assert code_of(lambda: leave(None)) == (0, "")
+    code, said = code_of(fail)
+    assert code == 1
+    assert "KeyError" in said
+    with tempfile.TemporaryFile() as said:
+        child = Forked(say, said)
+        assert child.poll() is None
+        child.stdin.close()
+        assert child.wait(60.0) == child.poll() == child.returncode == 0
+        said.seek(0)
+        assert said.read() == b"own session\nend of input"
+
+
+@pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("terminate", signal.SIGTERM)])
+def test_a_fork_is_ended_by_a_signal_and_then_let_alone(end, number):
+    with tempfile.TemporaryFile() as said:
+        child = Forked(lambda: time.sleep(60.0), said)
+        child.stdin.close()
+        with pytest.raises(subprocess.TimeoutExpired):
+            child.wait(0.05)
+        getattr(child, end)()
+        assert child.wait() == -number
+        child.kill()
+
+
+def test_a_fork_has_no_other_files_open():
+    """Its launcher's end of the standard input of another one would keep that one waiting when the launcher is gone."""
+    with tempfile.TemporaryFile() as first_said, tempfile.TemporaryFile() as second_said:
+        first = Forked(lambda: os.read(0, 1), first_said)
+        second = Forked(lambda: time.sleep(60.0), second_said)
+        first.stdin.close()
+        assert first.wait(60.0) == 0
+        second.kill()
+        second.wait()
+        second.stdin.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"), [(["nowhere.toml"], "nowhere.toml"), (["lapwing/scenes/hover.toml", "--mavlink", "x"], "x")]
+)
+def test_an_error_of_the_user_is_one_line_also_where_a_link_has_been_started(arguments, word):
+    command = [sys.executable, "-m", "lapwing", "run", *arguments, "--mavlink", "udpout:127.0.0.1:14550"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], timeout=120)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert word in done.stderr

@@ -1,0 +1,122 @@
+"""A process that gets no processor is told from one that is stopped, sleeps, or runs without end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, waited
+from lapwing.cosim.processes.run_monitor import LONGEST, Watch
+
+pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/schedstat"), reason="the system does not tell")
+
+SPIN = """
+import os, sys
+os.sched_setaffinity(0, {int(sys.argv[1])})
+os.nice(int(sys.argv[2]))
+print(flush=True)
+while True: pass
+"""
+SLEEP = "import time\nprint(flush=True)\ntime.sleep(60)"
+
+
+@pytest.fixture
+def start():
+    """Starts Python programs, and ends them all."""
+    children = []
+
+    def begin(program, *arguments):
+        command = [sys.executable, "-c", program, *map(str, arguments)]
+        children.append(subprocess.Popen(command, stdout=subprocess.PIPE))
+        children[-1].stdout.readline()
+        return children[-1].pid
+
+    yield begin
+    for child in children:
+        child.kill()
+        child.communicate()
+
+
+def measured(pid, seconds=1.5):
+    before = waited(pid)
+    time.sleep(seconds)
+    return waited(pid) - before
+
+
+@pytest.mark.long
+def test_a_starved_process_waits_and_one_that_is_stopped_or_sleeps_does_not(start):
+    core = min(os.sched_getaffinity(0))
+    for _ in range(2):
+        start(SPIN, core, 0)
+    assert measured(start(SPIN, core, 10)) > 0.7
+    assert measured(start(SLEEP)) < 0.1
+    stopped = start(SPIN, core, 10)
+    os.kill(stopped, signal.SIGSTOP)
+    os.waitpid(stopped, os.WUNTRACED)  # it stops once it is given the processor
+    assert measured(stopped) < 0.1
+
+
+def test_who_has_ended_has_waited_for_nothing():
+    child = subprocess.Popen([sys.executable, "-c", ""])
+    child.wait()
+    assert waited(child.pid) == 0.0
+
+
+def test_it_counts_from_when_there_was_no_news(monkeypatch):
+    times = {1: 5.0, 2: 7.0}
+    monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.waited", times.__getitem__)
+    starvation, pids = Starvation(), {"plant": 1, "sensors": 2}
+    starvation.look(pids, 0.0)
+    assert starvation.of(pids) == 0.0
+    starvation.look(pids, QUIET)
+    times[1], times[2] = 6.0, 7.5
+    starvation.look(pids, 2 * QUIET)
+    assert starvation.of(pids) == 1.5
+    assert starvation.of(["plant", "somewhere else"]) == 1.0
+    times[2] = 0.0  # a process of the same name that was started in its place
+    assert starvation.of(["sensors"]) == 0.0
+    starvation.look(pids, 0.1)
+    starvation.look(pids, QUIET)
+    assert starvation.of(pids) == 0.0
+
+
+@pytest.fixture
+def watch():
+    """A watch of two services that has heard nothing yet."""
+    bus = SimpleNamespace(receive=lambda senders: None, watch_alive=lambda key, seen: None)
+    return Watch(bus, Participants("test"), ["plant", "sensors"])
+
+
+def silent_for(watch, seconds):
+    watch.last_news = time.monotonic() - seconds
+
+
+def test_a_starved_service_is_not_held_to_be_frozen_and_others_are_as_soon_as_ever(watch):
+    names = ["plant", "sensors"]
+    silent_for(watch, 2.4)
+    assert watch.frozen(names) is None
+    silent_for(watch, 2.6)
+    assert watch.frozen(names) == "plant, sensors: no answer for 2.5 s, at t = 0.000 s"
+    assert watch.frozen(names, lambda who: 0.0)
+    assert watch.frozen(names, lambda who: 0.2) is None
+    silent_for(watch, 20.0)
+    assert watch.frozen(names, lambda who: 17.6) is None
+    assert watch.frozen(names, lambda who: 17.0)
+
+
+def test_who_waits_for_a_frozen_one_does_not_excuse_it(watch):
+    silent_for(watch, 2.6)
+    watch.waiting["sensors"] = "the truth"
+    starved = {"plant": 0.0, "sensors": 2.0}
+    found = watch.frozen(starved, lambda who: sum(starved[name] for name in who))
+    assert found == "plant: no answer for 2.5 s, at t = 0.000 s"
+
+
+def test_nobody_is_excused_for_ever(watch):
+    silent_for(watch, LONGEST + 0.1)
+    assert watch.frozen(["plant"], lambda who: LONGEST)

@@ -1,0 +1,45 @@
+"""What waits on the bus takes the memory of its bytes, not of the buffers in which they came."""
+
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.transport.bus import ZenohBus
+from tests.endpoints import loopback_endpoints
+
+MESSAGES = 2000
+KEY, MARK = "test-bus/_batch/plant", bytes(16)
+
+
+def anonymous():
+    """Memory [bytes] of this process that is of no file."""
+    return 1024 * int(re.search(r"^Anonymous:\s+(\d+)", Path("/proc/self/smaps_rollup").read_text(), re.MULTILINE)[1])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is told by Linux's /proc")
+def test_messages_that_wait_take_little_memory():
+    (endpoint,) = loopback_endpoints(["a"]).values()
+    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], mark=MARK) as here:
+        arrived, put = there.receive({KEY: MARK}), here.publisher(KEY)
+        while arrived.get(timeout=0.1) is None:  # until the subscription has come
+            put(b"first", 0)
+
+        def wait_for(number):
+            """So many messages, each on its own, as they come from a run that flies."""
+            for _ in range(number):
+                put(bytes(300), 0)
+                time.sleep(0.0005)
+            time.sleep(1.0)
+
+        wait_for(200)
+        while arrived.get(timeout=0.0):
+            pass
+        before = anonymous()
+        wait_for(MESSAGES)
+        grown = anonymous() - before
+        taken = sum(1 for _ in iter(lambda: arrived.get(timeout=0.0), None))
+    assert taken == MESSAGES
+    assert grown < 2048 * MESSAGES

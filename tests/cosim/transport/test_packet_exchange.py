@@ -1,0 +1,117 @@
+"""What a service gives arrives where it is taken, whatever the periods of its ports and the delays."""
+
+from collections import defaultdict, deque
+from types import SimpleNamespace
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.config.run_config import ServiceSetup, Setup
+from lapwing.cosim.diagram.block_diagram import Graph, Service
+from lapwing.cosim.diagram.tick_schedule import Input, Port, due
+from lapwing.cosim.transport.packet_exchange import Outlets, sources
+from lapwing.kernels import uncompiled
+
+LAST = 120  # [tick]
+PERIODS = (1, 2, 5, 25, 4)
+NAMES = tuple(f"port{i}" for i in range(len(PERIODS)))
+
+due = uncompiled(due)
+
+
+class Bus:
+    """Messages by key, in order."""
+
+    refused = 0
+
+    def __init__(self):
+        self.messages = defaultdict(deque)
+
+    def publisher(self, key, drops=False):
+        return lambda payload, time_ns: self.messages[key].append((time_ns, payload))
+
+    def inbox(self, key, sender):
+        return SimpleNamespace(get=lambda timeout: self.messages[key].popleft())
+
+    def has_audience(self, keys):
+        return False
+
+
+class Counts:
+    """Gives, at each port that is due, the tick."""
+
+    name, inputs = "counts", ()
+
+    def __init__(self, outputs):
+        self.outputs = outputs
+
+    def bind(self, graph):
+        self.graph = graph
+
+    def act(self, tick):
+        for port in self.outputs:
+            if due(tick, port.period, 0) >= 0:
+                self.graph.put(port.name, tick, float(tick))
+        return tick + 1
+
+
+class Takes(Counts):
+    """Notes what it takes."""
+
+    name, outputs = "takes", ()
+
+    def __init__(self, inputs):
+        self.inputs, self.noted = inputs, []
+
+    def act(self, tick):
+        for i in self.inputs:
+            stamp = due(tick, PERIODS[NAMES.index(i.port)], i.delay)
+            if stamp >= 0:
+                self.noted.append((i.port, stamp, self.graph.latest(i.port, stamp)))
+        return tick + 1
+
+
+def exchanged(inputs):
+    """What the consumer of these inputs notes, and how many bundles came by key."""
+    ports = tuple(Port(name, 0.0, period) for name, period in zip(NAMES, PERIODS, strict=True))
+    services = {"giver": ServiceSetup(None, (), ports), "taker": ServiceSetup(None, inputs, ())}
+    setup = Setup("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    bus = Bus()
+
+    def process(name):
+        return SimpleNamespace(
+            setup=setup, name=name, bus=bus, participants=Participants("test"), key_prefix="test", journal=None,
+            tell_of_refused=lambda: None, key=str, restarts=False, bundles_ahead=True, abandoned="",
+        )  # fmt: skip
+
+    giver, taker = Service("giver", [Counts(ports)], []), Service("taker", [Takes(inputs)], [])
+    given_rows, taken_rows = Graph(setup, [giver], 2048), Graph(setup, [taker], 2048)
+    outlets, (source,) = Outlets(process("giver"), giver, given_rows), sources(process("taker"), taken_rows)
+    for tick in range(LAST + 1):
+        given_rows.advance(tick + 1)
+        outlets.publish(tick, tick + 1)
+    counts = {key: len(found) for key, found in bus.messages.items() if "_step" in key}
+    outlets.end(LAST + 1)
+    tick = 0
+    while tick <= LAST:
+        known = source.take(tick)
+        assert known > tick
+        taken_rows.advance(min(known, LAST + 1))
+        tick = known
+    return taker.parts[0].noted, counts
+
+
+@given(st.dictionaries(st.sampled_from(NAMES), st.integers(0, 30), min_size=1))
+@example({"port3": 0})
+@example({"port2": 7, "port3": 0})
+def test_each_row_arrives_when_it_is_due(delays):
+    noted, _ = exchanged(tuple(Input(port, delay) for port, delay in delays.items()))
+    assert noted
+    assert all(value == stamp for _, stamp, value in noted)
+
+
+def test_who_takes_seldom_is_given_seldom():
+    assert exchanged((Input("port3"),))[1] == {"test/_step_every_25/giver": 5}
+    assert exchanged((Input("port3"), Input("port2")))[1] == {"test/_step_every_5/giver": 25}
+    assert exchanged((Input("port3"), Input("port4")))[1] == {"test/_step/giver": LAST + 1}

@@ -1,0 +1,32 @@
+"""The layout that programs of one's own read is that of the bundles."""
+
+from lapwing.cosim.config.serialise import to_json
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.transport.packet_layout import columns, layout
+from lapwing.cosim.transport.packets import Bundles
+from lapwing.kernels.row_packing import to_row
+from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.common.ports import MotorCommand
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+
+
+def test_columns_are_named_in_the_order_of_a_row():
+    like = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
+    named = dict(zip(columns(like), to_row(like), strict=True))
+    assert named["motor_voltage.2"] == 3.0
+    assert named["armed"] == 1.0
+    assert named["attitude_reference.0"] == 9.0
+    assert columns(EXACT)[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
+
+
+def test_a_bundle_is_as_long_as_the_layout_says():
+    setup = resolve(load("hover"))
+    told = layout(setup)
+    assert told["setup"] == to_json(setup)
+    graph = Graph(setup, create_all(setup), 64)
+    graph.advance(26)
+    for name, service in told["services"].items():
+        for tick in (24, 25):
+            expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
+            assert len(Bundles(setup.services[name].ports).pack(graph, tick)) == expected

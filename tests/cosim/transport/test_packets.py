@@ -1,0 +1,163 @@
+"""Bundles of rows and batches of messages: out and in again; what is no bundle or batch is refused."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.transport.packets import BundleError, Bundles, pack_batch, unpack_batch
+from lapwing.messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
+from tests.cosim.small_graph import graph_of
+
+
+class Pair(NamedTuple):
+    """A port of two numbers."""
+
+    left: float
+    right: float
+
+
+class Single(NamedTuple):
+    """A port of a number and a truth value."""
+
+    number: float
+    good: bool
+
+
+PORTS = (Port("pair", Pair(0.0, 0.0)), Port("slow", Single(0.0, False), 5), Port("slower", Pair(0.0, 0.0), 10))
+
+
+class User:
+    """Stands for a service that uses some of the ports."""
+
+    name = "user"
+    outputs = ()
+
+    def __init__(self, *names):
+        self.inputs = tuple(Input(name) for name in names)
+
+    def bind(self, graph):
+        """Nothing to be prepared."""
+
+
+def graph(*names):
+    return graph_of(User(*names), ports=PORTS, page=16)
+
+
+def filled(tick):
+    """A graph in which the ports that are due at `tick` have a value of that tick."""
+    found = graph("pair", "slow", "slower")
+    for port in PORTS:
+        if tick % port.period == 0:
+            found.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+    return found
+
+
+@pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
+def test_a_bundle_holds_the_rows_that_are_due_one_after_the_other(tick, numbers):
+    bundles, giver, taker = Bundles(PORTS), filled(tick), graph("slower", "pair", "slow")
+    payload = bundles.pack(giver, tick)
+    expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
+    assert np.frombuffer(payload, "<f8").tolist() == expected
+    bundles.unpack(payload, taker, tick)
+    for port in PORTS:
+        if tick % port.period == 0:
+            assert taker.latest(port.name, tick) == giver.latest(port.name, tick)
+
+
+def test_who_uses_some_of_the_ports_gets_those():
+    taker = graph("slow")
+    Bundles(PORTS).unpack(Bundles(PORTS).pack(filled(10), 10), taker, 10)
+    assert taker.latest("slow", 10) == Single(10.5, True)
+    assert not taker.has("pair")
+
+
+def test_a_service_has_no_bundle_where_none_of_its_ports_is_due():
+    assert [tick for tick in range(12) if Bundles(PORTS[1:]).due(tick)] == [0, 5, 10]
+    assert all(Bundles(PORTS).due(tick) for tick in range(12))
+    assert not Bundles(()).due(0)
+
+
+def run_of(ticks):
+    """A graph whose ports have values at each of the ticks [0, ticks) at which they are due."""
+    found = graph("pair", "slow", "slower")
+    for port in PORTS:
+        for tick in range(0, ticks, port.period):
+            found.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+    return found
+
+
+@pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
+def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
+    giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
+    for ports in (PORTS, PORTS[1:]):
+        single, several = Bundles(ports), Bundles(ports, ticks)
+        for first in range(0, 15 - ticks, ticks):
+            each = [tick for tick in range(first, first + ticks) if single.due(tick)]
+            assert several.due(first) == bool(each)
+            for tick in each:
+                single.unpack(single.pack(giver, tick), one_by_one, tick)
+            if each:
+                payload = several.pack(giver, first)
+                assert len(payload) == sum(len(single.pack(giver, tick)) for tick in each)
+                several.unpack(payload, at_once, first)
+        for port in ports[:-1]:
+            for tick in range(0, first + ticks, port.period):
+                assert at_once.row(port.name, tick).tolist() == one_by_one.row(port.name, tick).tolist()
+
+
+@pytest.mark.parametrize("size", [0, 64, 72, 81])
+def test_a_bundle_of_several_ticks_of_the_wrong_size_is_refused(size):
+    with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
+        Bundles(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
+
+
+@pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
+def test_a_bundle_of_the_wrong_size_is_refused(size):
+    with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):
+        Bundles(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
+
+
+def page(topic, first, n, size, seed=0):
+    random = np.random.default_rng(seed)
+    return Page(topic, np.arange(first, first + n), random.integers(0, 256, (n, size)).astype(np.uint8))
+
+
+def records(n):
+    """A page whose payloads are records, as `Wire` makes them."""
+    dtype = np.dtype({"names": ["x", "all"], "formats": ["<f8", "V12"], "offsets": [4, 0], "itemsize": 12})
+    found = np.zeros(n, dtype)
+    found["x"] = np.arange(n)
+    return Page(STATUS, np.arange(0, 5 * n, 5), found)
+
+
+def test_a_batch_comes_out_as_it_went_in():
+    pages = [page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3), records(4), page(COMMAND_ACKS, 10, 2, 0)]
+    start, stop, found = unpack_batch(pack_batch(pages, 20, 27))
+    assert (start, stop) == (20, 27)
+    for before, after in zip(pages, found, strict=True):
+        assert after.topic is before.topic
+        assert after.ticks.tolist() == before.ticks.tolist()
+        assert [p.tobytes() for p in after.payloads] == [p.tobytes() for p in before.payloads]
+
+
+def test_a_batch_without_messages_says_how_far_it_goes():
+    assert unpack_batch(pack_batch([], 3, 5)) == (3, 5, [])
+
+
+WHOLE = pack_batch([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 27)
+
+
+@given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (16, 16 + 10 + 20 * (8 + 256))))
+def test_a_batch_cut_short_is_refused(size):
+    with pytest.raises(BundleError, match=rf"^a batch of {size} bytes: "):
+        unpack_batch(WHOLE[:size])
+
+
+def test_a_batch_of_an_unknown_topic_is_refused():
+    with pytest.raises(BundleError, match=r"^a batch of "):
+        unpack_batch(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])

@@ -1,0 +1,91 @@
+"""What one sender publishes on one key: in order, of that sender alone, and waited for no longer than asked."""
+
+import time
+from itertools import count
+
+import pytest
+
+from lapwing.cosim.transport.bus import INBOX, ZenohBus
+from lapwing.cosim.transport.ring_subscription import Inbox
+from lapwing.messages.attachment import pack
+from tests.endpoints import loopback_endpoints
+
+KEY, MARK, OTHER, WAKER = "test-inbox/_step/plant", bytes(16), b"o" * 16, b"w" * 16
+
+
+@pytest.fixture
+def joined():
+    """A bus with an inbox, another that publishes, and the inbox."""
+    (endpoint,) = loopback_endpoints(["a"]).values()
+    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], mark=MARK) as here:
+        inbox = there.inbox(KEY, MARK)
+        put = here.publisher(KEY)
+        while inbox.get(0.1) is None:  # until the subscription has come
+            put(b"first", 0)
+        while inbox.get(0.2):
+            pass
+        yield there, here, inbox
+
+
+def test_messages_come_in_order(joined):
+    _, here, inbox = joined
+    for i in range(200):
+        here.publisher(KEY)(b"%d" % i, i)
+    assert [inbox.get(5.0) for _ in range(200)] == [(i, b"%d" % i) for i in range(200)]
+
+
+def test_without_a_message_it_waits_as_long_as_asked(joined):
+    _, here, inbox = joined
+    for timeout in (0.0, 0.1, 0.3):
+        begun = time.monotonic()
+        assert inbox.get(timeout) is None
+        assert time.monotonic() - begun >= timeout
+    here.publisher(KEY)(b"late", 7)
+    assert inbox.get(5.0) == (7, b"late")
+
+
+def test_others_are_refused_and_counted(joined):
+    there, here, inbox = joined
+    before = there.refused
+    zenoh = here._session
+    zenoh.put(KEY, b"")
+    zenoh.put(KEY, b"hello", attachment=b"short")
+    zenoh.put(KEY, b"forged", attachment=pack(1, 1, OTHER))
+    zenoh.delete(KEY)
+    here.publisher(KEY)(b"sound", 2)
+    assert inbox.get(5.0) == (2, b"sound")
+    assert there.refused - before >= 4
+
+
+def test_one_that_is_full_loses_the_oldest_and_holds_nobody_up(joined):
+    _, here, inbox = joined
+    put = here.publisher(KEY)
+    for i in range(INBOX + 500):
+        put(bytes(8), i)
+    put(b"last", 0)
+    time.sleep(1.0)  # all have come
+    arrived = []
+    while found := inbox.get(0.2):
+        arrived.append(found)
+    assert len(arrived) == INBOX
+    assert arrived[0] == (501, bytes(8))
+    assert arrived[-1] == (0, b"last")
+
+
+def inbox_of(messages, sender=MARK):
+    """One whose bus has these messages, and wakes it for ever after."""
+    refused = count()
+    samples = iter(messages)
+    return Inbox(lambda: next(samples, (0, WAKER, b"")), lambda m: m, sender, WAKER, lambda: next(refused)), refused
+
+
+def test_a_waker_that_comes_too_late_is_passed_over():
+    inbox, _ = inbox_of([(0, WAKER, b""), (0, WAKER, b""), (3, MARK, b"it")])
+    assert inbox.get(5.0) == (3, b"it")
+    assert inbox.until == float("inf")
+
+
+def test_the_first_comer_is_the_sender_where_nobody_is_known():
+    inbox, refused = inbox_of([(1, OTHER, b"one"), (2, MARK, b"two"), None, (3, OTHER, b"three")], sender=None)
+    assert [inbox.get(1.0), inbox.get(1.0), inbox.get(0.0)] == [(1, b"one"), (3, b"three"), None]
+    assert next(refused) == 2

@@ -1,0 +1,21 @@
+"""Connections to hosts that confirm nothing any more are ended by the system."""
+
+import os
+import socket
+
+from lapwing.cosim.transport.tcp_timeout import limit_silence
+
+
+def test_open_connections_are_limited_and_nothing_else_is_touched(tmp_path):
+    file = (tmp_path / "a").open("w")
+    with socket.create_server(("127.0.0.1", 0)) as door, socket.create_connection(door.getsockname()) as client:
+        server, _ = door.accept()
+        before = sorted(os.listdir("/proc/self/fd"))
+        limit_silence(1234)
+        assert sorted(os.listdir("/proc/self/fd")) == before
+        for end in (client, server):
+            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1234
+        client.sendall(b"x")
+        assert server.recv(1) == b"x"
+        server.close()
+    file.close()

@@ -1,0 +1,109 @@
+"""What may not be there any more after a trial: processes, their ports, locks of the kernel cache."""
+
+import fcntl
+import os
+import subprocess
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from lapwing.kernels import cache_folder
+
+LOCKS = "compiling"  # folder of the cache (lapwing.kernels.compiler.file_locks)
+TABLES = ("tcp", "tcp6", "udp", "udp6", "unix")
+
+
+def of_trial(folder: Path) -> dict[int, str]:
+    """What the processes of a trial are, by number: those with its folder in their environment or command line."""
+    found, mark = {}, os.fsencode(folder)
+    for place in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            given = (place / "cmdline").read_bytes() + (place / "environ").read_bytes()
+            ended = (place / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
+            if mark in given and not ended:
+                found[int(place.name)] = (place / "comm").read_text().strip()
+    return found
+
+
+def ports(processes: Iterable[int]) -> dict[str, str]:
+    """The sockets at which processes listen or may be spoken to: what they are, by inode."""
+    inodes = set()
+    for process in processes:
+        with suppress(OSError):
+            for file in Path(f"/proc/{process}/fd").iterdir():
+                with suppress(OSError):
+                    inodes.add(os.readlink(file).removeprefix("socket:[").removesuffix("]"))
+    return {inode: name for inode, name in _bound().items() if inode in inodes}
+
+
+def _bound() -> dict[str, str]:
+    """Every socket of this machine with an address of its own that nobody is connected to, by inode."""
+    found = {}
+    for table in TABLES:
+        with suppress(OSError):
+            for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+                words = line.split()
+                if table == "unix":
+                    if len(words) > 7 and int(words[3], 16) & 0x10000:  # it listens
+                        found[words[6]] = f"{table} {words[7]}"
+                elif words[3] == ("0A" if table.startswith("tcp") else "07"):
+                    found[words[9]] = f"{table} port {int(words[1].rpartition(':')[2], 16)}"
+    return found
+
+
+def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
+    """What is wrong where a process has not ended after so many seconds; it has ended then."""
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        return [f"the {name} has not ended after {seconds:g} s"]
+    return []
+
+
+def left(folder: Path, taken: dict[str, str], cache: Path | None, seconds: float) -> list[str]:
+    """What is still there after so many seconds, which is nothing where all is well.
+
+    Args:
+        folder: of the trial.
+        taken: the ports of its processes, as they were.
+        cache: its kernel cache, None: that of everybody.
+        seconds: to wait.
+    """
+    deadline = time.monotonic() + seconds
+    while (found := _left(folder, taken, cache)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    return found
+
+
+def _left(folder: Path, taken: dict[str, str], cache: Path | None) -> list[str]:
+    there = _bound()
+    return [
+        *(f"process {number} ({name}) is left" for number, name in of_trial(folder).items()),
+        *(f"{name} stays taken" for inode, name in taken.items() if inode in there),
+        *(f"the lock {name} stays taken" for name in locked(cache or Path(cache_folder() or folder))),
+    ]
+
+
+def locked(cache: Path) -> list[str]:
+    """The locks of a kernel cache that are held, and by nobody else who is there: others may compile in it, too."""
+    found, holders = [], _holders()
+    for path in sorted((cache / LOCKS).glob("*")):
+        with suppress(OSError):
+            descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if not Path(f"/proc/{holders.get(os.fstat(descriptor).st_ino)}").exists():
+                    found.append(path.name)
+            finally:
+                os.close(descriptor)
+    return found
+
+
+def _holders() -> dict[int, str]:
+    """Who has taken each lock of a file, by the file's inode."""
+    lines = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
+    return {int(words[5].rpartition(":")[2]): words[4] for words in lines if words[1] == "FLOCK"}

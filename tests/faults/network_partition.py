@@ -1,0 +1,58 @@
+"""A run on several hosts one of which is cut off, for a while or for good."""
+
+import time
+from pathlib import Path
+
+from lapwing.cosim.access.certificates import make
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.processes.run_monitor import WATCHER
+from tests.hosts.network import Network
+from tests.hosts.run import Run
+
+HOSTS = ("plant", "sensors", "autopilot", "trajectory", "recorder", WATCHER)  # each on a host of its own
+KINDS = ("cut", "cut off")  # for a while, for good
+WHILE = 2.0  # [s] that a run gets over
+RECOVERED = 0.5  # [s] before the cut up to which a log must be whole
+
+
+def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, float, list[str]]:
+    """Cut a host off; exit code and words of the mission, the seconds until the last has ended, what was wrong.
+
+    Args:
+        victim: whose host it is.
+        kind: of `KINDS`.
+        delay: [s] into the flight.
+        folder: for keys and log.
+    """
+    ever = kind == "cut off"
+    make(folder / "keys", HOSTS, 1)
+    sets = ["run.duration=5", "success.require=[]"]
+    with Network(HOSTS) as network, Run(network, {name: name for name in HOSTS}, sets, folder / "keys", folder) as run:
+        if not run.flies():
+            return 1, "", 0.0, ["it did not begin"]
+        time.sleep(delay)
+        over = run.participants["recorder"].poll() is not None
+        network.cut_off = {victim}
+        struck = time.monotonic()
+        if not ever:
+            time.sleep(WHILE)
+            network.cut_off = set()
+        ends = run.ends()
+    seconds = time.monotonic() - struck
+    code, said = ends[WATCHER]
+    wrong = [f"{name}: a traceback: {words}" for name, (_, words) in ends.items() if "Traceback" in words]
+    wrong += [f"{name} was left: {words}" for name, (c, words) in ends.items() if c < 0]
+    if over or not ever:
+        wrong += [f"{name} ended with exit code {c}: {words}" for name, (c, words) in ends.items() if c]
+    elif code == 1:
+        named = said.partition(": ")[2].partition(": ")[0].split(", ")
+        if named != ([victim] if victim != WATCHER else sorted(set(HOSTS) - {WATCHER})):
+            wrong.append(f"names the wrong: {said}")
+    elif code:
+        wrong.append(f"exit code {code}: {said}")
+    if (stated := said.partition("at t = ")[2]) and victim != "recorder":  # the others fly on without it
+        with LogReader(run.log) as read:
+            last = max(time_ns for _, _, time_ns, _ in read.messages()) * 1e-9
+        if last < float(stated.split()[0].rstrip(":;,")) - RECOVERED:
+            wrong.append(f"the log ends at {last:.3f} s: {said}")
+    return code, said, seconds, wrong

@@ -1,0 +1,132 @@
+"""A flight thinned out: enough of it to say when another flight began to differ, in which field, and by how much."""
+
+import hashlib
+import json
+import math
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.messages import message_class
+from lapwing.messages.message_diff import first_difference as first_field
+from tests.cosim.memory_log import MemoryLog
+
+FINGERPRINTS, KEPT = 200, 12  # of a topic, about
+HASHES_FILE = "fingerprints.json.zlib"
+
+
+class TopicSample(NamedTuple):
+    """What is kept of a topic."""
+
+    every: int  # messages between two fingerprints
+    fingerprints: list[str]  # of the first `every` messages, of the first 2 `every`, ..., of all
+    instants: list[int]  # [ns] of the last message of each fingerprint
+    kept: list[tuple[int, str, bytes]]  # (time [ns], type, payload) of a few messages
+
+
+Sample = dict[str, TopicSample]  # by name in the log
+
+
+def take(log: MemoryLog) -> Sample:
+    """The sample of a flight."""
+    found = {}
+    for name, topic in log.topics.items():
+        messages = [(tick * log.setup.interval_ns, payload) for tick, payload in log.payloads(name)]
+        every = math.ceil(len(messages) / FINGERPRINTS)
+        fingerprints, instants = _fingerprints(messages, every)
+        places = sorted({0, 1, *range(0, len(messages), math.ceil(len(messages) / KEPT)), len(messages) - 1})
+        kept = [(messages[i][0], topic.message.type_name, messages[i][1]) for i in places if i < len(messages)]
+        found[topic.key(log.setup.vehicle)] = TopicSample(every, fingerprints, instants, kept)
+    return found
+
+
+def _fingerprints(messages: list[tuple[int, bytes]], every: int) -> tuple[list[str], list[int]]:
+    running, fingerprints, instants = hashlib.blake2b(digest_size=4), [], []
+    for i, (time_ns, payload) in enumerate(messages, 1):
+        running.update(time_ns.to_bytes(8, "little") + payload)
+        if i % every == 0 or i == len(messages):
+            fingerprints.append(running.copy().hexdigest())
+            instants.append(time_ns)
+    return fingerprints, instants
+
+
+def write(path: Path, sample: Sample) -> None:
+    """Keep a sample as a log of the messages kept; the fingerprints go along as an attachment."""
+    table = {name: [topic.every, topic.fingerprints, topic.instants] for name, topic in sample.items()}
+    with LogWriter(path, {}, {HASHES_FILE: zlib.compress(json.dumps(table).encode(), 9)}) as log:
+        messages = [(time_ns, name, kind, payload) for name, t in sample.items() for time_ns, kind, payload in t.kept]
+        for time_ns, name, kind, payload in sorted(messages, key=lambda message: message[0]):
+            log.write(name, kind, payload, time_ns)
+
+
+def read(path: Path) -> Sample:
+    """A sample that `write` has kept."""
+    with LogReader(path) as log:
+        table = json.loads(zlib.decompress(log.attachments[HASHES_FILE]))
+        found = {name: TopicSample(row[0], row[1], row[2], []) for name, row in table.items()}
+        for name, kind, time_ns, payload in log.messages():
+            found[name].kept.append((time_ns, kind, payload))
+    return found
+
+
+def first_difference(old: Sample, new: MemoryLog, whole: bool = True) -> list[str]:
+    """When a flight began to differ from a sample, and in what; a line each, none where nothing kept differs.
+
+    Args:
+        old: the sample.
+        new: the flight.
+        whole: whether it was flown to its end, or is only to be like the beginning.
+    """
+    names = {topic.key(new.setup.vehicle): name for name, topic in new.topics.items()}
+    lines = [f"{name}: this topic is new" for name in sorted(names.keys() - old.keys())]
+    lines += [f"{name}: this topic is gone" for name in sorted(old.keys() - names.keys())]
+    end_ns = math.inf if whole else max(new.payloads(name)[-1][0] for name in new.topics) * new.setup.interval_ns
+    began: list[tuple[int, int, str]] = []
+    fields: list[tuple[int, str]] = []
+    for name in sorted(old.keys() & names.keys()):
+        messages = [(tick * new.setup.interval_ns, payload) for tick, payload in new.payloads(names[name])]
+        began += _began(name, old[name], messages, end_ns)
+        fields += _fields(name, old[name], dict(messages), end_ns)
+    if began:
+        last_alike, at_or_before, name = min(began)
+        since = f"after t = {last_alike * 1e-9:g} s, " if last_alike >= 0 else ""
+        lines.append(f"{name}: differs first, {since}at or before t = {at_or_before * 1e-9:g} s")
+    if fields:
+        lines.append(min(fields)[1])
+    return lines
+
+
+def _began(
+    name: str, old: TopicSample, messages: list[tuple[int, bytes]], end_ns: float
+) -> Iterator[tuple[int, int, str]]:
+    """(last instant at which all was alike, one at which it is not, topic), up to `end_ns`."""
+    fingerprints, _ = _fingerprints(messages, old.every)
+    alike = -1
+    for i, (was, instant) in enumerate(zip(old.fingerprints, old.instants, strict=True)):
+        if instant > end_ns:
+            return
+        if i >= len(fingerprints) or was != fingerprints[i]:
+            yield alike, instant, name
+            return
+        alike = instant
+    if len(messages) > 0 and messages[-1][0] > alike:
+        yield alike, messages[-1][0], name
+
+
+def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -> Iterator[tuple[int, str]]:
+    """(instant, line) of the first message kept that differs, up to `end_ns`."""
+    for time_ns, kind, was in old.kept:
+        now = new.get(time_ns)
+        if now == was or time_ns > end_ns:
+            continue
+        where = f"{name} at t = {time_ns * 1e-9:g} s: "
+        if now is None:
+            yield time_ns, where + "there is no such message any more"
+            return
+        found = first_field(message_class(kind), was, now)
+        assert found
+        by = f", by {found.by:.3g}" if found.by is not None else ""
+        yield time_ns, where + f"{found.field or 'length'} was {found.one!r}, is {found.other!r}{by}"
+        return

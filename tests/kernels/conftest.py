@@ -1,0 +1,172 @@
+"""A small package of kernels on disk, run in processes of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+
+FILES = {
+    "plant/__init__.py": "pass\n",
+    "plant/constants.py": "GAIN = 2.0\n",
+    "plant/inner.py": """
+from lapwing.kernels import leaf
+from .constants import GAIN
+
+@leaf
+def inner(x):
+    return GAIN * x
+""",
+    "plant/outer.py": """
+from lapwing.kernels import kernel
+from plant import inner as below
+
+@kernel
+def outer(x):
+    return below.inner(x) + 1.0
+""",
+    "plant/table.py": """
+from numba.extending import overload
+from lapwing.kernels import ByClass, kernel
+
+FORCES = ByClass()
+
+def force(p):
+    raise NotImplementedError
+
+@overload(force)
+def _force(p):
+    found = FORCES[p.instance_class]
+    return lambda p: found(p)
+
+@kernel
+def total(p):
+    return force(p)
+""",
+    "plant/spring.py": """
+from typing import NamedTuple
+
+class Spring(NamedTuple):
+    stiffness: float
+""",
+    "plant/law.py": """
+from lapwing.kernels import leaf
+from plant.spring import Spring
+from plant.table import FORCES
+
+@leaf
+def law(p):
+    return 10.0 * p.stiffness
+
+FORCES[Spring] = law
+""",
+    "plant/factory.py": """
+from lapwing.kernels import kernel
+from plant.inner import inner
+
+def times(n):
+    @kernel
+    def product(x):
+        return n * inner(x)
+    return product
+""",
+    "plant/large.py": """
+from lapwing.kernels import apart, kernel
+
+@apart
+def large(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x * x
+
+@kernel
+def middle(x):
+    return large(x) + large(2.0 * x)
+""",
+    "plant/outermost.py": """
+from lapwing.kernels import kernel
+from plant.large import middle
+
+@kernel
+def outermost(x):
+    return middle(x) + 1.0
+""",
+    "plant/slow.py": """
+import os, time
+from lapwing.kernels.codegen import implements
+from lapwing.kernels import kernel
+
+def held(x):
+    raise NotImplementedError
+
+@implements(held)
+def _held(x):
+    if "BEGUN" in os.environ:
+        open(os.environ["BEGUN"], "w").close()
+        time.sleep(60.0)
+    return lambda x: x + 1.0
+
+@kernel
+def slow(x):
+    return held(x)
+""",
+    "run.py": """
+import json, sys
+from lapwing.kernels import on_compile, statistics
+compiling = []
+on_compile(compiling.append)
+values = {}
+exec(sys.argv[1])
+print(json.dumps({"values": values, "compiling": compiling, **statistics()._asdict()}))
+""",
+}
+
+
+class Package:
+    """The package, and the cache folder of what runs it."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.cache = folder, folder / "cache"
+        for name, text in FILES.items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text)
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        """Replace a text in a file of the package."""
+        text = (self.folder / name).read_text()
+        assert old in text
+        (self.folder / name).write_text(text.replace(old, new))
+
+    def start(self, statements: str, **environment: str) -> subprocess.Popen:
+        """A process that runs statements, which put results into `values`."""
+        settings = {
+            **{key: value for key, value in os.environ.items() if not key.startswith("NUMBA")},
+            "LAPWING_CACHE": str(self.cache),
+            "PYTHONPATH": f"{self.folder}{os.pathsep}{ROOT}",
+            "PYTHONDONTWRITEBYTECODE": "1",  # its own staleness is to the second
+            **environment,
+        }
+        command = [sys.executable, str(self.folder / "run.py"), statements]
+        pipe = subprocess.PIPE
+        return subprocess.Popen(command, env=settings, cwd=self.folder, stdout=pipe, stderr=pipe, text=True)
+
+    def run(self, statements: str, **environment: str) -> dict[str, Any]:
+        """What such a process says at its end: values, names that it compiled, how many it compiled and loaded."""
+        return self.end(self.start(statements, **environment))
+
+    def end(self, process: subprocess.Popen) -> dict[str, Any]:
+        """The same of one that was started."""
+        out, errors = process.communicate()
+        assert (process.returncode, errors) == (0, "")
+        return json.loads(out)
+
+
+@pytest.fixture
+def package(tmp_path) -> Package:
+    """Fresh, with nothing kept."""
+    return Package(tmp_path)

@@ -1,0 +1,69 @@
+"""Functions made from text: the same in Python as compiled, one for each combination of argument types."""
+
+from numba.core import types
+
+from lapwing.kernels import kernel, leaf
+from lapwing.kernels.codegen import any_of, define, each, each_index, fold, generated
+
+
+@leaf
+def weighted(k, x, y):
+    return k * x + y
+
+
+@leaf
+def taken(x, y, i):
+    return x[i] - y[i]
+
+
+def _first(x):
+    return define("first(x)", {}, "return x[0]" if isinstance(x, types.BaseTuple) else "return x")
+
+
+first = generated("first(x)", _first, "The first number.")
+
+
+@kernel
+def all_of(x, y):
+    return each(weighted, 2.0, x, y), each_index(taken, x, x, y), first(x), first(x[1])
+
+
+def test_defines_a_function_of_several_lines():
+    assert define("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
+
+
+def test_compiled_and_uncompiled_are_the_same():
+    x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
+    assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
+    assert (first.__name__, first.__doc__) == ("first", "The first number.")
+
+
+@kernel
+def any_above(x, y):
+    return any_of(each(above, 0.0, x, y))
+
+
+@leaf
+def above(_, x, y):
+    return x > y
+
+
+def test_any_of_a_tuple():
+    for y, found in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
+        assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == found
+    assert not any_of(())
+
+
+@leaf
+def appended(common, value, x, y):
+    return common * value + x * y
+
+
+@kernel
+def folded(x, y):
+    return fold(appended, 10.0, 1.0, x, y)
+
+
+def test_folds_in_order():
+    x, y = (1.0, 2.0, 3.0), (1.0, 1.0, 2.0)
+    assert folded(x, y) == folded.py_func(x, y) == 1126.0

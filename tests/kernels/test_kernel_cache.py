@@ -1,0 +1,249 @@
+"""What is kept of compiled kernels: found again, never stale, never trusted when damaged, nobody else's business."""
+
+import os
+import shutil
+import signal
+import stat
+import subprocess
+import time
+
+import pytest
+
+pytestmark = pytest.mark.long
+
+OUTER = "from plant.outer import outer; values['outer'] = outer(3.0)"
+TOTAL = "import plant.law; from plant.table import total; values['total'] = total(plant.law.Spring(3.0))"
+PRODUCT = "from plant.factory import times; values['product'] = [times(2.0)(1.0), times(5.0)(1.0)]"
+ALL = f"{OUTER}\n{TOTAL}\n{PRODUCT}"
+VALUES = {"outer": 7.0, "total": 30.0, "product": [4.0, 10.0]}
+
+
+def files(package):
+    """All that is kept."""
+    return sorted(path for path in package.cache.rglob("*") if path.is_file())
+
+
+def test_a_second_process_compiles_nothing(package):
+    first, second = package.run(ALL), package.run(ALL)
+    assert first["values"] == second["values"] == VALUES
+    assert first["compiled"] == len(first["compiling"]) > 0
+    assert "plant.outer.outer" in first["compiling"]
+    assert (second["compiled"], second["compiling"]) == (0, [])
+    assert second["loaded"] > 0
+
+
+@pytest.mark.parametrize(
+    ("statements", "file", "old", "new", "after"),
+    [
+        (OUTER, "plant/outer.py", "1.0", "4.0", {"outer": 10.0}),
+        (OUTER, "plant/inner.py", "GAIN * x", "GAIN - x", {"outer": 0.0}),
+        (OUTER, "plant/constants.py", "2.0", "5.0", {"outer": 16.0}),
+        (OUTER, "plant/__init__.py", "pass", "from plant import constants\nconstants.GAIN = 7.0", {"outer": 22.0}),
+        (TOTAL, "plant/law.py", "10.0", "20.0", {"total": 60.0}),
+        (TOTAL, "plant/spring.py", "stiffness: float", "stiffness: float = 0.0", {"total": 30.0}),
+        (PRODUCT, "plant/inner.py", "GAIN * x", "GAIN - x", {"product": [2.0, 5.0]}),
+    ],
+)  # fmt: skip
+def test_an_edit_of_whatever_a_kernel_reaches_compiles_it_anew(package, statements, file, old, new, after):
+    package.run(statements)
+    package.edit(file, old, new)
+    edited = package.run(statements)
+    assert edited["values"] == after
+    assert edited["compiled"] > 0
+    package.edit(file, new, old)
+    assert package.run(statements)["compiled"] == 0  # both versions are kept
+
+
+def test_an_edit_of_what_a_kernel_cannot_reach_compiles_nothing(package):
+    package.run(OUTER)
+    package.edit("plant/law.py", "10.0", "20.0")
+    package.edit("plant/factory.py", "n * inner", "n + inner")
+    assert package.run(OUTER)["compiled"] == 0
+
+
+def test_what_comes_from_the_disk_brings_the_functions_apart_that_it_calls(package):
+    run = """
+from plant.outermost import outermost
+try:
+    outermost(-1.0)
+except ValueError as error:
+    values["refused"] = str(error)
+values["outermost"] = outermost(3.0)
+"""
+    assert package.run(run)["values"] == {"refused": "below zero", "outermost": 46.0}
+    package.edit("plant/outermost.py", "1.0", "2.0")
+    edited = package.run(run)
+    assert edited["values"] == {"refused": "below zero", "outermost": 47.0}
+    assert edited["compiling"] == ["plant.outermost.outermost"]
+
+
+def test_a_constant_set_from_outside_counts_as_an_edit(package):
+    package.run(OUTER)
+    other = package.run(f"import plant.inner; plant.inner.GAIN = 100.0\n{OUTER}")
+    assert other["values"] == {"outer": 301.0}
+    assert package.run(OUTER)["values"] == {"outer": 7.0}
+
+
+def test_an_implementation_registered_elsewhere_counts_as_an_edit(package):
+    package.run(TOTAL)
+    (package.folder / "other.py").write_text(
+        "import plant.law\nfrom lapwing.kernels import leaf\n\n@leaf\ndef law(p):\n    return -p.stiffness\n\n"
+        "plant.law.FORCES[plant.law.Spring] = law\n"
+    )
+    assert package.run(f"import other\n{TOTAL}")["values"] == {"total": -3.0}
+    assert package.run(TOTAL)["values"] == {"total": 30.0}
+
+
+def test_a_source_that_changes_while_it_runs_is_not_kept_under_its_new_state(package):
+    edit = "import plant.outer; open('plant/constants.py', 'w').write('GAIN = 5.0')"
+    running = package.run(f"{edit}\n{OUTER}")
+    assert running["values"] == {"outer": 7.0}  # it had read the old one
+    assert package.run(OUTER)["values"] == {"outer": 16.0}
+
+
+def test_damage_in_any_file_costs_a_compilation(package):
+    package.run(ALL)
+    whole = {path: path.read_bytes() for path in files(package)}
+    assert len(whole) > 8
+    cuts = {
+        "empty": lambda data: b"",
+        "half": lambda data: data[: len(data) // 2],
+        "short": lambda data: data[:-1],
+        "first": lambda data: bytes([data[0] ^ 1]) + data[1:],
+        "middle": lambda data: data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 16]) + data[len(data) // 2 + 1 :],
+        "last": lambda data: data[:-1] + bytes([data[-1] ^ 0x80]),
+    }  # fmt: skip
+    for cut in cuts.values():
+        for path, data in whole.items():
+            path.write_bytes(cut(data))
+        run = package.run(ALL)
+        assert run["values"] == VALUES
+        assert run["loaded"] == 0
+        assert package.run(ALL)["compiled"] == 0  # it has been mended
+
+
+def test_one_version_that_names_what_is_gone_spoils_no_other(package):
+    (package.folder / "gone.py").write_text("from typing import NamedTuple\n\nclass Gone(NamedTuple):\n    x: float\n")
+    read = "from lapwing.kernels.cell import Cell, read; values['read'] = read(Cell(2.0))"
+    package.run(f"{read}; import gone; values['gone'] = read(Cell(gone.Gone(1.0)))[0]")
+    (package.folder / "gone.py").unlink()
+    run = package.run(read)
+    assert (run["values"], run["compiled"]) == ({"read": 2.0}, 0)
+
+
+def test_several_processes_that_warm_at_once(package):
+    alone = package.run(ALL)
+    shutil.rmtree(package.cache)
+    ended = [package.end(process) for process in [package.start(ALL) for _ in range(4)]]
+    assert [run["values"] for run in ended] == [VALUES] * 4
+    assert sum(run["compiled"] for run in ended) == alone["compiled"]  # each kernel by one of them
+    assert not list((package.cache / "compiling").iterdir())
+    last = package.run(ALL)
+    assert (last["values"], last["compiled"]) == (VALUES, 0)
+    assert all(
+        path.name.count(".") == path.name.rpartition("-")[0].count(".") for path in files(package)
+    )  # all renamed
+
+
+SLOW = "from plant.slow import slow; values['slow'] = slow(2.0)"
+
+
+@pytest.fixture
+def compiling(package):
+    """A process in the midst of compiling `slow`."""
+    begun = package.folder / "begun"
+    process = package.start(SLOW, BEGUN=str(begun))
+    while not begun.exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
+    other = package.start(SLOW)
+    with pytest.raises(subprocess.TimeoutExpired):
+        other.wait(5.0)
+    compiling.kill()
+    ended = package.end(other)
+    assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
+
+
+def test_whoever_is_stopped_while_he_compiles_is_not_waited_for_long(package, compiling):
+    compiling.send_signal(signal.SIGSTOP)
+    ended = package.run(f"from lapwing.kernels import _locks; _locks.PATIENCE = 0.1; {SLOW}")
+    assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
+
+
+def test_where_nothing_can_be_written_all_is_compiled(package):
+    package.cache.write_text("a file where the folder should be")
+    assert package.run(OUTER)["values"] == {"outer": 7.0}
+    elsewhere = package.run(OUTER, LAPWING_CACHE="", HOME="/dev/null/none")
+    assert (elsewhere["values"], elsewhere["loaded"]) == ({"outer": 7.0}, 0)
+    homeless = "from pathlib import Path\ndef home(): raise RuntimeError\nPath.home = home\n"
+    assert package.run(homeless + OUTER, LAPWING_CACHE="")["values"] == {"outer": 7.0}
+
+
+def test_others_cannot_read_or_write_it(package):
+    package.run(OUTER)
+    folders = [package.cache, *(path for path in package.cache.rglob("*") if path.is_dir())]
+    assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
+
+
+def test_what_others_could_have_written_is_not_run(package):
+    package.run(ALL)
+    for path in files(package):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        path.chmod(0o666)
+    assert package.run(ALL)["loaded"] == 0
+    assert package.run(ALL)["compiled"] == 0  # by files of its own
+    if os.geteuid() == 0:
+        for path in files(package):
+            os.chown(path, 1, 1)
+        assert package.run(ALL)["loaded"] == 0
+
+
+def test_only_the_last_versions_are_kept(package):
+    for gain in range(7):
+        package.edit("plant/constants.py", f"GAIN = {2 + gain}.0", f"GAIN = {3 + gain}.0")
+        assert package.run(OUTER)["values"] == {"outer": 3.0 * (3 + gain) + 1.0}
+    assert len(list((package.cache / "imports").glob("plant.constants-*"))) == 4
+
+
+def test_numbas_own_cache_is_left_alone(package):
+    (package.folder / "own.py").write_text(
+        "from numba import njit\n\n@njit(cache=True)\ndef own(x):\n    return x + 1.0\n"
+    )
+    settings = "import numba; from numba.core import caching; from lapwing.kernels.cell import Cell; Cell(1.0)"
+    untouched = "values['settings'] = [numba.config.CACHE_DIR, caching.IndexDataCacheFile._load_index.__module__]"
+    run = package.run(f"{settings}; {untouched}; import own; values['own'] = own.own(1.0)")
+    assert run["values"] == {"settings": ["", "numba.core.caching"], "own": 2.0}
+    assert list((package.folder / "__pycache__").glob("own.own-*.nbc"))
+    assert not list(package.cache.rglob("*own*"))
+
+
+def test_what_a_script_defines_itself_is_compiled_each_time(package):
+    inside = "from lapwing.kernels import kernel; from typing import NamedTuple\n"
+    inside += "class Here(NamedTuple):\n    x: float\n\n@kernel\ndef here(x):\n    return x.x * 2.0\n"
+    inside += "values['here'] = here(Here(2.0))"
+    first, second = package.run(inside), package.run(inside)
+    assert first["values"] == second["values"] == {"here": 4.0}
+    assert second["compiled"] == first["compiled"] == 1
+
+
+def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_factory):
+    package.run(OUTER)
+    other = tmp_path_factory.mktemp("copy")
+    shutil.copytree(package.folder, other, dirs_exist_ok=True)
+    package.folder, kept = other, package.cache
+    assert package.run(OUTER, LAPWING_CACHE=str(kept))["compiled"] == 0
+
+
+def test_what_a_wheel_carries_is_read_where_nothing_is_kept(package, tmp_path):
+    package.run(ALL)
+    shipped = package.cache.rename(tmp_path / "shipped")
+    placed = f"from pathlib import Path; from lapwing.kernels import _files; _files.SHIPPED = Path({str(shipped)!r})\n"
+    run = package.run(placed + ALL)
+    assert (run["values"], run["compiled"]) == (VALUES, 0)
+    assert not files(package)

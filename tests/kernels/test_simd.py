@@ -1,0 +1,93 @@
+"""Lanes compute what floats compute, lane by lane and to the same bits."""
+
+import math
+
+import numpy as np
+
+from lapwing.dynamics import vector
+from lapwing.dynamics.lie import quaternion
+from lapwing.dynamics.lie.quaternion import Quaternion
+from lapwing.kernels import kernel
+from lapwing.kernels.simd import (
+    any_above,
+    apart,
+    beside,
+    choose,
+    lanes,
+    load,
+    root,
+    separate,
+    spread,
+    store,
+    total,
+    where,
+)
+
+
+@kernel
+def formula(a, b, s):
+    return ((a + b) * s - 2.0 / a) / (b - s * a) + (1.0 - -b)
+
+
+@kernel
+def on_lanes(a, b, s):
+    return apart(formula(lanes(a[0], a[1], a[2], a[3]), lanes(b[0], b[1], b[2], b[3]), s))
+
+
+def test_arithmetic_is_that_of_floats():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        a, b = (tuple(row) for row in rng.normal(size=(2, 4)).tolist())
+        assert on_lanes(a, b, 0.7) == tuple(formula(x, y, 0.7) for x, y in zip(a, b, strict=True))
+
+
+@kernel
+def turned(four, v):
+    q = beside(four)
+    R = quaternion.rotation_matrix(quaternion.multiply(quaternion.conjugate(q), q))
+    return separate((q, vector.apply(R, v), vector.cross(v, quaternion.rotate(q, v))))
+
+
+def test_trees_go_in_and_out_in_their_order():
+    rng = np.random.default_rng(2)
+    four = tuple(Quaternion(*row) for row in rng.normal(size=(4, 4)).tolist())
+    v = (0.1, -0.4, 0.8)
+    for q, (same, _, crossed) in zip(four, turned(four, v), strict=True):
+        assert same == q
+        assert crossed == vector.cross(v, quaternion.rotate(q, v))
+
+
+@kernel
+def chosen(flag, x):
+    f = beside(flag)
+    return apart(where(f, root(beside(x)), -1.0)), total(beside(x))
+
+
+def test_choice_root_and_sum():
+    x = (4.0, 9.0, 2.0, -1.0)
+    picked, whole = chosen((1.0, 0.0, 0.5, -1.0), x)
+    assert picked == (2.0, -1.0, math.sqrt(2.0), -1.0)
+    assert whole == 14.0
+
+
+@kernel
+def vectors(flag, a, b):
+    f = beside(flag)
+    return separate(choose(f, beside(a), b)), any_above(f)
+
+
+def test_choice_of_vectors_and_whether_any_is_chosen():
+    a, b = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (10.0, 11.0, 12.0)), (0.0, -1.0, -2.0)
+    assert vectors((0.0, 1.0, -1.0, math.nan), a, b) == ((b, a[1], b, b), True)
+    assert vectors((0.0, -0.0, -1.0, math.nan), a, b) == ((b, b, b, b), False)
+
+
+@kernel
+def moved(a):
+    store(a, 5, load(a, 1) + spread(10.0))
+    return a
+
+
+def test_in_and_out_of_memory():
+    a = np.arange(12.0).reshape(3, 4)
+    np.testing.assert_array_equal(moved(a).ravel(), [0, 1, 2, 3, 4, 11, 12, 13, 14, 9, 10, 11])

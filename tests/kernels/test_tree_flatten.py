@@ -1,0 +1,46 @@
+"""A function written for one structure flattens its values, and no others."""
+
+import itertools
+
+import numpy as np
+
+from lapwing.kernels.cell import Cell
+from lapwing.kernels.tree_flatten import Flattener, leaves
+from lapwing.kernels.type_fingerprint import structure
+from tests.kernels.test_type_fingerprint import VALUES
+
+NESTED = [(a, (b, (), a)) for a, b in itertools.product(VALUES, VALUES)]
+
+
+def test_flattens_what_has_the_structure_and_nothing_else():
+    for a, b in itertools.product(VALUES, VALUES):
+        found = Flattener(a).leaves(b)
+        assert (found is not None) == (structure(a) == structure(b))
+        assert found is None or all(map(same, found, leaves(b)))
+
+
+def test_flattens_trees():
+    for value in NESTED:
+        found, expected = Flattener(value).leaves(value), leaves(value)
+        assert len(found) == len(expected)
+        assert all(map(same, found, expected))
+
+
+def test_a_whole_number_of_more_bits_is_another_type():
+    assert Flattener((1, 2.0)).leaves((2**62, 2.0)) == (2**62, 2.0)
+    assert Flattener((1, 2.0)).leaves((2**63, 2.0)) is None
+    assert Flattener((1, 2.0)).leaves(("text", 2.0)) is None
+
+
+def test_cells_of_one_structure_hold_their_own_values():
+    grid = np.arange(6.0).reshape(2, 3)
+    for k in range(4):  # the first is walked through, the others by a function
+        kept = Cell(0.5 * k)
+        held = Cell((k, (0.5 * k, k > 1), grid + k, kept, None)).memory
+        numbers = held._block.numbers()
+        assert numbers[:3] == (k, 0.5 * k, k > 1)
+        assert kept.memory.pointer in numbers
+
+
+def same(a, b):
+    return a is b

@@ -1,0 +1,32 @@
+"""A kernel as a Python function: on numpy arrays too, and nothing is compiled, not even what it calls."""
+
+import numpy as np
+
+from lapwing.kernels import kernel, leaf, uncompiled
+
+
+@leaf
+def doubled(x):
+    return 2.0 * x
+
+
+@leaf
+def raised(x):
+    return doubled(x) + 1.0
+
+
+@kernel
+def outer(x):
+    return raised(x) * doubled(x)
+
+
+def test_nothing_is_compiled_for_it():
+    python = uncompiled(outer)
+    assert python(3.0) == 42.0
+    np.testing.assert_array_equal(python(np.array([0.0, 3.0])), [0.0, 42.0])
+    assert not any(function.signatures for function in (outer, raised, doubled))
+    assert uncompiled(outer) is python
+
+
+def test_it_gives_what_the_compiled_one_gives():
+    assert outer(0.1) == uncompiled(outer)(0.1)

@@ -1,0 +1,107 @@
+"""Vehicles stepped side by side: the bits of one alone, resets, parameters of each, and commands of body rates."""
+
+import re
+
+import numpy as np
+import pytest
+
+import lapwing
+from lapwing.dynamics import simd_batch as kernels
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.kernels import kernel
+from lapwing.kernels.row_packing import to_row
+from lapwing.services.scene_resolver import load, resolve
+
+N = 19  # more than a block, less than two
+LOADED = ["effects.carried_load.mass=1.0", "effects.carried_load.length=1.0"]
+MISSION = "delivery_mission"  # random wind, ground contact, air density
+VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.wind_random.sigma": lapwing.uniform(0.0, 2.0)}
+
+
+@kernel
+def flown(method, p, key, state, command, h, n, ticks):
+    for tick in range(ticks):
+        state = multirotor.advance(method, p, key, tick, state, command, h, n)
+    return state
+
+
+@pytest.fixture(scope="module")
+def batch():
+    return lapwing.Batch(MISSION, N, VARY, seed=5)
+
+
+def alone(k, volts, ticks, start=None):
+    """The numbers of the motion of member k after so many ticks, stepped by itself."""
+    from lapwing.studies.campaign.plan import plan
+
+    given = plan(MISSION, (), N, 5, VARY).given(k)
+    plant = resolve(load(MISSION, given)).services["plant"].parameters
+    core, state = plant.core, plant.start.vehicle
+    if start is not None:
+        state = state._replace(motion=state.motion._replace(position_world=start))
+    return to_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
+
+
+def test_members_are_stepped_side_by_side_in_vector_registers(batch):
+    batch.reset()
+    batch.step(motor_voltages=np.full((N, 4), 31.0))
+    for compiled in kernels.advance.overloads.values():
+        assert re.search(r"fmul <\d+ x double>", str(compiled.library._get_module_for_linking()))
+
+
+def rows(state):
+    return np.column_stack(state[1:])
+
+
+def test_every_member_has_the_bits_of_one_vehicle_alone(batch):
+    batch.reset()
+    volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off
+    end = batch.step(motor_voltages=volts, ticks=125)
+    assert end.position_world[:, 2].min() < 0.351 < 0.4 < end.position_world[:, 2].max()
+    assert np.all(end.time == 125 * batch.interval)
+    for k in (0, 7, 15, 16, 18):
+        assert np.array_equal(rows(end)[k], alone(k, tuple(volts[k]), 125))
+
+
+def test_members_are_reset_alone(batch):
+    first = batch.reset()
+    volts = np.full((N, 4), 33.0)
+    after = batch.step(motor_voltages=volts, ticks=30)
+    mixed = batch.reset([3, 17], position_world=(1.0, 2.0, 5.0))
+    assert np.array_equal(np.delete(rows(mixed), [3, 17], axis=0), np.delete(rows(after), [3, 17], axis=0))
+    assert (mixed.time[3], mixed.time[4]) == (0.0, 30 * batch.interval)
+    assert mixed.position_world[[3, 17]].tolist() == [[1.0, 2.0, 5.0]] * 2
+    end = batch.step(motor_voltages=volts, ticks=20)
+    for k in (3, 17):
+        assert np.array_equal(rows(end)[k], alone(k, (33.0,) * 4, 20, (1.0, 2.0, 5.0)))
+    assert np.array_equal(rows(batch.reset()), rows(first))
+
+
+def test_body_rates_are_followed_and_thrust_holds_the_weight():
+    batch = lapwing.Batch("hover", 4)
+    batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=np.full(4, 330.0))
+    wanted = np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
+    weight = load("hover").lookup("airframe.mass").total * 9.80665
+    end = batch.step(thrust=np.full(4, weight), body_rates=wanted, ticks=150)
+    assert end.omega_body == pytest.approx(wanted, abs=0.02)
+    assert abs(end.velocity_world[3, 2]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda b: lapwing.Batch("hover", 0), "n: expected at least 1 member, got 0"),
+        (lambda b: lapwing.Batch("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
+        (lambda b: lapwing.Batch("hover", 2, overrides=LOADED), "effects.carried_load: .*without what they carry"),
+        (lambda b: b.step(), "step: expected motor_voltages, or thrust and body_rates"),
+        (lambda b: b.step(thrust=np.zeros(N)), "step: expected motor_voltages, or thrust and body_rates"),
+        (lambda b: b.step(np.zeros((N, 3))), r"motor_voltages: expected numbers of shape \(19, 4\), got \(19, 3\)"),
+        (lambda b: b.step(np.full((N, 4), np.nan)), "motor_voltages: expected finite numbers"),
+        (lambda b: b.step(np.zeros((N, 4)), ticks=0), "step: expected ticks = 1, 2"),
+        (lambda b: b.reset([19]), "members: expected numbers from 0 to 18"),
+        (lambda b: b.reset([1], speed=1.0), "speed: unknown; expected one of position_world, attitude"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(batch, wrong, said):
+    with pytest.raises(ValueError, match=said):
+        wrong(batch)

@@ -1,0 +1,46 @@
+"""A type as a log defines it beside this version's: what is read the same, and what is not."""
+
+import pytest
+
+from lapwing.messages import TYPES
+from lapwing.messages.type_compatibility import otherwise
+
+STATE = "lapwing_msgs/msg/VehicleState"
+TEXT = TYPES[STATE].schema_text
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_every_type_is_its_own(name):
+    text = TYPES[name].schema_text
+    assert otherwise(name, text) == ""
+    assert otherwise(name, "# of another program\n" + text.replace("\n", "\r\n").replace("uint8 ", "char ")) == ""
+
+
+def test_the_types_that_one_contains_may_stand_in_any_order_and_what_is_not_ours_is_not_judged():
+    bar = "=" * 80 + "\n"
+    own, *others = TEXT.split(bar)
+    ended = [part if part.endswith("\n") else part + "\n" for part in reversed(others)]
+    assert otherwise(STATE, bar.join([own, *ended])) == ""
+    assert otherwise("foreign/msg/A", "anything <= 3") == ""
+    assert otherwise(STATE, "") == ""
+
+
+@pytest.mark.parametrize(
+    ("there", "here", "said"),
+    [
+        ("float64 air_density", "float32 air_density", "has float32 air_density where this version has float64 air_"),
+        ("float64 air_density", "#", "has bool ground_contact where this version has float64 air_density"),
+        ("bool ground_contact", "#", "has no more fields where this version has bool ground_contact"),
+        (
+            "bool ground_contact",
+            "bool ground_contact\nint8 more",
+            "has int8 more where this version has no more fields",
+        ),
+        ("float64[] rotor_speed", "float64[4] rotor_speed", "has float64[4] rotor_speed where"),
+        ("float64 x", "float32 x", "has float32 pose.position.x where this version has float64 pose.position.x"),
+        ("float64 air_density", "wide<=3 air_density", "has a definition that cannot be read"),
+    ],
+)
+def test_what_is_otherwise_is_named(there, here, said):
+    assert there in TEXT
+    assert otherwise(STATE, TEXT.replace(there, here)).startswith(said)

@@ -1,0 +1,42 @@
+"""What hinders arming: what lasts, not a single reading that was refused."""
+
+import pytest
+from commander_session import CONSTANTS, Session
+
+from lapwing.services.autopilot.estimator import SOURCES
+from lapwing.services.autopilot.initial_estimate import EXACT, NOT_STARTED
+
+
+def shown(bits, seconds, constants=CONSTANTS):
+    """The reasons after these bits of health for so long."""
+    session = Session(constants._replace(has_trajectory=False))
+    session.step(estimate=EXACT, estimate_interval=0.02)
+    for _ in range(round(seconds / 0.02)):
+        request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
+    return list(request.status.prearm), session.commander.state.source_outage
+
+
+def test_a_refused_reading_is_no_reason_but_a_source_that_stays_away_is():
+    for bit, name in enumerate(SOURCES):
+        assert shown(1 << bit, 0.1)[0] == []
+        assert shown(1 << bit, 1.0)[0] == [f"no good readings of the {name}"]
+
+
+def test_an_uncertain_estimate_is_a_reason_at_once():
+    assert shown(64, 0.02)[0] == ["the position is uncertain"]
+    assert shown(128, 0.02)[0] == ["the attitude is uncertain"]
+    assert shown(NOT_STARTED, 0.02)[0] == ["the estimator has not started"]
+
+
+def test_time_counts_at_new_estimates_alone():
+    session = Session(CONSTANTS._replace(has_trajectory=False))
+    lost = EXACT._replace(health=1)
+    for tick in range(1000):
+        session.step(estimate=lost, estimate_interval=0.02 if tick % 5 == 0 else 0.0)
+    assert session.commander.state.source_outage[0] == pytest.approx(200 * 0.02)
+
+
+def test_without_an_operator_nobody_arms_and_nothing_is_counted():
+    reasons, outage = shown(1, 1.0, CONSTANTS._replace(has_operator=False))
+    assert reasons == []
+    assert outage == [0.0] * len(SOURCES)

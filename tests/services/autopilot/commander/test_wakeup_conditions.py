@@ -1,0 +1,231 @@
+"""A commander that is called only where it has a say asks for the same, to the bit, as one called at every tick."""
+
+import math
+
+import numba
+import pytest
+from commander_session import CONSTANTS, VIEW
+from flights import command, item
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from lapwing.services.autopilot.commander.commander import Commander
+from lapwing.services.autopilot.commander.wakeup_conditions import (
+    BatteryThresholds,
+    battery_thresholds,
+    needs_attention,
+)
+from lapwing.services.autopilot.initial_estimate import EXACT
+
+pytestmark = pytest.mark.long
+
+DT = 0.05  # [s] coarse: time-outs of half a second are ten ticks
+LOOK = 5
+GPS_LOST, ATTITUDE_UNSURE = 1 << 1, 128
+NAMES = ("FS_ESTIMATE_ACT", "FS_MOTOR_ACT", "FS_BAT_EMER_ACT", "FS_BAT_CRIT_ACT", "FS_BAT_LOW_ACT")
+
+SOUND = {"health": 0, "charge": 0.5, "motor": 0, "thrust": 1.0, "cut": False}
+"""A flight in which nothing is wrong."""
+deviations = st.sampled_from(
+    [
+        *({"health": bits} for bits in (1, GPS_LOST, GPS_LOST, 64, ATTITUDE_UNSURE, 255)),
+        *({"charge": charge} for charge in (math.nan, 0.14, 0.06, 0.04)),
+        *({"motor": 2}, {"motor": 2}),
+        *({"thrust": 0.3}, {"thrust": 0.0}, {"thrust": 0.0, "cut": True}),
+    ]
+)
+spells = st.tuples(st.integers(1, 40), st.one_of(st.just({}), deviations, st.tuples(deviations, deviations)))
+"""A number of ticks, and what is different from a sound flight."""
+
+NEAR = [item("fence_circle_in", 0.0, 0.0, radius=20.0)]
+PLACES = [item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0)]
+COMMANDS = (
+    command("link"),
+    command("manual", 0.2, 0.0, 0.1, 0.0),
+    command("offboard_position", 1.0, 2.0, 3.0),
+    command("parameter", 1.0, text="COM_DL_LOSS_T"),
+    command("parameter", 0.6, text="BAT_LOW_THR"),
+    command("parameter", 2.0, text="NAV_DLL_ACT"),
+    command("fence_upload", items=NEAR),
+    command("mission_upload", items=PLACES),
+    command("mission_current", 1.0),
+    command("set_home", 1.0, 2.0, 0.0),
+    command("gripper", 0.0),
+    command("finish"),
+    command("arm", math.nan, 2.0, id=4),
+    command("disarm", id=5),
+    command("hold"),
+    command("goto", 4.0, 1.0, 5.0),
+    command("return"),
+    command("offboard"),
+)
+orders = st.dictionaries(st.integers(0, 150), st.lists(st.sampled_from(COMMANDS), min_size=1, max_size=2), max_size=12)
+"""Commands by the tick at which they come."""
+
+
+def constants(actions, delay, operator=False):
+    """Of a vehicle that follows its trajectory, with these failsafes."""
+    values = dict(zip(NAMES, actions, strict=True)) | {"COM_POS_FS_DELAY": delay}
+    table = {name: p._replace(default=float(values.get(name, p.default))) for name, p in CONSTANTS.parameters.items()}
+    return CONSTANTS._replace(parameters=table, has_trajectory=True, has_operator=operator)
+
+
+def plain(value):
+    """Any state as nested lists and tuples, to be compared."""
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, dict):
+        return [(k, plain(v)) for k, v in value.items()]
+    return (type(value).__name__, plain(vars(value))) if hasattr(value, "__dict__") else repr(value)
+
+
+def views(flight, orders=()):
+    """(view, whether the estimate is due) of each tick; the estimate is that of the last look. Send each request."""
+    tick, shown, every_tick = 0, EXACT, False
+    for ticks, different in flight:
+        now = dict(SOUND)
+        for each in different if isinstance(different, tuple) else (different,):
+            now |= each
+        for _ in range(ticks):
+            due = tick % LOOK == 0 or every_tick
+            if due:
+                shown = EXACT._replace(
+                    position_world=(float(tick), 0.1 * tick, 5.0 + 0.01 * tick), health=now["health"]
+                )
+            view = VIEW._replace(
+                dt=DT,
+                estimate=shown,
+                estimate_interval=(1 if every_tick else LOOK) * DT if due else 0.0,
+                battery_charge=now["charge"],
+                failed_motor=now["motor"],
+                setpoint=VIEW.setpoint._replace(position_world=(0.3 * tick, 1.0, 5.0), yaw=0.01 * tick),
+                thrust=now["thrust"],
+                motors_cut=now["cut"],
+                commands=tuple(orders[tick]) if tick in orders else (),
+            )
+            request = yield view, due
+            every_tick = request.estimate_every_tick
+            tick += 1
+
+
+def skip(commander, missed):
+    """Let a commander take in views that it was not shown."""
+    flies = [view.thrust > 0.0 and not view.motors_cut for view in missed]
+    flew = [view.setpoint for view, flying in zip(missed, flies, strict=True) if flying]
+    commander.skip(len(missed), DT, flies[-1], flew[-1] if flew else None)
+
+
+UNSAID = {"acknowledgements": (), "texts": (), "parameters": None, "faults": None}
+"""What is told once."""
+
+
+def check_same(known, flight, orders=()):
+    """Fly with a commander that is called at every tick, and one that is called as seldom as it allows."""
+    always, seldom = Commander(known), Commander(known)
+    told = views(flight, orders)
+    view, due = next(told)
+    last, until, missed = None, 0.0, []
+    while True:
+        wanted = always.step(view)
+        thresholds = battery_thresholds(seldom.state.guidance.parameters)
+        conditions = view.estimate.health, view.battery_charge, view.failed_motor, due
+        operated = known.has_operator and (due or view.commands)
+        if len(missed) + 1 >= until or operated or needs_attention(thresholds, *conditions):
+            if known.has_operator and missed:
+                skip(seldom, missed)
+            last = seldom.step(view)
+            missed, until = [], last.quiet / DT if last.quiet < math.inf else math.inf
+            assert last.quiet == 0.0 or last.setpoint is None
+        else:
+            missed.append(view)
+            assert wanted.acknowledgements == wanted.texts == ()
+        assert repr(last._replace(quiet=0.0, **UNSAID)) == repr(wanted._replace(quiet=0.0, **UNSAID))
+        if not missed:
+            assert (last.acknowledgements, last.texts) == (wanted.acknowledgements, wanted.texts)
+            if known.has_operator or wanted.status.mode != "mission":
+                assert plain(seldom.state) == plain(always.state)
+        try:
+            view, due = told.send(wanted)
+        except StopIteration:
+            return
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(spells, min_size=1, max_size=12), st.tuples(*[st.integers(0, 4)] * 5), st.sampled_from([0.1, 0.5, 2.0]))
+@example([(7, {}), (3, {"health": GPS_LOST}), (90, {})] * 2, (4,) * 5, 0.1)
+@example([(7, {}), (30, {"charge": 0.14}), (9, {})] * 2, (4,) * 5, 0.5)
+@example([(7, {}), (5, {"motor": 2}), (9, {})], (0, 3, 0, 0, 0), 0.5)
+@example([(40, {"health": 1}), (5, ({"health": 1}, {"motor": 2}))], (0, 3, 0, 0, 0), 0.5)
+@example([(7, {}), (5, {"charge": 0.14}), (9, {"thrust": 0.0}), (9, {}), (8, {"charge": 0.14})], (1,) * 5, 0.5)
+def test_calls_in_between_change_nothing(flight, actions, delay):
+    check_same(constants(actions, delay), flight)
+
+
+SHORT_LINK = {3: [COMMANDS[0]], 5: [COMMANDS[3], COMMANDS[5]]}
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(spells, min_size=1, max_size=8), st.tuples(*[st.integers(0, 4)] * 5), st.sampled_from([0.1, 2.0]), orders
+)
+@example([(150, {})], (4,) * 5, 0.1, SHORT_LINK)
+@example([(150, {})], (4,) * 5, 0.1, {8: [command("offboard_position", 1.0, 2.0, 3.0)]})
+@example([(150, {})], (4,) * 5, 0.1, {6: [command("fence_upload", items=NEAR)]})
+@example([(12, {}), (60, {"thrust": 0.0}), (40, {})], (4,) * 5, 0.1, {7: [command("mission_upload", items=PLACES)]})
+@example([(12, {}), (3, {"thrust": 0.0}), (40, {})], (4,) * 5, 0.1, {14: [command("hold")]})
+@example([(12, {}), (30, {"thrust": 0.0, "cut": True})], (4,) * 5, 0.1, {19: [command("hold")]})
+@example([(60, {})], (4,) * 5, 0.1, {17: [command("goto", 4.0, 1.0, 5.0)]})
+@example([(60, {"thrust": 0.0, "health": 1})], (4,) * 5, 0.1, {27: [command("arm", math.nan, 1.0)]})
+@example([(60, {})], (4,) * 5, 0.1, {17: [command("parameter", 0.6, text="BAT_LOW_THR")]})
+def test_nor_where_an_operator_is_listened_to(flight, actions, delay, orders):
+    check_same(constants(actions, delay, operator=True), flight, orders)
+
+
+def test_a_sound_flight_along_the_trajectory_is_quiet_and_follows():
+    for operator in (False, True):
+        commander = Commander(constants((1,) * 5, 1.0, operator))
+        for charge in (math.nan, 0.5):
+            request = commander.step(VIEW._replace(battery_charge=charge))
+            assert request.quiet == math.inf
+            assert request.setpoint is None
+            assert request.texts == request.acknowledgements == ()
+
+
+def test_what_is_counted_is_not_quiet_and_is_forgotten_once_it_is_over():
+    commander = Commander(constants((1,) * 5, 1.0))
+    lost = VIEW._replace(estimate=EXACT._replace(health=GPS_LOST))
+    assert not commander.step(lost).quiet
+    assert commander.step(VIEW).quiet
+    requests = [commander.step(lost) for _ in range(round(1.1 / VIEW.dt))]
+    assert [r.status.mode for r in requests].index("hold") in (249, 250)
+    assert not commander.step(VIEW).quiet  # the trajectory has been left
+
+
+def test_it_is_quiet_until_a_link_or_setpoints_would_be_missed():
+    known = constants((1,) * 5, 1.0, operator=True)
+    timeout = {name: known.parameters[name].default for name in ("COM_DL_LOSS_T", "COM_OF_LOSS_T")}
+    linked = Commander(known).step(VIEW._replace(commands=(command("link"),)))
+    assert linked.quiet == timeout["COM_DL_LOSS_T"] - VIEW.dt
+    offboard = Commander(known).step(VIEW._replace(commands=(command("offboard_position", 1.0, 2.0, 3.0),)))
+    assert offboard.quiet == timeout["COM_OF_LOSS_T"] - VIEW.dt
+
+
+def test_without_a_trajectory_it_is_never_quiet():
+    for operator in (True, False):
+        assert not Commander(CONSTANTS._replace(has_trajectory=False, has_operator=operator)).step(VIEW).quiet
+
+
+def test_it_compiles_into_a_loop():
+    @numba.njit
+    def first(thresholds, health, charge):
+        for tick in range(100):
+            if needs_attention(thresholds, health, charge - 0.01 * tick, 0, tick % LOOK == 0):
+                return tick
+        return -1
+
+    thresholds = BatteryThresholds(0.15, 0.07, 0.05)
+    assert first(thresholds, 0, 1.0) == 86
+    assert first(thresholds, 0, 10.0) == -1
+    assert first(BatteryThresholds(0.0, 0.0, 0.5), 0, 0.505) == 1
+    assert first(thresholds, GPS_LOST, math.nan) == 0
+    assert first(thresholds, 1, math.nan) == -1  # the IMU refused once: not the position

@@ -1,0 +1,63 @@
+"""Plans: read as they are written, refused in one line, and flown to the end of the run."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from lapwing.services.common.flight_plan_file import read
+
+DELIVERY = Path("lapwing/scenes/plans/delivery.plan")
+
+
+def items(path):
+    return read(path)[0].items
+
+
+def test_the_delivery_mission_as_a_plan():
+    found = items(DELIVERY)
+    assert [i.action for i in found] == ["speed", "takeoff", *["waypoint"] * 4, "land"]
+    assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
+    assert found[4].yaw == pytest.approx(0.0)  # heading east
+    assert found[5].yaw == pytest.approx(math.pi / 2)  # heading north
+    assert found[5].hold == 5.0
+
+
+def test_altitudes_above_home_count_from_where_the_vehicle_stands():
+    found = read(DELIVERY, 0.35)[0].items
+    assert [i.position.z for i in found[1:6]] == pytest.approx([10.35] * 5, abs=1e-3)
+
+
+def test_waypoints_skip_home_and_keep_jumps(tmp_path):
+    path = tmp_path / "a.waypoints"
+    rows = [
+        "QGC WPL 110",
+        "0 1 0 16 0 0 0 0 40.7686 14.7907 280 1",
+        "1 0 3 22 0 0 0 nan 40.7686 14.7907 5 1",
+        "2 0 3 16 2 0 0 nan 40.7687 14.7907 5 1",
+        "3 0 2 177 2 1 0 0 0 0 0 1",
+    ]
+    path.write_text("\n".join(rows))
+    found = items(path)
+    assert [i.action for i in found] == ["takeoff", "waypoint", "jump"]
+    assert found[1].position.y == pytest.approx(11.1, abs=0.1)
+    assert found[1].position.z == 5.0
+    assert found[2].values == (1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nothing", "neither JSON"),
+        ("{}", "fileType"),
+        ('{"fileType": "Plan"}', "not a plan"),
+        ("QGC WPL 110\n0 1 3 16 0 0", "expected 12 columns, got 6"),
+        ("QGC WPL 110\n0 1 3 999 0 0 0 0 1 1 1 1", "unknown command 999"),
+    ],
+)
+def test_what_is_no_plan_is_refused_in_a_line(tmp_path, text, said):
+    path = tmp_path / "bad.plan"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=said) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)

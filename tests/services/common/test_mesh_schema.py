@@ -1,0 +1,135 @@
+"""The mesh of an airframe: the same solid in every form of file, and from its file to the page of a log."""
+
+import re
+import struct
+
+import numpy as np
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.services.common.mesh_file import MOST, read
+from lapwing.services.common.mesh_schema import pack, unpack
+from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.scene_resolver import from_resolved, load, resolve
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.report import motion_3d
+from tests.studies import synthetic_flights
+
+# A pyramid on a square, its top off the middle: no two axes can be mistaken for one another.
+CORNERS = np.array([(0, 0, 0), (0.4, 0, 0), (0.4, 0.3, 0), (0, 0.3, 0), (0.1, 0.05, 0.2)], np.float32)
+FACES = [(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
+VOLUME = 0.4 * 0.3 * 0.2 / 3.0
+
+
+def binary(head=b"made by a test"):
+    triangles = b"".join(struct.pack("<12fH", 0, 0, 0, *CORNERS[list(face)].ravel(), 0) for face in FACES)
+    return head.ljust(80, b" ") + struct.pack("<I", len(FACES)) + triangles
+
+
+def ascii_stl():
+    facets = [
+        "facet normal 0 0 0\n outer loop\n"
+        + "".join(f"  vertex {x:.6e} {y} {z}\n" for x, y, z in CORNERS[list(face)])
+        + " endloop\nendfacet\n"
+        for face in FACES
+    ]
+    return ("solid pyramid\n" + "".join(facets) + "endsolid pyramid\n").encode()
+
+
+def obj():
+    places = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+    sides = "".join(f"f {a + 1}/1/1 {b + 1}//1 {c - 5}\n" for a, b, c in FACES[2:])
+    return f"# a pyramid\no pyramid\n{places}vn 0 0 1\nf 4 3 2 1\n{sides}".encode()
+
+
+def volume(mesh):
+    """Of a closed surface whose faces are seen counter-clockwise from outside [m^3]."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(float) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.stl", binary()),
+        ("solid.STL", binary(b"solid, says the head of many a binary file")),
+        ("b.stl", ascii_stl()),
+        ("c.obj", obj()),
+    ],
+)
+def test_a_solid_is_the_same_from_every_form_of_file(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    mesh = read(tmp_path / name)
+    assert len(mesh.vertices) == len(CORNERS)  # corners at the same place are one
+    assert volume(mesh) == pytest.approx(VOLUME, rel=1e-6)
+    again = unpack(pack(mesh))
+    assert np.array_equal(again.vertices, mesh.vertices)
+    assert np.array_equal(again.faces, mesh.faces)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("no.stl", None, "no such file"),
+        ("a.step", b"", "expected the path of an .stl or .obj file, got '../a.step'"),
+        ("a.stl", b"", "no STL file"),
+        ("a.stl", binary()[:-7], "no STL file"),
+        ("a.stl", b"solid x\nvertex 1 2 3\nvertex 1 2 3\n", "fewer than three corners"),
+        ("a.stl", b"solid x\nvertex 1 two 3\n", "not three numbers"),
+        ("a.stl", ascii_stl().replace(b"endsolid", 3 * b"vertex nan 0 0\n" + b"endsolid"), "no finite number"),
+        ("a.stl", b"solid x\nendsolid x\n", "no triangles"),
+        ("a.stl", bytes(80) + struct.pack("<I", MOST + 1) + bytes(50 * (MOST + 1)), f"expected at most {MOST}"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: "),
+        ("a.obj", b"v 0 0 0\nf a b c\n", "line 2: "),
+        ("a.obj", obj().replace(b"0.4", b"400").replace(b"0.3", b"300"), "metres along the airframe's axes"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_with_key_file_and_what_would_be_right(tmp_path, name, content, said):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError, match=re.escape(said)) as refused:
+        load(scene(tmp_path, name))
+    text = str(refused.value)
+    assert "airframe.mesh" in text
+    assert name in text
+    assert "\n" not in text
+
+
+def scene(folder, mesh):
+    """`hover` with an airframe in vehicles/ beside it that names a mesh."""
+    (folder / "vehicles").mkdir()
+    text = (SHIPPED / "vehicles" / "delivery_drone.toml").read_text()
+    (folder / "vehicles" / "own.toml").write_text(f'mesh = "../{mesh}"\n{text}')
+    path = folder / "own.toml"
+    path.write_text((SHIPPED / "hover.toml").read_text().replace('"delivery_drone"', '"own"'))
+    return path
+
+
+def test_the_set_up_has_the_triangles_and_the_page_shows_them_without_the_file(tmp_path):
+    (tmp_path / "own.stl").write_bytes(binary())
+    loaded = load(scene(tmp_path, "own.stl"), ["airframe.mass.centre=[0.1, 0.0, 0.0]"])
+    setup = resolve(loaded)
+    (tmp_path / "own.stl").unlink()
+    assert from_resolved(setup.resolved).resolved == loaded.resolved
+    truth = {"pose.position": (0.0, 0.0, 1.0), "pose.orientation": synthetic_flights.LEVEL, "rotor_speed": (0.0,) * 4}
+    flight = synthetic_flights.flight(3, truth=truth, scene=Origin.of_setup(setup).scene)
+    (body,) = motion_3d.motion(flight).bodies
+    assert body.surface.vertices.min(axis=0) == pytest.approx([-0.1, 0.0, 0.0])  # from the centre of mass
+    assert body.surface.vertices.max(axis=0) == pytest.approx([0.3, 0.3, 0.2])
+    assert len(body.surface.faces) == len(FACES)
+    assert (len(body.strokes), len(body.rotors)) == (0, 4)  # instead of arms and feet
+
+
+def test_a_mesh_may_stand_in_the_scene_and_not_in_an_override(tmp_path):
+    (tmp_path / "own.stl").write_bytes(binary())
+    path = tmp_path / "own.toml"
+    path.write_text((SHIPPED / "hover.toml").read_text() + '\n[airframe]\nmesh = "own.stl"\n')
+    assert list(load(path).resolved["meshes"]) == ["own.stl"]
+    with pytest.raises(SceneError, match=r"airframe\.mesh: .*as an override"):
+        load("hover", ["airframe.mesh=own.stl"])
+
+
+def test_a_scene_without_a_mesh_has_nothing_of_it():
+    resolved = load("hover").resolved
+    assert "meshes" not in resolved
+    assert "mesh" not in resolved["airframe"]

@@ -1,0 +1,52 @@
+"""An adapter on the real autopilot in one process: the vehicle flies as fast as it goes while a station talks to it."""
+
+from adapter_harness import Bench
+
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
+from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+
+OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false", "run.duration=1e4"]
+
+
+class Flown(Bench):
+    """A scene's vehicle, its adapter, and whoever has connected."""
+
+    period = 0.04
+
+    def __init__(self, scene="hover", *overrides):
+        setup = resolve(load(scene, [*OPERATED, *overrides]))
+        self.waiting, self.stations = [], []
+        self._interval_ns, self._ticks = setup.interval_ns, round(self.period * setup.rate)
+        self.graph = Graph(setup, create_all(setup, self._given), PAGE)
+        self.adapter = Adapter(setup.beside["mavlink"], self.waiting.append)
+
+    def _given(self, tick):
+        commands = list(self.waiting)
+        self.waiting.clear()
+        return commands
+
+    def station_of(self, kind):
+        """A station that has connected."""
+        station = kind(self)
+        self.stations.append(station)
+        return station
+
+    @property
+    def seconds(self):
+        return self.graph.tick * self._interval_ns * 1e-9
+
+    def step(self, count=1):
+        for _ in range(count):
+            first = self.graph.tick
+            self.graph.advance(first + self._ticks)
+            pages = self.graph.pages(first, first + self._ticks)
+            for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # which moves time on
+                newest = slice(None) if page.topic in (STATUS, COMMAND_ACKS) else slice(-1, None)
+                for tick, payload in zip(page.ticks[newest], page.payloads[newest], strict=True):
+                    self.adapter.take(page.topic, int(tick) * self._interval_ns, payload.tobytes(), self.seconds)
+            for station in self.stations:
+                station.step()

@@ -1,0 +1,98 @@
+"""The one description of a vehicle: from a scene, and from a log; and who may know of what."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from lapwing.services.mavlink.resolve import describe, resolve
+from lapwing.services.scene_resolver import load
+
+FOLDER = Path("services/mavlink")
+
+
+def test_a_scenes_vehicle_is_described_whole():
+    d = describe(
+        load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system=7", "exchange.rate=500"])
+    )
+    assert (d.name, d.system, d.flavour, len(d.rotors), d.tick_ns) == ("bee", 7, "px4", 4, 2_000_000)
+    assert d.sensors == ("barometer", "gps", "imu", "magnetometer", "sonar")
+    assert (d.battery.cells, d.battery.empty_voltage) == (12, 3.0)
+    assert 4.0 < d.battery.charged_voltage < 4.2
+    assert d.max_voltage > 0.0
+    assert d.accepts_commands
+    assert "MIS_TAKEOFF_ALT" in {p.name for p in d.parameters}
+
+
+def test_what_a_scene_lacks_is_not_described():
+    d = describe(load("lapwing/scenes/hover.toml"))
+    assert (d.sensors, d.battery, d.accepts_commands) == ((), None, False)
+
+
+def test_without_an_autopilot_there_is_nothing_to_describe():
+    assert resolve(load("lapwing/scenes/gyrostat_blocked.toml")) is None
+
+
+def test_an_unknown_flavour_names_the_choices():
+    from lapwing.services.mavlink import firmware
+
+    with pytest.raises(ValueError, match=r"unknown flavour 'px'; did you mean px4\? \(flavours: ardupilot, px4\)"):
+        firmware.get("px")
+
+
+SCENE = (
+    "lapwing.cosim.scene",
+    *(f"lapwing.services.common.{name}" for name in ("sections", "exchange", "vehicle", "modules")),
+)
+
+
+def imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{name.name}" for name in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+
+
+def test_the_scene_is_known_to_the_description_alone():
+    for path in FOLDER.rglob("*.py"):
+        if path.name not in ("resolve.py", "config.py"):
+            found = {n for n in imports(path) if n.startswith(SCENE)}
+            assert not found, path
+
+
+def test_handlers_and_telemetry_know_neither_adapter_nor_hub():
+    for path in (*FOLDER.glob("protocols/*.py"), *FOLDER.glob("telemetry/*.py")):
+        assert not {n for n in imports(path) if ".adapter" in n or ".hub" in n or ".endpoint" in n}, path
+
+
+def test_nothing_is_imported_for_types_alone():
+    for path in FOLDER.rglob("*.py"):
+        assert "TYPE_CHECKING" not in path.read_text(), path
+
+
+def test_no_import_cycles():
+    modules = {
+        str(path.with_suffix("")).replace("/", ".").removesuffix(".__init__"): path for path in FOLDER.rglob("*.py")
+    }
+
+    def named(full):
+        return full if full in modules else full.rpartition(".")[0]
+
+    edges = {name: {named(i) for i in imports(path)} & set(modules) - {name} for name, path in modules.items()}
+
+    def visit(name, way):
+        assert name not in way, " -> ".join([*way, name])
+        for other in edges[name]:
+            visit(other, [*way, name])
+
+    for name in modules:
+        visit(name, [])
+
+
+def test_private_members_stay_private():
+    for path in FOLDER.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
+                owner = getattr(node.value, "id", "")
+                assert owner in ("self", "cls"), f"{path}: {owner}.{node.attr}"

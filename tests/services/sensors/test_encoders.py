@@ -1,0 +1,23 @@
+"""The sensors' messages: what they say besides the reading."""
+
+import numpy as np
+import pytest
+
+from lapwing.cosim.diagram.topic_encoder import encode
+from lapwing.kernels.row_packing import to_row
+from lapwing.messages import stamp_ns
+from lapwing.messages import topics as topic
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+
+
+@pytest.mark.parametrize("which", [topic.GPS, topic.GPS_VELOCITY], ids=["fix", "velocity"])
+def test_a_fix_is_stamped_with_its_moment_and_never_before_the_start(which):
+    setup = resolve(load("delivery_mission"))
+    wire = next(w for service in create_all(setup) for w in service.wires if w.topic is which)
+    port = setup.port(wire.port)
+    ticks = wire.period * np.arange(4)
+    rows = np.array([to_row(port.like._replace(age=0.2))] * len(ticks))
+    payloads = [payload.tobytes() for page in encode(wire, port, setup, ticks, rows) for payload in page.payloads]
+    stamps = [stamp_ns(which.message.decode(payload).header) for payload in payloads]
+    assert stamps == [0, 0, 0, 100_000_000]

@@ -1,0 +1,128 @@
+"""Formations: a vehicle's way relative to another one's, against its definition and against itself by differences."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.services.scene_resolver import parse, resolve
+from lapwing.services.trajectory.leader_follower import step
+from tests.cosim.memory_log import fly
+
+SCENE = """
+[run]
+duration = 2.0
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.ground_contact]
+[autopilot]
+gains = "tuned"
+estimator = "truth"
+[[vehicle]]
+name = "leader"
+airframe = "delivery_drone"
+start = [1.0, 0.5]
+[[vehicle.trajectory.phase]]
+name = "climb"
+z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
+[[vehicle.trajectory.phase]]
+name = "turn"
+x = { kind = "minimum_jerk", to = 5.0, duration = 4.0 }
+yaw = { kind = "minimum_jerk", to = 1.5, duration = 4.0 }
+[[vehicle.trajectory.phase]]
+name = "down"
+z = { kind = "minimum_jerk", to = 0.0, duration = 2.0 }
+[[vehicle]]
+name = "wing"
+airframe = "quad_x"
+start = [-2.0, 1.5]
+autopilot = { gains = "quad_x" }
+[vehicle.trajectory]
+follow = "leader"
+[[vehicle.trajectory.phase]]
+name = "beside"
+duration = 3.0
+[[vehicle.trajectory.phase]]
+name = "closer"
+x = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
+yaw = { kind = "minimum_jerk", to = 0.3, duration = 2.0 }
+"""
+
+
+def path(tmp_path, vehicle="wing", *overrides):
+    return resolve(parse(tmp_path / "two.toml", SCENE, overrides)).services["trajectory"].parameters.given[
+        ["leader", "wing"].index(vehicle)
+    ].parameters.core  # fmt: skip
+
+
+def at(core, tick):
+    return step(core, 0.0, tick, ())[1][0]
+
+
+def leading(core, tick):
+    from lapwing.services.trajectory import block as own
+
+    return own.step(core.leader, 0.0, tick, ())[1][0]
+
+
+def test_it_begins_where_the_vehicle_stands_and_lands_there_beside_the_leader(tmp_path):
+    core = path(tmp_path)
+    start, end = at(core, 0), at(core, 2500)
+    assert start.position_world[:2] == pytest.approx((-2.0, 1.5))
+    x, y = -3.0 + 1.0, 1.0
+    turned = (math.cos(1.5) * x - math.sin(1.5) * y, math.sin(1.5) * x + math.cos(1.5) * y)
+    assert end.position_world[:2] == pytest.approx((6.0 + turned[0], 0.5 + turned[1]))
+    assert end.position_world[2] == pytest.approx(start.position_world[2])  # it stands on its own feet
+    assert end.yaw == pytest.approx(1.8)
+    assert (at(core, 1400).final, at(core, 1600).final) == (False, True)
+    assert [at(core, tick).phase for tick in (0, 800)] == [0, 1]
+
+
+def test_in_the_frame_of_the_world_the_way_does_not_turn(tmp_path):
+    core = path(tmp_path, "wing", "vehicle.1.trajectory.frame=world")
+    for tick in (0, 900, 1300, 2500):
+        apart = np.subtract(at(core, tick).position_world, leading(core, tick).position_world)
+        assert apart[1] == pytest.approx(1.0)
+    assert apart[0] == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize("tick", [700, 900, 1100, 1300])
+def test_velocity_and_acceleration_are_the_derivatives_of_what_comes_before(tmp_path, tick):
+    core, h = path(tmp_path), 0.004
+    before, now, after = (at(core, tick + k) for k in (-1, 0, 1))
+    for value, slope in (("position_world", "velocity_world"), ("velocity_world", "acceleration_world")):
+        found = np.subtract(getattr(after, value), getattr(before, value)) / (2.0 * h)
+        assert getattr(now, slope) == pytest.approx(found, abs=2e-4)
+    assert now.yaw_rate == pytest.approx((after.yaw - before.yaw) / (2.0 * h), abs=1e-4)
+
+
+def test_the_vehicle_is_asked_for_it(tmp_path):
+    scene = parse(tmp_path / "two.toml", SCENE)
+    flown = fly(resolve(scene))
+    told, core = flown.view("wing/setpoint"), path(tmp_path)
+    assert told.position[400] == pytest.approx(at(core, 400).position_world)
+    assert flown.messages("wing/setpoint")[400].phase == "beside"
+    assert flown.view("wing/truth").position[-1] == pytest.approx(told.position[-1], abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("vehicle.1.trajectory.follow=lead", "vehicle.1.trajectory.follow: expected one .* its own: leader, got lead"),
+        ("vehicle.0.trajectory.follow=wing", "vehicle.0.trajectory.follow: expected one .* its own: there is none"),
+        ("vehicle.1.trajectory.follow=wing", "vehicle.1.trajectory.follow: expected one that flies"),
+        ("vehicle.0.trajectory.frame=world", "trajectory.frame: there is no leader"),
+    ],
+)  # fmt: skip
+def test_refuses_a_leader_that_is_none(tmp_path, override, message):
+    with pytest.raises(SceneError, match=message):
+        resolve(parse(tmp_path / "two.toml", SCENE, [override]))
+
+
+def test_refuses_phases_that_are_the_leaders_own(tmp_path):
+    text = SCENE.split('[[vehicle.trajectory.phase]]\nname = "beside"')[0]
+    climb = SCENE.split("[[vehicle]]")[1].split("start = [1.0, 0.5]\n")[1]
+    text = text.replace("[[vehicle]]", climb.replace("vehicle.", "") + "[[vehicle]]", 1).replace(climb, "", 1)
+    with pytest.raises(SceneError, match=r"vehicle.1.trajectory.phase: .*the phases are those of leader"):
+        resolve(parse(tmp_path / "two.toml", text))

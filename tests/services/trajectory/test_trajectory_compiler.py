@@ -1,0 +1,159 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.config_error import KeyedError
+from lapwing.services.scene_resolver import load
+from lapwing.services.trajectory import trajectory_compiler
+from lapwing.services.trajectory.phases import Phases
+from lapwing.services.trajectory.polynomial_piece import channel_at, evaluate
+from lapwing.services.trajectory.trajectory_compiler import Compiled
+
+RAMP = {"kind": "ramp", "to": 10.0, "rate": 1.0}
+DELIVERY = [
+    {"name": "climb", "z": RAMP},
+    {"name": "hover", "duration": 5.0},
+    {"name": "forward", "x": RAMP},
+    {"name": "stay", "duration": 5.0},
+    {"name": "left", "y": RAMP},
+    {"name": "stop", "duration": 5.0},
+    {"name": "turn", "yaw": {"kind": "ramp", "to": math.pi / 2, "rate": 0.3}},
+    {"name": "wait", "duration": 5.0},
+    {"name": "descend", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}},
+]
+TURN = math.pi / 2 / 0.3
+
+
+def compile(tables: dict, *origin) -> Compiled:
+    """A trajectory from the tables of a scene."""
+    return trajectory_compiler.compile(Phases.model_validate(tables), *origin)
+
+
+def test_delivery_mission_is_at_each_corner_when_it_should_be():
+    parameters, phases, duration, _ = compile({"phase": DELIVERY}, (0.0, 0.0, 0.35))
+    assert phases == tuple(phase["name"] for phase in DELIVERY)
+    assert duration == pytest.approx(60.0 + TURN, abs=1e-12)
+    corners = {0.0: (0, 0, 0), 10.0: (0, 0, 10), 15.0: (0, 0, 10), 25.0: (10, 0, 10), 40.0: (10, 10, 10)}
+    for t, (x, y, z) in corners.items():
+        assert evaluate(parameters, t).position_world == (x, y, z + 0.35)
+    for k, t in enumerate((0.0, 10.0, 15.0, 25.0, 30.0, 40.0, 45.0, 45.0 + TURN, 50.0 + TURN)):
+        assert evaluate(parameters, t).phase == k
+        assert evaluate(parameters, t + 1e-6).phase == k
+    assert evaluate(parameters, 4.0).velocity_world == (0.0, 0.0, 1.0)
+    assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
+    assert evaluate(parameters, 46.0).yaw_rate == pytest.approx(0.3, rel=1e-15)
+    end = evaluate(parameters, duration)
+    assert (end.position_world, end.yaw, end.velocity_world) == ((10.0, 10.0, 0.35), math.pi / 2, (0.0, 0.0, 0.0))
+
+
+def test_a_phase_lasts_as_long_as_its_longest_channel_and_the_others_hold():
+    phase = {
+        "name": "both",
+        "x": {"kind": "ramp", "to": 1.0, "duration": 2.0},
+        "y": [RAMP, {"kind": "hold", "duration": 3.0}],
+    }
+    parameters, _, duration, _ = compile({"phase": [phase]})
+    assert duration == 13.0
+    assert evaluate(parameters, 5.0).position_world == (1.0, 5.0, 0.0)
+    assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
+
+
+def test_a_step_is_a_jump_that_takes_no_time():
+    parameters, _, duration, _ = compile(
+        {"phase": [{"name": "a", "duration": 1.0}, {"name": "b", "x": {"kind": "step", "to": 2.0}}]}
+    )
+    assert duration == 1.0
+    assert channel_at(parameters.x, 0.999)[0] == 0.0
+    assert channel_at(parameters.x, 1.0)[0] == 2.0
+
+
+SEGMENTS = st.one_of(
+    st.builds(lambda d: {"kind": "hold", "duration": d}, st.floats(0.1, 3.0)),
+    st.builds(lambda to, d: {"kind": "ramp", "to": to, "duration": d}, st.floats(-5.0, 5.0), st.floats(0.1, 3.0)),
+    st.builds(lambda to, d: {"kind": "smoothstep", "to": to, "duration": d}, st.floats(-5.0, 5.0), st.floats(0.1, 3.0)),
+    st.builds(
+        lambda to, d: {"kind": "minimum_jerk", "to": to, "duration": d}, st.floats(-5.0, 5.0), st.floats(0.1, 3.0)
+    ),
+    st.builds(
+        lambda a, d: {"kind": "sine", "amplitude": a, "frequency": 0.7, "duration": d},
+        st.floats(0.1, 2.0),
+        st.floats(0.1, 3.0),
+    ),
+)
+
+
+@given(st.lists(st.tuples(SEGMENTS, SEGMENTS), min_size=1, max_size=6))
+@settings(deadline=None, max_examples=60)
+def test_everything_but_a_step_joins_continuously(pairs):
+    phases = [{"name": str(k), "x": list(pair), "duration": 7.0} for k, pair in enumerate(pairs)]
+    parameters, *_ = compile({"phase": phases})
+    assert all(np.diff(parameters.x.start) > 0.0)
+    for start in parameters.x.start[1:]:
+        assert channel_at(parameters.x, start)[0] == pytest.approx(channel_at(parameters.x, start - 1e-9)[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        (
+            {"phase": [{"name": "a", "duration": 1.0, "z": RAMP}]},
+            "trajectory.phase.0.duration: expected not less than its segments last, 10 s, got 1 s in phase 'a'",
+        ),
+        (
+            {"phase": [{"name": "a", "x": [RAMP, {"kind": "table", "points": [[0.0, 3.0], [1.0, 4.0]]}]}]},
+            "trajectory.phase.0.x.points.0.1: the table starts at 3.0, but the channel is at 10.0: put a ramp",
+        ),
+    ],
+)
+def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
+    with pytest.raises(KeyedError, match=r"\A[^\n]+\Z") as error:
+        compile(spec)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("trajectory={}", "trajectory.phase: missing; expected a list of tables"),
+        ("trajectory.phase=[]", "at least 1"),
+        (
+            "trajectory.phase.0.z.kind=rump",
+            "phase.0.z.kind: unknown kind of segment 'rump'; did you mean ramp? expected",
+        ),
+        ("trajectory.phase.0.z.kind=[3.0]", "phase.0.z.kind: unknown kind of segment [3.0]; expected one of chirp"),
+        (
+            "trajectory.phase.0.z=3.0",
+            "trajectory.phase.0.z: expected a table with a kind of segment (chirp, hold, mini",
+        ),
+        (
+            "trajectory.phase.0.z={kind='hold', duration=-1}",
+            "phase.0.z.duration: expected a number above 0 [s], got -1",
+        ),
+        (
+            "trajectory.phase.0.z=[{kind='hold', duration=-1}]",
+            "phase.0.z.0.duration: expected a number above 0 [s], got -1",
+        ),
+        ("trajectory.phase.0.z={kind='ramp', to=1.0}", "either rate or duration"),
+        ("trajectory.phase.0.q=1.0", "trajectory.phase.0.q"),
+        ("trajectory.phase.0.name=hover", "two phases are named 'hover'"),
+        ("trajectory.phase.0.duration=1.0", "expected not less than its segments last, 3 s, got 1 s in phase 'climb'"),
+        ("trajectory.phase.0.z={kind='ramp', to=inf, rate=1.0}", "finite"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(override, message):
+    with pytest.raises(SceneError, match=r"\A--set trajectory[^\n]+\Z") as error:
+        load("hover", [override])
+    assert message in str(error.value)
+
+
+def test_the_last_landing_is_known():
+    up = {"name": "up", "z": {"kind": "ramp", "to": 2.0, "rate": 1.0}}
+    down = {"name": "down", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}}
+    again = [{**up, "name": "up again"}, {**down, "name": "down again"}, {"name": "stand", "duration": 1.0}]
+    assert compile({"phase": [up, down]}).final == 1
+    assert compile({"phase": [up, down, *again]}).final == 3
+    assert compile({"phase": [up]}).final == 1  # never lands: no phase is the last one on the ground

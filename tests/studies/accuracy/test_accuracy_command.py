@@ -1,0 +1,121 @@
+"""The study on a problem of one number with known errors and times, and the command around it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from lapwing.studies.accuracy import accuracy_command, console_output
+from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.targets import find, scene_of
+from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, telling
+from lapwing.studies.accuracy.work_precision_plot import draw
+from lapwing.studies.terminal import console
+
+
+def decay():
+    """x' = -x to t = 1 by Euler's method in Python; and a way that always fails."""
+
+    def euler(h):
+        x = 1.0
+        for _ in range(round(1.0 / h)):
+            x -= h * x
+        return x
+
+    def read(h, x):
+        return Outcome(np.array([0.0, 1.0]), np.array([[1.0], [x]]), 0.0, round(1.0 / h))
+
+    steps = [0.1 / 2**k for k in range(5)]
+    ways = [
+        Way("euler", 1, "s", steps, lambda h: lambda: euler(h), read, lambda: None),
+        Way("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
+    ]
+    value = {"value": lambda t, y: y[:, 0]}
+    return Problem("decay", "s", 1.0, ways, lambda: np.array([np.exp(-1.0)]), "closed form", value)
+
+
+def test_measured_errors_are_those_of_the_method():
+    points = measure(decay())
+    assert [p.way for p in points] == ["euler"] * 5
+    for p in points:
+        exact = np.exp(-1.0)
+        assert p.error == pytest.approx(abs((1 - p.setting) ** (1 / p.setting) - exact) / (1 + exact), rel=1e-9)
+        assert p.evaluations == round(1.0 / p.setting)
+        assert p.drift["value"] == pytest.approx(1 - (1 - p.setting) ** (1 / p.setting))
+        assert p.time > 0.0
+
+
+def points():
+    drift = {"manifold": 0.0}
+    return [
+        Point("one", 4, "s", 0.1, 1e-3, 1e-5, 40, drift),
+        Point("one", 4, "s", 0.05, 6e-5, 2e-5, 80, drift),
+        Point("two", 5, "tol", 1e-6, 5e-7, 3e-5, 90, drift),
+        Point("two", 5, "tol", 1e-3, 5e-4, 2.5e-5, 50, drift),
+    ]
+
+
+def test_the_cheapest_that_meets_a_target_is_named():
+    assert cheapest(points(), 1e-3).setting == 0.1
+    assert cheapest(points(), 2e-4).setting == 0.05
+    assert cheapest(points(), 1e-6).way == "two"
+    with pytest.raises(ValueError, match=r"--target 1e-09: no method meets this error; the smallest .* 5e-07, by two"):
+        cheapest(points(), 1e-9)
+    assert [p.setting for p in telling(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
+
+
+@pytest.mark.parametrize("goal", [0.0, -1e-3, float("nan"), float("inf")])
+def test_a_goal_that_is_no_error_is_refused(goal):
+    with pytest.raises(ValueError, match=r"--target .*: expected an error above 0"):
+        check_target(goal)
+
+
+def test_a_misspelt_target_lists_the_choices():
+    with pytest.raises(
+        ValueError, match=r"unknown problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? \(problems: .*free"
+    ):
+        find("gyrostat_bloked")
+
+
+def test_a_scene_goes_by_its_name_where_no_problem_has_it():
+    assert scene_of("delivery_paper", ["solver.step=0.002"]).lookup("solver.step") == 0.002
+    assert scene_of("gyrostat_blocked", []) is None
+    assert scene_of("lapwing/scenes/gyrostat_blocked.toml", []).name == "gyrostat_blocked"
+
+
+def test_json_and_picture(tmp_path):
+    console_output.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], [])
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert data["cheapest"]["way"] == "one"
+    assert data["points"][2] == {
+        "way": "two", "order": 5, "unit": "tol", "setting": 1e-6, "error": 5e-7, "time": 3e-5, "evaluations": 90,
+        "drift": {"manifold": 0.0},
+    }  # fmt: skip
+    draw(tmp_path / "a.png", "decay", points())
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_command_prints_the_choice(capsys, tmp_path, monkeypatch):
+    problem = find("os4_experiment_1")
+    few = [way for way in problem.ways if way.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
+    monkeypatch.setattr(accuracy_command, "find", lambda target: problem._replace(ways=few))
+    found = accuracy_command.study(accuracy_command.console(), "os4_experiment_1", [], 1e-3)
+    accuracy_command.show(accuracy_command.console(), found)
+    accuracy_command.write_json(tmp_path / "a.json", found)
+    printed = capsys.readouterr().out
+    assert "OS4 quadrotor: experiment 1" in printed
+    assert "cheapest: " in printed
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["cheapest"]["error"] <= 1e-3
+    assert {"rkmk54", "lie_euler", "erk4m"} == {p["way"] for p in found["points"]}
+
+
+def test_the_table_fits_80_columns_and_cuts_no_digit(capsys):
+    drift = dict.fromkeys(("manifold", "energy", "vertical momentum"), 1.23e-123)
+    wide = Point("implicit_lie_midpoint", 2, "s", 5.7220458984375e-05, 3.2e-13, 0.15, 12_345_678, drift)
+    console_output.show(console(80), decay(), [wide], wide)
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 80
+    assert "…" not in said
+    assert "5.72e-05 s" in said
+    assert "12345678" in said

@@ -1,0 +1,67 @@
+"""Three errors apart, on flights whose answer is known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_flights
+
+from lapwing.services.scene_resolver import load
+from lapwing.studies.accuracy.error_budget import SOURCES, difference, errors
+from lapwing.studies.simulate import fly
+
+ROOT = Path(__file__).parents[3]
+
+
+def turned(angle):
+    return [0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]
+
+
+def flight(rate, position, orientation):
+    truth = {"pose.position": position, "pose.orientation": orientation}
+    return synthetic_flights.flight(len(position), rate, truth=truth)
+
+
+def test_difference_at_common_ticks():
+    fine = flight(10, np.array([[0.1 * k, 0, 0] for k in range(7)]), turned(0.0))
+    coarse = flight(5, fine.truth.position[::2] + np.array([0, 0.3, 0]), turned(1e-9))
+    for one, other in ((fine, coarse), (coarse, fine)):
+        position, angle, largest = difference(one, other)
+        assert (position, largest) == pytest.approx((0.3, 0.3))
+        assert angle == pytest.approx(1e-9)
+    opposite = flight(10, fine.truth.position, -fine.truth.orientation)
+    assert difference(fine, opposite) == (0.0, 0.0, 0.0)
+
+
+def test_a_flight_in_memory_is_the_plants_own():
+    flown = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
+    assert len(flown.truth) == 101
+    assert flown.setup.interval == 0.004
+    t = 0.4
+    assert flown.truth.position[-1, 1] > 0.0  # experiment 2 moves to +y
+    assert abs(flown.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
+
+
+def test_errors_fall_with_what_causes_them():
+    scene = load(ROOT / "lapwing/scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
+    parts = errors(scene)
+    by = {source: [p for p in parts if p.source == source] for source in SOURCES}
+    steps = [p.position for p in by["plant step"]]
+    assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.2)  # second order
+    exchange = [p.position for p in by["exchange interval"]]
+    assert exchange[0] > exchange[1] > exchange[2] > 0.0
+    delay = [p.position for p in by["coupling delay"]]
+    assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # one interval of delay, first order
+
+
+def test_an_accuracy_is_kept_from_take_off_to_rest():
+    """Steps of 4 ms and the contact at the accuracy, against steps of an eighth and a contact 1000 times finer."""
+    coarse, fine = (
+        fly(load("hover", [f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]))
+        for step, accuracy in ((0.004, 1e-5), (0.0005, 1e-8))
+    )
+    contact = fine.truth.ground_contact
+    assert contact[0]
+    assert contact[-1]
+    assert not contact.all()
+    assert difference(coarse, fine)[2] < 1e-5

@@ -1,0 +1,109 @@
+"""An accuracy instead of a step: what is chosen meets it, is remembered, and is what all services fly."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.services.plant.schema import Solver, method
+from lapwing.services.scene_resolver import load
+from lapwing.studies.accuracy import integrate, scenes, solver_selection
+from lapwing.studies.accuracy.work_precision import Point
+
+ROOT = Path(__file__).parents[3]
+BLOCKED = ROOT / "lapwing/scenes/gyrostat_blocked.toml"
+OS4 = ROOT / "lapwing/scenes/os4_motors.toml"
+POINTS = [
+    Point("rkmk2", 2, "s", 0.004, 3e-4, 1e-5, 100, {}),
+    Point("rkmk2", 2, "s", 0.002, 8e-5, 2e-5, 200, {}),
+    Point("rkmk4", 4, "s", 0.004, 1e-7, 1.5e-5, 400, {}),
+]
+
+
+def scene(tmp_path, solver):
+    """OS4 without its own solver."""
+    text = (ROOT / "lapwing/scenes/os4_experiment_2.toml").read_text()
+    head, _, rest = text.partition("[solver]")
+    path = tmp_path / "os4.toml"
+    path.write_text(f"{head}[solver]\n{solver}\n[exchange]{rest.partition('[exchange]')[2]}")
+    return path
+
+
+@pytest.fixture
+def measured(monkeypatch, tmp_path):
+    """Counts measurements, whose points are given; the cache is empty."""
+    calls = []
+    monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: calls.append(problem.title) or list(POINTS))
+    return calls
+
+
+@pytest.mark.parametrize(
+    ("solver", "chosen"),
+    [
+        ("accuracy = 1e-4", ['solver.integrator="rkmk4"', "solver.step=0.004"]),
+        ("accuracy = 1e-3", ['solver.integrator="rkmk2"', "solver.step=0.004"]),
+        ('accuracy = 1e-4\nintegrator = "rkmk2"', ['solver.integrator="rkmk2"', "solver.step=0.002"]),
+        ("accuracy = 1e-4\nstep = 0.001", []),
+        ("step = 0.001", []),
+    ],
+)
+def test_the_cheapest_that_meets_the_accuracy_is_set(solver, chosen, measured, tmp_path):
+    path = scene(tmp_path, solver)
+    found = solver_selection.overrides(load(path), lambda text: None)
+    assert found == chosen
+    decided = load(path, found)
+    assert not decided[Solver].undecided
+    method(decided)
+
+
+def test_it_is_measured_once_for_the_same_physics(measured, tmp_path):
+    path, said = scene(tmp_path, "accuracy = 1e-4"), []
+    first = solver_selection.overrides(load(path), said.append)
+    assert solver_selection.overrides(load(path), said.append) == first
+    solver_selection.overrides(load(path, ["solver.accuracy=1e-3"]), said.append)
+    assert len(measured) == len(said) == 1
+    solver_selection.overrides(load(path, ["os4.mass=0.7"]), said.append)
+    assert len(measured) == 2
+
+
+def test_a_damaged_cache_and_one_that_cannot_be_written_are_no_obstacle(measured, monkeypatch, tmp_path):
+    path = scene(tmp_path, "accuracy = 1e-4")
+    first = solver_selection.overrides(load(path), lambda text: None)
+    (kept,) = (tmp_path / "cache" / "accuracy").glob("*.json")
+    for damage in (b"\xff", b"[{}]", b"[1", b"7", b"[]"):
+        kept.write_bytes(damage)
+        assert solver_selection.overrides(load(path), lambda text: None) == first
+    assert len(measured) == 6
+    monkeypatch.setattr(solver_selection, "cache_folder", lambda: Path("/dev/null/none"))
+    assert solver_selection.overrides(load(path), lambda text: None) == first
+
+
+def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
+    path = scene(tmp_path, "accuracy = 1e-12")
+    with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: 1e-12: no method meets .* 1e-07, by rkmk4"):
+        solver_selection.overrides(load(path), lambda text: None)
+    with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: what `lapwing run` chooses .* --set"):
+        method(load(path))
+    with pytest.raises(SceneError, match=r"solver.accuracy: expected a number above 0, got 0"):
+        load(path, ["solver.accuracy=0"])
+
+
+def test_measured_in_earnest_on_a_scene(monkeypatch, tmp_path):
+    monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
+    few = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled
+    monkeypatch.setattr(integrate.integrators, "fitting", lambda p, x: few)
+    path = scene(tmp_path, "accuracy = 1e-6")
+    found = solver_selection.overrides(load(path), lambda text: None)
+    points = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
+    (chosen,) = [p for p in points if found == [f'solver.integrator="{p["way"]}"', f"solver.step={p['setting']!r}"]]
+    assert chosen["error"] <= 1e-6
+    assert chosen["time"] == min(p["time"] for p in points if p["error"] <= 1e-6)
+
+
+def test_a_model_that_cannot_be_measured_is_named(monkeypatch):
+    other = load(OS4)
+    monkeypatch.delattr("lapwing.services.plant.models.os4.system")
+    with pytest.raises(ValueError, match=r"os4_motors.toml: vehicle.model: the integrators of os4 cannot be compared"):
+        scenes.problem(other)

@@ -1,0 +1,133 @@
+"""The plots of a campaign's report, of tables that are made up."""
+
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from lapwing.studies.campaign import campaign_plots
+from lapwing.studies.campaign.campaign_plots import errors, matters, parallel
+from lapwing.studies.campaign.distributions import uniform
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.results import Results
+from lapwing.studies.campaign.statistics import Interval, has_sobol
+from lapwing.studies.metrics import FIGURES
+from lapwing.studies.report import matplotlib_figure
+
+KEYS = ("a", "b")
+MANY = tuple("abcdefghijkl")
+
+
+def table(runs, sweep=None, keys=KEYS, **values):
+    """The results of a campaign over some parameters; figures that are not given are NaN."""
+    made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
+    drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in keys}
+    kinds = {"run": int, "seed": int, **dict.fromkeys(keys, float), "success": bool}
+    kinds |= {name: str if name in ("verdict", "told") else float for name in FIGURES}
+    found = {name: np.full(runs, np.nan) for name in kinds}
+    found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "verdict": np.full(runs, "landed", object)}
+    about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
+    arrays = found | drawn | {name: of(drawn) for name, of in values.items()}
+    return Results(SimpleNamespace(arrays=lambda: arrays, plan=made, about=about, kinds=kinds))
+
+
+def bars(plot, panel, aim):
+    """Length of the bars of a panel of `matters`, by parameter."""
+    (found,) = [p for p in plot.panels if p.title == aim and p.x_label.startswith(panel)]
+    return {bar.lane: bar.end - bar.start for bar in found.marks}
+
+
+def test_what_some_runs_do_not_tell_matters_for_the_others():
+    def speed(drawn):
+        return np.where(drawn["b"] < 0.5, drawn["a"], np.nan)  # half of the runs never touch down
+
+    plot = matters(table(400, **{"touchdown.speed": speed, "energy": lambda drawn: drawn["b"]}))
+    assert {panel.title for panel in plot.panels} == {"touchdown.speed", "energy"}
+    assert bars(plot, "rank", "touchdown.speed")["a"] == pytest.approx(1.0)
+    assert abs(bars(plot, "rank", "touchdown.speed")["b"]) < 0.2
+    assert bars(plot, "rank", "energy") == pytest.approx({"a": 0.0, "b": 1.0}, abs=0.15)
+
+
+@pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
+def test_a_parameter_that_all_who_tell_have_in_common_has_no_index():
+    def speed(drawn):
+        drawn["b"][:] = np.where(drawn["b"] < 0.5, 0.25, drawn["b"])
+        return np.where(drawn["b"] == 0.25, drawn["a"], np.nan)
+
+    found = bars(matters(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
+    assert set(found) == {"a"}
+    assert found["a"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_sobol_indices_are_not_told_of_what_goes_together(tmp_path):
+    lines = [f"{k / 100},{k / 50}" for k in range(100)]
+    (tmp_path / "s.csv").write_text("\n".join(["a,b", *lines]))
+    plot = matters(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
+    assert [panel.x_label for panel in plot.panels] == ["rank correlation"]
+    assert "which those of a sweep are not" in plot.caption
+
+
+def test_what_is_left_out_of_many_runs_is_no_value_of_a_grid():
+    lots = table(3000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(3000) % 10  # of which every tenth run has the same
+    (good,) = parallel(lots).panels[0].marks
+    lines = good.y.reshape(-1, 4)[:, :3]
+    assert lines.shape == (300, 3)
+    assert len(np.unique(lines[:, 1])) == 10
+
+
+def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
+    asked = []
+    monkeypatch.setattr(campaign_plots, "has_sobol", lambda: True)
+    monkeypatch.setattr(
+        campaign_plots, "sobol", lambda x, y, names: asked.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names)
+    )
+    monkeypatch.setattr(campaign_plots, "MOST", 100)
+    lots = table(2000, energy=lambda drawn: drawn["b"])
+    lots.columns["b"][:] = np.arange(2000) % 10
+    matters(lots)
+    assert asked[0].shape == (100, 2)
+    assert len(np.unique(asked[0][:, 1])) == 10
+
+
+def test_long_keys_stand_beside_each_other():
+    assert campaign_plots._broken("effects.wind_random.mean.0") == "effects.\nwind_random.\nmean.0"
+    assert campaign_plots._broken("vehicle.mass") == "vehicle.mass"
+    assert campaign_plots._broken("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
+
+
+def test_errors_stand_as_shares_beside_what_is_required():
+    found = table(11, **{"rmse.x": lambda drawn: np.arange(11.0), "rmse.roll": lambda drawn: np.arange(11.0)})
+    found.folder.about["success"] = ["rmse.roll < 0.1"]
+    roll, x = sorted(errors(found).panels, key=lambda panel: panel.x_label)
+    assert (x.x_label, x.marks[0].x.tolist()) == ("rmse.x [m]", list(range(11)))
+    assert x.marks[0].y[-1] == 1.0
+    assert roll.marks[1].x == pytest.approx(np.degrees([0.1, 0.1]))
+
+
+def test_of_many_parameters_those_that_matter_are_drawn_and_the_others_named():
+    found = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
+    assert len(bars(matters(found), "rank", "energy")) == len(MANY)
+    for draw in (campaign_plots.success, parallel):
+        plot = draw(found)
+        told = plot.caption.partition("Left out, as they go least with it: ")[2].rstrip(".").split(", ")
+        assert len(told) == len(MANY) - campaign_plots.KEYS
+        assert not {"k", "l"} & set(told)
+    assert [panel.x_label for panel in campaign_plots.success(found).panels] == [key for key in MANY if key not in told]
+
+
+def test_on_paper_numbers_below_panels_beside_each_other_do_not_touch():
+    rmse = {f"rmse.{axis}": lambda drawn: 0.01 + 0.16 * drawn["a"] for axis in ("x", "y", "z")}
+    with matplotlib_figure.styled():
+        canvas = FigureCanvasAgg(matplotlib_figure.figure(errors(table(50, **rmse))))
+        canvas.draw()
+        boxes = [
+            label.get_window_extent()
+            for axes in canvas.figure.axes
+            for label in axes.get_xticklabels()
+            if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
+        ]
+    assert len(boxes) >= 9
+    assert not [1 for a, b in combinations(boxes, 2) if a.padded(2.0).overlaps(b)]

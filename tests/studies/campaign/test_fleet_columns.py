@@ -1,0 +1,110 @@
+"""Campaigns of fleets: the worst of the vehicles in the columns of a run, and each by its name."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lapwing.cli.main import app
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.campaign.campaign_config import TOPICS
+from lapwing.studies.campaign.campaign_plots import errors, touchdown
+from lapwing.studies.campaign.folder import read
+from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.results import Results
+from lapwing.studies.campaign.runs import row_of
+from lapwing.studies.metrics import figures
+from lapwing.studies.report.plot import NotRecordedError
+from lapwing.studies.simulate import fly_each
+from tests.cosim.memory_log import fly
+
+SHORT = ("run.duration=2.0", 'vehicle.2.success.require=["max_tilt < 0.001"]')
+VARIED = [
+    "--vary",
+    "vehicle.0.airframe.mass.total=uniform(9.5,10.5)",
+    "--vary",
+    "effects.wind_constant.velocity.0=uniform(0,3)",
+]
+
+
+def lapwing(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert "Traceback" not in result.output
+    return result.exit_code, result.output
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("campaign") / "fleet"
+    sets = [part for text in SHORT for part in ("--set", text)]
+    code, said = lapwing("campaign", "fleet", *sets, *VARIED, "--runs", 3, "--workers", 1, "--out", path)
+    assert code == 0, said
+    return path, said
+
+
+def test_flights_of_a_fleet_are_those_of_its_vehicles():
+    setup = resolve(load("fleet", ["run.duration=1.0"]))
+    flights, log = fly_each(setup, TOPICS), fly(setup)
+    assert [flight.vehicle for flight in flights] == ["left", "right", "scout"]
+    for flight in flights:
+        assert (flight.truth.position == log.view(f"{flight.vehicle}/truth").position).all()
+        assert (flight.setpoint.position == log.view(f"{flight.vehicle}/setpoint").position).all()
+        assert flight.setup.vehicle == flight.vehicle
+        assert set(flight.fleet) == {"left", "right", "scout"}
+
+
+def test_a_row_has_the_worst_of_the_vehicles_and_each_of_them(folder):
+    path, said = folder
+    found = Results(read(path))
+    assert found.vehicles == ["left", "right", "scout"]
+    for name in ("rmse.x", "max_tilt", "max_distance"):
+        each = [found[f"{vehicle}.{name}"] for vehicle in found.vehicles]
+        assert (found[name] == np.max(each, axis=0)).all()
+    assert found["energy"] == pytest.approx(sum(found[f"{vehicle}.energy"] for vehicle in found.vehicles))
+    assert not found["success"].any()
+    assert found["left.success"].all()
+    assert not found["scout.success"].any()
+    assert all(text.startswith("scout: Timed out") for text in found["told"])
+    assert 4.0 < found["nearest"].min() < 4.3  # they stand 4.24 m apart
+    assert "Nearest of any two vehicles" in said
+
+
+def test_the_report_shows_every_vehicle(folder):
+    path, _ = folder
+    page, found = (path / "report.html").read_text(), Results(read(path))
+    for vehicle in found.vehicles:
+        assert f'<th scope="row">{vehicle}</th>' in page
+    lines = {mark.name: mark for mark in errors(found).panels[0].marks}
+    assert set(lines) == {"left", "right", "scout"}
+    for vehicle, line in lines.items():
+        assert np.array_equal(line.x, np.sort(found[f"{vehicle}.rmse.x"]))
+    with pytest.raises(NotRecordedError, match="no vehicle touches down"):
+        touchdown(found)
+
+
+def test_what_varies_reaches_the_vehicle_that_it_names(folder):
+    found = Results(read(folder[0]))
+    masses = found["vehicle.0.airframe.mass.total"]
+    assert len(set(masses)) == 3
+    # who climbs with more mass takes more energy
+    assert (np.argsort(masses) == np.argsort(found["left.energy"])).all()
+    assert json.loads((folder[0] / "campaign.json").read_text())["vehicles"] == found.vehicles
+
+
+def test_a_run_is_its_figures_and_the_same_each_time():
+    given = plan("fleet", SHORT, runs=2)
+    rows = {}
+    first = [row_of(given, run, rows) for run in (0, 1, 0)]
+    assert repr(first[0]) == repr(first[2])
+    assert first[0]["end_state"] != first[1]["end_state"]
+    flights = fly_each(resolve(load("fleet", [*SHORT, "run.seed=1", "rates.estimate=250"])), TOPICS)
+    assert figures(flights[1])["rmse.z"] == first[0]["right.rmse.z"]
+
+
+def test_a_run_is_flown_again_to_the_bit(folder, tmp_path):
+    code, said = lapwing(
+        "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single", "--log", tmp_path / "a.mcap"
+    )
+    assert "the same end, to the bit" in said
+    assert code == 4  # as it had failed

@@ -1,0 +1,52 @@
+"""Flights made up from columns, whose figures are known."""
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import Setup
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.topic_view import TopicView
+
+LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+
+
+def setup(ticks, rate=100, **resolved):
+    return Setup("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "sequential", "drone1", {}, {}, resolved)
+
+
+def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
+    """A flight of so many ticks; of each topic the columns by dotted name, a value standing for one at every tick."""
+    views = {}
+    for name, columns in topics.items():
+        rows = {}
+        for field, value in columns.items():
+            column = np.asarray(value)
+            rows[field] = column if column.shape[:1] == (ticks,) else np.broadcast_to(column, (ticks, *column.shape))
+        views[name] = TopicView(np.arange(ticks) * (10**9 // rate), rows)
+    return Flight(views, Origin.of_setup(setup(ticks, rate, **(scene or {}))), failure, diverged)
+
+
+def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):
+    """A flight along x [m], level unless an attitude is given, that takes so much power [W]."""
+    x = np.asarray(x, float)
+    truth = {
+        "pose.position": np.column_stack([x, 0.0 * x, 0.0 * x]),
+        "pose.orientation": turned,
+        "motor_power": (power,),
+    }
+    return flight(len(x), rate, failure, truth=truth)
+
+
+def differences(a, b, topics):
+    """Topic and field of every column that is not the same to the bit in two flights."""
+    found = []
+    for topic in topics:
+        one, other = a.topic(topic), b.topic(topic)
+        found += [(topic, "times")] if not np.array_equal(one.times, other.times) else []
+        found += [(topic, field) for field in set(one.fields) ^ set(other.fields)]
+        found += [(topic, f) for f in one.fields if f in other.fields and _bits(one[f]) != _bits(other[f])]
+    return found
+
+
+def _bits(column):
+    return column.tolist() if column.dtype == object else (column.dtype, column.shape, column.tobytes())

@@ -1,0 +1,118 @@
+"""One type for a flight, whether it was recorded or flown in memory."""
+
+import pickle
+
+import numpy as np
+import pytest
+import synthetic_flights
+
+from lapwing.cosim.config.provenance import attachments, metadata
+from lapwing.cosim.config.serialise import digest
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE, run_single
+from lapwing.cosim.log import LogWriter
+from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.messages.topics import SETPOINT, TRUTH
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.flight_data import Flight
+from lapwing.studies.simulate import fly
+
+SCENE = "hover"
+TICKS = 500
+UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return resolve(load(SCENE, ["run.duration=2.0"]))
+
+
+@pytest.fixture(scope="module")
+def in_memory(run):
+    return fly(run)
+
+
+@pytest.fixture(scope="module")
+def recorded(run, tmp_path_factory):
+    path = tmp_path_factory.mktemp("flight") / "hover.mcap"
+    with LogWriter(path, metadata(run, "single"), attachments(run, {})) as writer:
+        run_single(Graph(run, create_all(run), PAGE), Recording(writer, run))
+    return Flight.read(path)
+
+
+def test_a_log_and_memory_say_the_same(recorded, in_memory):
+    assert set(in_memory.topics) == set(recorded.topics) - {"wall_time"}
+    assert synthetic_flights.differences(in_memory, recorded, in_memory.topics) == []
+    assert in_memory.digest == recorded.digest != ""
+    assert in_memory.rmse == recorded.rmse
+    assert in_memory.energy == recorded.energy
+    assert digest(recorded.setup) == digest(in_memory.setup)
+    assert recorded.origin.scene == in_memory.origin.scene
+    assert recorded.metadata["setup"] == in_memory.metadata["setup"]
+
+
+def test_only_what_is_wanted_is_kept(run):
+    found = fly(run, (TRUTH, SETPOINT))
+    assert found.topics == ["setpoint", "truth"]
+    with pytest.raises(ValueError, match="hover: has no topic status; it has setpoint, truth"):
+        found.status  # noqa: B018
+
+
+def test_only_the_ports_that_are_asked_for_are_deep(run):
+    graph = Graph(run, create_all(run), 64, {"truth"})
+    graph.advance(run.last_tick + 1)
+    deep, shallow = graph.all_rows("truth", 1), graph.rows("setpoint", np.arange(64))
+    assert len(deep) == TICKS + 1
+    assert len(np.unique(deep[:, 2])) > 100  # the height at every tick, from the first on
+    assert shallow.shape[0] == 64
+    assert graph.rows("setpoint", np.array([0]))[0].tolist() != deep[0].tolist()
+    assert graph.rows("setpoint", np.array([0])).tolist() == graph.rows("setpoint", np.array([128])).tolist()  # a ring
+
+
+def test_a_flight_goes_from_process_to_process(run):
+    found = fly(run, (TRUTH,))
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.truth.position, found.truth.position)
+    assert again.energy == found.energy
+
+
+def test_a_failure_is_told():
+    found = fly(load("gyrostat_feedback", ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]))
+    assert "not finite" in found.failure
+    assert np.isfinite(found.truth.position).all()
+
+
+def ended(**truth):
+    """A flight whose autopilot says that it has landed."""
+    columns = {
+        "pose.position": np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 2.0), 10),
+        "pose.orientation": synthetic_flights.LEVEL,
+        "velocity": (0.0, 0.0, 0.0),
+        "ground_contact": True,
+    }
+    return synthetic_flights.flight(10, truth=columns | truth, status={"finished": True, "landed": True})
+
+
+def test_landed_means_upright_slow_and_in_contact():
+    assert ended().landed
+    assert not ended(**{"pose.orientation": UPSIDE_DOWN}).landed
+    half = np.radians(40.0) / 2.0
+    assert not ended(**{"pose.orientation": (np.sin(half), 0.0, 0.0, np.cos(half))}).landed
+    assert not ended(velocity=(0.4, 0.4, 0.0)).landed
+    assert not ended(ground_contact=False).landed
+    stood = np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 0.36), 10)  # a plant that tells of no contact
+    assert ended(**{"ground_contact": False, "pose.position": stood}).landed
+
+
+def test_landed_needs_the_autopilots_word():
+    truth = {"pose.position": (0.0, 0.0, 0.0), "pose.orientation": synthetic_flights.LEVEL, "velocity": (0.0, 0.0, 0.0),
+             "ground_contact": True}  # fmt: skip
+    assert not synthetic_flights.flight(10, truth=truth).landed
+    assert not synthetic_flights.flight(10, truth=truth, status={"finished": False, "landed": True}).landed
+    assert not synthetic_flights.flight(10, truth=truth, status={"finished": True, "landed": False}).landed
+
+
+def test_a_flight_lands(in_memory):
+    assert not in_memory.landed  # two seconds are not enough
+    assert fly(load(SCENE)).landed

@@ -1,0 +1,68 @@
+"""What happened in flights made up, as a list."""
+
+import numpy as np
+import synthetic_flights
+
+TICKS, RATE = 500, 100
+T = np.arange(TICKS) / RATE
+SCENE = {
+    "airframe": {"motor": {"max_voltage": 40.0}},
+    "effects": {"rotor_damage": {"rotor": 2, "time": 2.5, "remaining_thrust": 0.3}},
+    "sensors": {"gps": {"faults": [{"kind": "dropout", "start": 2.0, "stop": 3.0}]}, "imu": {"preset": "ideal"}},
+    "multibody": {"event": [{"time": 9.0, "propeller": 1, "becomes": "torn_off"}]},
+}
+
+
+def flown():
+    """Up at 1 s; two motors at their limit from 2 s on for 0.2 s; a failsafe at 3 s; down at 4 s."""
+    flying = (T >= 1.0) & (T < 4.0)
+    voltage = np.full((TICKS, 4), 20.0)
+    voltage[200:220, [0, 2]] = 40.0
+    truth = {
+        "pose.position": (0.0, 0.0, 0.35),
+        "pose.orientation": synthetic_flights.LEVEL,
+        "velocity": np.where(flying, -0.5, 0.0)[:, None] * np.array([0.0, 0.0, 1.0]),
+        "ground_contact": ~flying,
+        "motor_voltage": voltage,
+    }
+    failsafe = (T >= 3.0) & (T < 4.5)
+    status = {
+        "armed": flying,
+        "landed": ~flying,
+        "finished": T > 4.5,
+        "mode": np.where(T < 3.0, "mission", "land"),
+        "phase": "",
+        "failsafe": failsafe,
+        "text": np.where(failsafe, "a motor has failed", ""),
+        "failed_motor": np.where(T >= 2.8, 2, 0),
+        "battery_warning": np.where(T >= 3.5, 1, 0),
+    }
+    setpoint = {"phase": np.where(T < 2.0, "climb", "hover"), "position": (0.0, 0.0, 0.0), "yaw": 0.0}
+    actuators = {"armed": flying, "attitude_reference": (0.0, 0.0, 0.0)}
+    return synthetic_flights.flight(
+        TICKS, RATE, scene=SCENE, truth=truth, status=status, setpoint=setpoint, actuators=actuators
+    )
+
+
+def test_everything_that_happened_is_told_in_its_order():
+    assert [tuple(event) for event in flown().events] == [
+        (0.0, "mode", "mission"),
+        (0.0, "phase", "climb"),
+        (1.0, "arming", "armed"),
+        (1.0, "contact", "leaves the ground"),
+        (2.0, "fault", "gps: dropout until 3 s"),
+        (2.0, "phase", "hover"),
+        (2.0, "motors", "motors 1, 3 at 40 V for 0.20 s, 6.7 % of the flight"),
+        (2.5, "fault", "rotor 2 keeps 30 % of its thrust"),
+        (2.8, "fault", "motor 2 noticed to have failed"),
+        (3.0, "failsafe", "a motor has failed"),
+        (3.0, "mode", "land"),
+        (3.5, "battery", "low"),
+        (4.0, "arming", "disarmed"),
+        (4.0, "contact", "touches the ground at 0.50 m/s"),
+        (4.5, "failsafe", "a motor has failed: over"),
+    ]
+
+
+def test_without_an_autopilot_there_is_nothing_to_tell():
+    assert synthetic_flights.moved([0.0, 1.0]).events == []

@@ -1,0 +1,58 @@
+"""A flight step by step is the flight: its messages, and its events."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import lapwing
+from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.services.common.event_kinds import KINDS
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.live_flight import LiveFlight, new_events
+
+STEP = 50_000_000  # [ns]
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """Of the first seconds of a mission, whose services hand over at different times."""
+    setup = resolve(load("hover", {"run.duration": 4.0}))
+    graph = Graph(setup, create_all(setup), PAGE)
+    live, found, held = LiveFlight(setup), [], []
+    while not graph.ended:
+        before = graph.tick
+        graph.advance(min(graph.tick + 30, setup.last_tick + 1))
+        pages = list(graph.pages(before, graph.tick))
+        live.take(held + [page for page in pages if page.topic.name.endswith("truth")])
+        held = [page for page in pages if not page.topic.name.endswith("truth")]  # come later
+        if (step := live.step((before - 1) * setup.interval_ns)) is not None:
+            found.append(step)
+    live.take(held)
+    return [*found, live.step(setup.last_tick * setup.interval_ns)]
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return lapwing.fly("hover", {"run.duration": 4.0})
+
+
+def test_the_steps_are_the_flight_each_begun_with_the_last_message_before(steps, whole):
+    assert len(steps) > 10
+    for one, other in itertools.pairwise(steps):
+        assert one.times("truth")[-1] == other.times("truth")[0]
+    rows = [step.truth.position[1:] if k else step.truth.position for k, step in enumerate(steps)]
+    assert np.array_equal(np.concatenate(rows), whole.truth.position)
+    rows = [step.reference[1:] if k else step.reference for k, step in enumerate(steps)]
+    assert np.array_equal(np.concatenate(rows), whole.reference)
+
+
+def test_events_are_told_once_and_as_they_are_afterwards(steps, whole):
+    told, after = [], -1.0
+    for step in steps:
+        told += new_events(step, after)
+        after = float(step.truth.times[-1])
+    assert told == [event for event in whole.events if not KINDS[event.kind].afterwards]
+    assert {event.kind for event in told} >= {"arming", "mode", "phase", "contact"}

@@ -1,0 +1,181 @@
+"""Figures of flights made up, whose answers are known; and what a scene calls a success."""
+
+import numpy as np
+import pytest
+import synthetic_flights
+
+from lapwing.cosim.scene import SceneError
+from lapwing.services.common.success_criteria import Success, holds
+from lapwing.services.scene_resolver import load
+from lapwing.studies.metrics import FIGURES, check_success, figures
+from lapwing.studies.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided, total
+
+N = 400
+
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+def flown(failure="", diverged=False, finished=True, setpoint=None, truth=None, estimate=None, armed=True):
+    """A flight at 100 Hz: columns of some topics besides what stands still."""
+    pose = {"pose.position": ZERO, "pose.orientation": synthetic_flights.LEVEL}
+    still = {**pose, "velocity": ZERO, "motor_power": (100.0,), "ground_contact": False, "motor_voltage": (20.0,)}
+    return synthetic_flights.flight(
+        N,
+        failure=failure,
+        diverged=diverged,
+        truth={**still, **(truth or {})},
+        setpoint={"position": ZERO, "yaw": 0.0, **(setpoint or {})},
+        actuators={"attitude_reference": ZERO, "armed": armed},
+        estimate={**pose, "position_std": (0.1, 0.1, 0.1), **(estimate or {})},
+        status={"finished": finished, "landed": True},
+        scene={"airframe": {"motor": {"max_voltage": 40.0}}},
+    )
+
+
+def test_errors_of_known_offsets():
+    half = np.sin(0.05), np.cos(0.05)
+    f = figures(
+        flown(
+            setpoint={"position": (1.0, 2.0, 3.0), "yaw": 0.2},
+            truth={"pose.position": (0.9, 2.0, 3.2), "pose.orientation": (0.0, 0.0, *half)},  # a yaw of 0.1
+            estimate={"pose.position": (1.0, 1.7, 3.2)},
+        )
+    )
+    assert [f[f"rmse.{axis}"] for axis in AXES] == pytest.approx([0.1, 0.0, 0.2, 0.0, 0.0, 0.1])
+    assert [f[f"rmse_estimate.{axis}"] for axis in AXES] == pytest.approx([0.0, 0.3, 0.2, 0.0, 0.0, 0.2])
+    assert f["max_distance"] == pytest.approx(np.hypot(0.1, 0.2))
+    assert f["overshoot"] == pytest.approx(0.2)  # above the reference; it never came as far along x
+    assert [f[f"inside.{axis}"] for axis in "xyz"] == [1.0] * 3
+    assert f["energy"] == pytest.approx(400.0)
+    assert (f["verdict"], f["saturation"], f["max_tilt"]) == ("landed", 0.0, 0.0)
+    assert np.isnan(f["touchdown.speed"])
+    assert set(f) == set(FIGURES)
+
+
+def test_share_of_the_time_within_three_sigma():
+    ramp = np.zeros((N, 3))
+    ramp[:, 1] = np.linspace(0.0, 0.6, N)  # three sigma are reached half-way
+    f = figures(flown(estimate={"pose.position": ramp}))
+    assert [f[f"inside.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 0.5, 1.0])
+
+
+def test_only_the_armed_part_counts():
+    armed = np.arange(N) < 10
+    off = np.where(armed, 0.0, 5.0)[:, None] * np.ones(3)
+    assert figures(flown(truth={"pose.position": off}, armed=armed))["max_distance"] == 0.0
+
+
+def test_a_touch_down_has_its_place_speed_and_tilt():
+    touch, half = np.arange(N) > 300, np.sin(0.1)
+    falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    moving = np.arange(N)[:, None] * np.array([0.01, -0.02, 0.0])
+    leaning = {"pose.orientation": (0.0, half, 0.0, np.sqrt(1.0 - half**2)), "pose.position": moving}
+    hit = figures(flown(truth={"ground_contact": touch, "velocity": falling, **leaning}))
+    assert (hit["verdict"], hit["touchdown.speed"], hit["time"]) == ("crashed", 3.0, 3.01)
+    assert (hit["touchdown.x"], hit["touchdown.y"]) == pytest.approx((3.01, -6.02))
+    assert hit["touchdown.tilt"] == pytest.approx(0.2)
+
+
+def test_saturation_is_a_share_of_the_time_in_the_air():
+    voltage = np.where(np.arange(N) < 100, 40.0, 20.0)[:, None]
+    f = figures(flown(truth={"motor_voltage": voltage}))
+    assert f["saturation"] == pytest.approx(0.25, abs=0.01)
+
+
+def test_verdicts_are_those_of_a_single_run():
+    assert figures(flown("not finite at t = 1 s", diverged=True))["verdict"] == "diverged"
+    assert figures(flown(finished=False))["verdict"] == "timed out"
+
+
+@pytest.mark.parametrize(
+    ("text", "true"),
+    [
+        ("rmse.x < 0.1", True),
+        ("rmse.x < 0.1 and verdict == 'crashed'", False),
+        ("rmse.x < 0.1 or verdict == 'crashed'", True),
+        ("verdict in ('landed', 'flown') and not time > 5", True),
+        ("0.01 < abs(-rmse.x) * 2 <= max(0.1, time / 100)", True),
+        ("energy < 1", False),  # NaN
+        ("1 / (time - 3) < 1", False),
+    ],
+)
+def test_expressions_over_figures(text, true):
+    assert holds(text, {"rmse.x": 0.05, "verdict": "landed", "time": 3.0, "energy": np.nan}) == true
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "rmse.x <", "x = 3", "__import__('os')", "rmse.x.__class__()", "[x for x in y]", "(1).real", "f'{x}'"],
+)
+def test_nothing_else_is_an_expression(text):
+    with pytest.raises(SceneError, match=r"success.require.0: expected an expression over figures"):
+        load("hover", {"success.require": [text]})
+
+
+def test_the_default_lets_crashes_and_divergences_fail():
+    success = load("hover")[Success]
+    assert [success.unmet({"verdict": v}) != [] for v in ("landed", "timed out", "crashed", "diverged")] == [
+        False, False, True, True,
+    ]  # fmt: skip
+    with pytest.raises(SceneError, match=r"success.require.0: unknown figure 'rmse.zz'; did you mean rmse.z\?"):
+        check_success(load("hover", {"success.require": ["rmse.zz < 1"]}))
+
+
+@pytest.fixture
+def made():
+    """Reference, position, attitude and what is armed of 300 times, all over the place."""
+    random = np.random.default_rng(7)
+    wanted, flown, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
+    return Reference(wanted[:, :3], 4.0 * wanted[:, 3:5], 4.0 * wanted[:, 5]), flown[:, :3], flown[:, 3:], armed
+
+
+def test_one_pass_over_the_rows_finds_what_numpy_finds(made):
+    (position, roll_pitch, yaw), flown, attitude, armed = made
+    errors = np.column_stack([position - flown, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))])
+    expected = np.sqrt((errors[armed] ** 2).mean(axis=0))
+    assert list(rmse(*made).values()) == pytest.approx(expected, rel=1e-12)
+    distance, farthest = reach(position, flown, armed)
+    wanted, flown = position[armed], flown[armed]
+    beyond = np.concatenate([flown.max(axis=0) - wanted.max(axis=0), wanted.min(axis=0) - flown.min(axis=0)])
+    assert distance == pytest.approx(np.linalg.norm(wanted - flown, axis=1).max(), rel=1e-12)
+    assert farthest == beyond.max()
+
+
+def test_what_is_no_number_stays_none(made):
+    _, flown, _, armed = made
+    assert np.isnan(list(rmse(*made[:3], np.zeros(300, bool)).values())).all()
+    flown[np.flatnonzero(armed)[7], 1] = np.nan
+    found = rmse(*made)
+    assert np.isnan([*reach(made[0].position, flown, armed), found["y"]]).all()
+    assert np.isfinite([found[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
+
+
+@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
+def test_the_layout_of_the_numbers_is_no_matter(made, laid):
+    values = laid(made[1])
+    assert np.array_equal(strided(values), values)
+    assert total(values) == pytest.approx(values.sum(), rel=1e-12)
+    assert rmse(made[0], values, *made[2:]) == rmse(*made)
+    assert reach(made[0].position, values, made[3]) == reach(made[0].position, *made[1::2])
+
+
+@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray])
+def test_roll_pitch_yaw_make_the_rotation_again(laid):
+    angles = np.random.default_rng(3).uniform((-3.0, -1.5, -3.0), (3.0, 1.5, 3.0), (50, 3))
+    roll, pitch, yaw = np.cos(angles.T / 2) + 1j * np.sin(angles.T / 2)
+    w = roll.real * pitch.real * yaw.real + roll.imag * pitch.imag * yaw.imag
+    x = roll.imag * pitch.real * yaw.real - roll.real * pitch.imag * yaw.imag
+    y = roll.real * pitch.imag * yaw.real + roll.imag * pitch.real * yaw.imag
+    z = roll.real * pitch.real * yaw.imag - roll.imag * pitch.imag * yaw.real
+    found = roll_pitch_yaw(laid(np.column_stack([x, y, z, w])))
+    assert np.allclose(np.exp(1j * found), np.exp(1j * angles), rtol=0.0, atol=1e-12)
+    assert (np.abs(np.diff(found[:, 2])) <= np.pi).all()
+
+
+def test_an_attitude_that_is_no_number_has_no_angles_and_one_beyond_rounding_a_right_one():
+    assert np.isnan(roll_pitch_yaw(np.full((2, 4), np.nan))).all()
+    half = np.sqrt(0.5) * (1.0 + 1e-15)
+    assert roll_pitch_yaw(np.array([[0.0, half, 0.0, half], [0.0, -half, 0.0, half]]))[:, 1] == pytest.approx(
+        [0.5 * np.pi, -0.5 * np.pi]
+    )

@@ -1,0 +1,63 @@
+"""Descents by hand, and a walk off a grid."""
+
+import math
+
+import numpy as np
+import synthetic_flights
+
+from lapwing.studies.model_validity import in_vortex_ring
+
+SCENE = {"airframe": {"propeller": {"diameter": 0.5}, "motor": {"max_voltage": 40.0}}}
+HOVER = math.sqrt(40.0 / (2 * 1.2 * 4 * math.pi * 0.25**2))  # [m/s] four rotors of 10 N, 0.5 m
+
+
+def flown(velocity, turned=synthetic_flights.LEVEL, scene=SCENE, wind=(0.0, 0.0, 0.0), position=(0.0, 0.0, 50.0)):
+    truth = {
+        "pose.position": position,
+        "pose.orientation": turned,
+        "velocity": velocity,
+        "wind": wind,
+        "air_density": 1.2,
+        "rotor_thrust": (10.0,) * 4,
+        "motor_voltage": (20.0,) * 4,
+        "ground_contact": False,
+    }
+    return synthetic_flights.flight(
+        400, 100, scene=scene, truth=truth, status={"armed": True}, actuators={"armed": True}
+    )
+
+
+def ring(*velocity, **how):
+    return bool(in_vortex_ring(flown(velocity, **how).truth, 0.5).all())
+
+
+def test_the_ring_is_between_half_and_one_and_a_half_induced_velocities_down():
+    assert [ring(0.0, 0.0, -f * HOVER) for f in (0.0, 0.45, 0.55, 1.0, 1.45, 1.55)] == [0, 0, 1, 1, 1, 0]
+    assert not ring(1.1 * HOVER, 0.0, -HOVER)
+    assert ring(0.9 * HOVER, 0.0, -HOVER)
+
+
+def test_it_is_the_air_along_the_rotors_axis_that_counts():
+    assert ring(0.0, 0.0, 0.0, wind=(0.0, 0.0, HOVER))
+    quarter = math.sqrt(0.5)
+    assert ring(-HOVER, 0.0, 0.0, turned=(0.0, quarter, 0.0, quarter))  # nose down: body z is world x
+    assert not ring(HOVER, 0.0, 0.0, turned=(0.0, quarter, 0.0, quarter))
+
+
+def test_it_is_told_once_with_how_long():
+    t = np.arange(400) / 100
+    down = np.where((t >= 1.0) & (t < 2.5), -HOVER, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    said = [event for event in flown(down).events if event.kind == "warning"]
+    assert [(event.time, event.text[:54]) for event in said] == [
+        (1.0, "descends into the vortex ring of its rotors for 1.5 s:")
+    ]
+
+
+def test_off_the_grid_is_told():
+    grid = {"heights": [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]], "corner": [-1.0, -2.0], "spacing": 2.0}
+    x = np.linspace(0.0, 4.0, 400)
+    walk = np.column_stack([x, 0 * x - 1.0, 0 * x + 9.0])
+    scene = {**SCENE, "environment": {"terrain": {"grid": grid}}}
+    said = [e for e in flown((1.0, 0.0, 0.0), scene=scene, position=walk).events if e.kind == "warning"]
+    assert [round(event.time, 1) for event in said] == [3.0]
+    assert said[0].text.startswith("is beyond the edge of the terrain's grid for 1.0 s")

@@ -1,0 +1,142 @@
+"""The performance card: figures of the models beside the published ones."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from lapwing.dynamics.vehicles import performance
+from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.services.autopilot.controller_parameters import rotor_effectiveness
+from lapwing.services.autopilot.controller_parameters import shares as law_shares
+from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.performance_card import card, show, write_json
+from lapwing.studies.terminal import console
+
+ROOT = Path(__file__).parents[2]
+VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"
+
+
+def test_a_scene_and_its_vehicle_give_the_same_card():
+    assert card(VEHICLE) == card(ROOT / "lapwing/scenes/hover.toml")
+
+
+def test_units_of_the_card():
+    rows = {row.name: row for row in card(VEHICLE)}
+    drone = load_airframe(VEHICLE)
+    assert rows["hover time"].computed == pytest.approx(performance.hover_time(drone) / 60.0)
+    assert rows["maximum tilt"].computed == pytest.approx(math.degrees(performance.maximum_tilt(drone)))
+    assert rows["hover time"].published == pytest.approx(19.3)
+    assert rows["maximum tilt"].published == pytest.approx(58.9, abs=0.05)
+
+
+def test_where_nothing_is_chosen_the_models_come_near_the_paper():
+    rows = {row.name: row for row in card(VEHICLE)}
+    for name in ("hover time", "maximum payload", "maximum tilt"):
+        assert rows[name].computed == pytest.approx(rows[name].published, rel=0.06), name
+    ceiling = rows["ceiling"]  # in the standard atmosphere, which is denser aloft than the paper's law
+    assert 1.1 < ceiling.computed / ceiling.published < 1.2
+
+
+def test_every_published_figure_says_why_it_may_differ():
+    assert all(row.reason for row in card(VEHICLE) if row.published is not None)
+
+
+def test_json(tmp_path):
+    write_json(tmp_path / "card.json", card(VEHICLE))
+    assert '"hover time"' in (tmp_path / "card.json").read_text()
+
+
+def test_what_is_neither_scene_nor_vehicle_is_refused(tmp_path):
+    (tmp_path / "x.toml").write_text("[nonsense]\n")
+    with pytest.raises(ValueError, match="nonsense"):
+        card(tmp_path / "x.toml")
+    with pytest.raises(ValueError, match=r"none\.toml"):
+        card(tmp_path / "none.toml")
+
+
+def airframe_without(tmp_path, *tables):
+    """The delivery drone's file without some of its tables."""
+    parts = re.split(r"(?m)^(?=\[)", VEHICLE.read_text())
+    path = tmp_path / "vehicle.toml"
+    path.write_text("".join(part for part in parts if not part.startswith(tuple(f"[{name}" for name in tables))))
+    return path
+
+
+def test_units_are_printed_within_80_columns(capsys):
+    show(console(80), card(VEHICLE))
+    said = capsys.readouterr().out
+    assert "hover time [min]" in said
+    assert "maximum speed [m/s]" in said
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_without_drag_or_battery_the_card_has_what_it_can(tmp_path, capsys):
+    rows = {row.name: row for row in card(airframe_without(tmp_path, "drag", "battery", "published"))}
+    whole = {row.name: row for row in card(VEHICLE)}
+    for name in ("maximum payload", "ceiling", "maximum tilt"):
+        assert rows[name].computed == whole[name].computed
+    assert (rows["maximum speed"].computed, rows["maximum speed"].reason) == (None, "the vehicle has no [drag]")
+    assert (rows["hover time"].computed, rows["hover time"].reason) == (None, "the vehicle has no [battery]")
+    show(console(80), list(rows.values()))
+    assert "the vehicle has no [drag]" in capsys.readouterr().out
+
+
+QUADRATIC = "\n[effects.rotor_quadratic]\nthrust_constant = 4.0e-4\ntorque_constant = 1.0e-5\n"
+
+
+def scene_with_constants(tmp_path, vehicle):
+    """The hover scene under `rotor_quadratic`, which knows no propeller."""
+    text = (ROOT / "lapwing/scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", QUADRATIC)
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace('"delivery_drone"', f'"{vehicle}"'))
+    return path
+
+
+@pytest.mark.parametrize("tables", [("propeller",), ()], ids=["without a propeller", "with both"])
+def test_card_and_autopilot_go_by_the_rotors_that_are_in_force(tmp_path, tables):
+    scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
+    known = known_airframe(load(scene))
+    assert known.motor.thrust_coefficient == 4.0e-4
+    assert known.torque_per_thrust == pytest.approx(1.0e-5 / 4.0e-4)
+    assert resolve(load(scene)).vehicle == "drone1"
+    rows = {row.name: row for row in card(scene)}
+    weight = load_airframe(VEHICLE).mass.total * performance.GRAVITY
+    speed = math.sqrt(0.25 * weight / 4.0e-4)
+    motor = load_airframe(VEHICLE).motor
+    current = 1.0e-5 * speed**2 / motor.rotor_constant + motor.no_load_current
+    power = 4.0 * current * (motor.rotor_constant * speed + motor.resistance * current)
+    energy = performance.battery_energy(load_airframe(VEHICLE))
+    assert rows["hover time"].computed == pytest.approx(energy / power / 60.0)
+    assert rows["ceiling"].reason == "[effects.rotor_quadratic] knows no density of the air"
+
+
+def test_an_airframe_of_which_nothing_says_what_its_rotors_give_is_refused_by_check(tmp_path):
+    with pytest.raises(ValueError, match=r"no \[propeller\]; give a scene with \[effects.rotor_quadratic\]"):
+        card(airframe_without(tmp_path, "propeller"))
+    with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
+        load("hover", {"vehicle.airframe": str(airframe_without(tmp_path, "propeller"))})
+
+
+def test_without_a_rotor_a_hexacopter_has_what_linear_programming_leaves_at_most():
+    """All thrusts up to the highest, torques of roll, pitch and yaw 0: the autopilot's least squares come near it."""
+    rows = {row.name: row for row in card(ROOT / "lapwing/scenes/vehicles/hexacopter.toml")}
+    known = known_airframe(load("hexacopter"))
+    B, whole = rotor_effectiveness(known), rows["thrust over weight"].computed
+    bounds, most = [(0.0, 1.0)] * 6, []
+    for k, shares in enumerate(law_shares(known)[1:]):
+        torques = B[1:] if any(share[3] for share in shares) else B[1:3]
+        free = [(0.0, 0.0) if j == k else bound for j, bound in enumerate(bounds)]
+        most.append(-linprog(-B[0], A_eq=torques, b_eq=np.zeros(len(torques)), bounds=free).fun / 6.0)
+    found = rows["the same without a rotor"].computed
+    assert 0.75 * min(most) * whole < found <= min(most) * whole * (1.0 + 1e-9)
+    assert found > 1.0  # it flies on
+
+
+def test_four_rotors_cannot_lose_one():
+    row = next(row for row in card(VEHICLE) if row.name == "the same without a rotor")
+    assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")

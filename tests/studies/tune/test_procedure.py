@@ -1,0 +1,110 @@
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from lapwing.cli.main import app
+from lapwing.services.autopilot.gains import load
+from lapwing.services.autopilot.stability_check import unstable_loops
+from lapwing.services.scene_resolver import load as load_scene
+from lapwing.studies.simulate import fly
+from lapwing.studies.tune import console_output, tuning_report
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.gain_refinement import rmse
+from lapwing.studies.tune.procedure import tune, write
+
+pytestmark = pytest.mark.long
+
+SCENES = Path(__file__).parents[3] / "scenes"
+HOVER = SCENES / "hover.toml"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return tune(load_scene(HOVER), Bandwidths(), lambda _: None)
+
+
+def test_what_is_written_can_be_read_and_flown(found, tmp_path):
+    path = tmp_path / "new.toml"
+    write(path, found.gains)
+    assert load(str(path)) == found.gains
+    flown = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
+    assert flown.failure == ""
+    height = flown.truth.position[:, 2]
+    assert height.max() - height[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_polishing_keeps_the_margins_and_lessens_the_error(found):
+    assert found.after.shortfalls == {}
+    assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
+    moved, asked = found.polished.bandwidths, Bandwidths()
+    assert moved.altitude != asked.altitude
+    assert moved.position == asked.position  # nothing of this flight goes along x or y
+
+
+def test_the_same_scene_gives_the_same_gains(found):
+    assert tune(load_scene(HOVER), Bandwidths(), lambda _: None).gains == found.gains
+
+
+def test_every_corner_lands(found):
+    assert len(found.corners) == 8
+    assert not [f["told"] for f in found.corners.values() if f["verdict"] != "landed"]
+    assert max(f["max_distance"] for f in found.corners.values()) < 0.3
+    assert len({f["max_distance"] for f in found.corners.values()}) == 8  # the corners are different vehicles
+
+
+def test_page_and_tables(found, tmp_path):
+    path = tmp_path / "tune.html"
+    tuning_report.write(path, found)
+    page = path.read_text()
+    assert page.count('<figure class="plot">') == 2
+    assert "Open loops" in page
+    assert "mass +20 %, inertia -20 %, thrust -20 %" in page
+    console = Console(record=True, width=120)
+    console_output.show(console, found)
+    assert "x_plant_input" in console.export_text()
+
+
+def test_weak_gains_of_the_scene_are_warned_about_with_the_margin():
+    said = []
+    tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), said.append)
+    assert any(line.startswith("warning: gains paper: roll: phase margin 2") for line in said)
+
+
+def gains_with(tmp_path, **changes):
+    path = tmp_path / "changed.toml"
+    write(path, load("tuned").model_copy(update=changes))
+    return path
+
+
+def test_unstable_gains_are_warned_about_before_a_flight(tmp_path):
+    path = gains_with(tmp_path, altitude=(160.0, 120.0, 3200.0))
+    assert unstable_loops(load_scene(HOVER)) == []
+    result = CliRunner().invoke(app, ["check", str(HOVER), "--set", f"autopilot.gains={path}"])
+    assert result.exit_code == 0
+    warned = [line for line in result.output.splitlines() if "warning" in line]
+    assert len(warned) == 1
+    assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
+
+
+def test_no_scene_that_is_shipped_is_unstable():
+    for path in sorted(SCENES.glob("*.toml")):
+        scene = load_scene(path)
+        for vehicle in scene.vehicles or (scene,):
+            assert unstable_loops(vehicle) == [], path
+
+
+def test_bad_input_is_one_line(tmp_path):
+    with pytest.raises(ValueError, match=r"^--altitude -1: expected a bandwidth above 0 rad/s$"):
+        tune(load_scene(HOVER), Bandwidths(altitude=-1.0), lambda _: None)
+    with pytest.raises(ValueError, match=r"has no \[autopilot\] to tune"):
+        tune(load_scene(SCENES / "gyrostat_attitude.toml"), Bandwidths(), lambda _: None)
+    for arguments, message in (
+        (["--from", str(tmp_path / "no.mcap")], "no.mcap"),
+        (["--report", "page.txt"], "--report page.txt: expected a name that ends in .html"),
+        (["--out", "gains.txt"], "--out gains.txt: expected a name that ends in .toml"),
+    ):
+        result = CliRunner().invoke(app, ["tune", str(HOVER), *arguments])
+        assert result.exit_code == 2
+        assert message in result.output.replace("\n", "")
