@@ -74,7 +74,9 @@ done
 docker run --rm --network none "$IMAGE-tests" python -m pytest --version > /dev/null 2>&1 || fail "the tests do not start"
 
 # A user's folder; where that can be tried it belongs to somebody who is neither root nor known to the image.
-cp -r docker-compose.yml scenes "$work/"
+mkdir "$work/lapwing"
+cp docker-compose.yml "$work/"
+cp -r lapwing/scenes "$work/lapwing/"
 mkdir "$work/recordings"
 if [ "$(id -u)" -eq 0 ]; then chown 4321:4321 "$work/recordings"; fi
 owner=$(stat -c %u:%g "$work/recordings")

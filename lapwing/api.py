@@ -53,7 +53,8 @@ def fly(
         seed: of all randomness, 0 to 2^63 - 1; None: the scene's.
         controller: one's own in the place of the scene's: a class, an object of one (each take-off begins with a copy
             of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
-            `lapwing.services.common.controller_api`. A class in a module of its own becomes part of the flight's set-up, so that
+            `lapwing.services.common.controller_api`. A class in a module of its own becomes part of the flight's
+            set-up, so that
             `lapwing refly` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
         controller_options: of the constructor of the class: numbers, texts, lists of numbers, by name.
         estimator: the same of an estimator, with `step(time, readings)`; see `lapwing.services.common.estimator_api`.

@@ -1,6 +1,7 @@
 """What crosses the wire: ROS 2 message types, their CDR encoding, the topic table.
 
-`from messages import Imu, header`: the classes are generated from `msg/<package>/<Name>.msg`; adding a message is
+`from lapwing.messages import Imu, header`: the classes are generated from `msg/<package>/<Name>.msg`; adding a
+message is
 adding such a file.
 """
 

@@ -1,4 +1,5 @@
-"""One process of a run: what it is given, and how it takes part. `python -m lapwing.services.process_main NAME`, or a fork that
+"""One process of a run: what it is given, and how it takes part. `python -m lapwing.services.process_main NAME`,
+or a fork that
 calls `main`, reads that from standard input, as the launcher writes it."""
 
 import importlib

@@ -26,9 +26,9 @@ from lapwing.services.process_table import PROCESSES, entry
 
 
 def _configurations() -> list[ModuleType]:
-    """The module `config` of every service that has one."""
+    """The module `schema` of every service that has one."""
     folders = sorted(p.name for p in pkgutil.iter_modules(lapwing.services.__path__) if p.ispkg)
-    paths = [f"services.{name}.config" for name in folders]
+    paths = [f"lapwing.services.{name}.schema" for name in folders]
     return [importlib.import_module(path) for path in paths if importlib.util.find_spec(path)]
 
 
@@ -171,10 +171,8 @@ def _restarts_listed(scene: Scene, services: Collection[str]) -> dict[str, Any]:
         SceneError: one of them is none of these services.
     """
     wanted = scene[Run].restart
-    names = (list(lapwing.services) if wanted else []) if isinstance(wanted, bool) else list(wanted)
-    if unknown := [name for name in names if name not in lapwing.services]:
-        raise SceneError(
-            "run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(lapwing.services)}"
-        )
+    names = (list(services) if wanted else []) if isinstance(wanted, bool) else list(wanted)
+    if unknown := [name for name in names if name not in services]:
+        raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(services)}")
     run = {**scene.resolved[Run.TABLE], "restart": names}
     return {**scene.resolved, Run.TABLE: run}

@@ -1,24 +1,22 @@
-"""What is not Python and must be in a wheel is in one."""
+"""Package data: what is not Python and belongs into a wheel is declared."""
 
 import tomllib
 from pathlib import Path
-
-import pytest
 
 from lapwing.kernels.compiler.cache_files import SHIPPED
 
 ROOT = Path(__file__).parent.parent
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+FOLDERS = [ROOT / name for name in ("lapwing", "lapwing/services", "lapwing/messages")]  # two are links
 
 
-@pytest.mark.parametrize("folder", ["scenes", "services", "messages", "studies"])
-def test_data_files_are_packaged(folder):
-    assert f"{folder}*" in SETUPTOOLS["packages"]["find"]["include"]
-    packaged = {path for glob in SETUPTOOLS["package-data"][folder] for path in (ROOT / folder).glob(glob)}
-    there = {path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
-    assert there <= packaged
+def test_package_data_covers_data_files():
+    globs = SETUPTOOLS["package-data"]["lapwing"]
+    endings = {glob.removeprefix("**/*") for glob in globs if glob.startswith("**/*.")}
+    files = [path for folder in FOLDERS for path in folder.rglob("*") if path.is_file()]
+    data = [path for path in files if path.suffix not in (".py", ".pyc")]
+    assert {path.suffix for path in data if not path.is_relative_to(SHIPPED)} <= endings
 
 
-def test_kernels_that_a_wheel_is_to_carry_are_packaged():
-    (glob,) = SETUPTOOLS["package-data"]["dynamics"]
-    assert (ROOT / "dynamics" / glob).is_relative_to(SHIPPED)
+def test_package_data_covers_shipped_kernels():
+    assert f"{SHIPPED.relative_to(ROOT / 'lapwing')}/**/*" in SETUPTOOLS["package-data"]["lapwing"]

@@ -27,7 +27,8 @@ FLOWN = [c for c in COMMANDS if c.startswith("lapwing ")]
 def folder(tmp_path_factory):
     """A folder that looks like a checkout to its user."""
     path = tmp_path_factory.mktemp("checkout")
-    (path / "scenes").symlink_to(ROOT / "scenes")
+    (path / "lapwing").mkdir()
+    (path / "lapwing/scenes").symlink_to(ROOT / "lapwing/scenes")
     (path / "recordings").mkdir()
     return path
 

@@ -158,7 +158,7 @@ def _class(name: str, cls: type, shown: Iterable[str] | None = None) -> str:
 
 def _members(cls: type) -> list[str]:
     """The public names of a class and of those that it stands on here, in the order in which they are written."""
-    own = [c for c in reversed(cls.__mro__) if c.__module__.split(".")[0] in ("lapwing", "studies", "cosim")]
+    own = [c for c in reversed(cls.__mro__) if c.__module__.split(".")[0] == "lapwing"]
     return list(dict.fromkeys(name for c in own for name in vars(c)))
 
 

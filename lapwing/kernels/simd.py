@@ -1,7 +1,8 @@
 """Four numbers side by side in one vector register: what is the same for four propellers is computed once for them all.
 
 Lanes exist in compiled code only. They add, subtract, multiply, divide and negate among themselves and with floats,
-lane by lane and rounded as floats are, so all of `lapwing.dynamics.vector` and the arithmetic of `lapwing.dynamics.lie` take them.
+lane by lane and rounded as floats are, so all of `lapwing.dynamics.vector` and the arithmetic of
+`lapwing.dynamics.lie` take them.
 """
 
 # numba.core.types fills itself at import

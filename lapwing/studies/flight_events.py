@@ -61,7 +61,8 @@ def ordered(found: Iterable[Event]) -> list[Event]:
 
 
 def restarts(told: str) -> list[Event]:
-    """Where services were started again, from what the log's metadata tells of it (`lapwing.cosim.processes.restart_policy`)."""
+    """Where services were started again, from what the log's metadata tells of it
+    (`lapwing.cosim.processes.restart_policy`)."""
     return [Event(round(time, 9), "restart", text) for time, text in json.loads(told)]
 
 

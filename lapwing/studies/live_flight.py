@@ -21,7 +21,8 @@ class LiveFlight:
     """Takes the messages of a run as its services hand them over, in whatever order they come."""
 
     def __init__(self, setup: Setup):
-        """Of a run that is about to begin; of a fleet the set-up of one vehicle (`lapwing.cosim.diagram.multi_vehicle.members`)."""
+        """Of a run that is about to begin; of a fleet the set-up of one vehicle
+        (`lapwing.cosim.diagram.multi_vehicle.members`)."""
         self._setup = setup
         self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
 

@@ -90,7 +90,8 @@ class VehicleAirframe(Airframe, Section):
 
 
 class Effects(NamedTables):
-    """The physics that the scene calls for: a table for each effect of lapwing/dynamics/effects, or of the user's own."""
+    """The physics that the scene calls for: a table for each effect of lapwing/dynamics/effects, or of the user's
+    own."""
 
     TABLE: ClassVar[str] = "effects"
 

@@ -15,7 +15,7 @@ from lapwing.dynamics.config_error import KeyedError
 from lapwing.dynamics.validation import fault
 from lapwing.services.sensors import fault_schedule
 
-NO_SENSORS = ("config", "registry", "service")  # modules of the folder that import this one
+NO_SENSORS = ("schema", "registry", "service")  # modules of the folder that import this one
 
 
 @cache

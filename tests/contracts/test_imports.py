@@ -3,14 +3,15 @@
 import ast
 from pathlib import Path
 
-PACKAGES = ("cosim", "dynamics", "lapwing", "messages", "services", "studies")
-
 
 def imports():
     """The modules of this project that each module imports, anywhere in its source."""
-    files = {
-        path: path.with_suffix("").as_posix().replace("/", ".") for top in PACKAGES for path in Path(top).rglob("*.py")
-    }
+    paths = [
+        *Path("lapwing").rglob("*.py"),
+        *Path("lapwing/services").rglob("*.py"),
+        *Path("lapwing/messages").rglob("*.py"),
+    ]
+    files = {path: path.with_suffix("").as_posix().replace("/", ".") for path in paths}
     names = {name.removesuffix(".__init__"): path for path, name in files.items()}
     found = {}
     for name, path in names.items():

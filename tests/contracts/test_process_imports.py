@@ -11,7 +11,7 @@ from lapwing.services.scene_resolver import load, resolve
 
 pytestmark = pytest.mark.long
 
-OWN = {"cosim", "dynamics", "messages", "services"}
+OWN = {"lapwing"}
 NEEDED = {"annotated_types", "llvmlite", "numba", "numpy", "typing_extensions", "zenoh"}
 # numpy's, and what numba imports where it is installed
 BY_OTHERS = {"cffi", "cython_runtime", "pycparser", "scipy", "yaml"}
@@ -21,14 +21,14 @@ before = set(sys.modules)
 from lapwing.services.process_main import take_over
 given = take_over()
 import lapwing.cosim.transport.bus, lapwing.cosim.executors.lockstep
-from services import processes
-processes.create(given.setup, given.name)
+from lapwing.services import process_table
+process_table.create(given.setup, given.name)
 print(*sorted(set(sys.modules) - before))
 """
 
 FORKED = """
 import sys
-from cosim import child
+from lapwing.cosim.processes import child_process as child
 fork = child._fork
 def noted(name):
     print("at the fork:", *sorted(sys.modules))

@@ -11,13 +11,14 @@ pytestmark = pytest.mark.long
 RUN = """
 import json, sys
 from lapwing.cli.main import app
-from lapwing.kernels import _files, on_compile
-compiled, looked_up, read = [], [], _files.read
+from lapwing.kernels import on_compile
+from lapwing.kernels.compiler import cache_files
+compiled, looked_up, read = [], [], cache_files.read
 def watched(folder, name, version):
     if folder.startswith("kernels/"):
         looked_up.append(f"{folder}/{name} {version}")
     return read(folder, name, version)
-_files.read = watched
+cache_files.read = watched
 on_compile(compiled.append)
 app(sys.argv[1:], standalone_mode=False)
 print(json.dumps([compiled, looked_up]))

@@ -52,7 +52,7 @@ def test_a_participant_with_another_set_up_is_refused_and_the_first_difference_n
     for process in (plant, recorder):
         _, said = process.communicate(timeout=120)
         assert process.returncode == 2, said
-        assert "lapwing.services.plant.parameters.core.system.inertia.1" in said
+        assert "services.plant.parameters.core.system.inertia.1" in said
         assert "501.0" in said
         assert "500.0" in said
         assert len(said.splitlines()) == 1

@@ -163,7 +163,7 @@ def test_a_log_whose_writer_was_killed_is_readable(path):
     code = textwrap.dedent(
         f"""
         import os, signal
-        from messages import Clock, stamp
+        from lapwing.messages import Clock, stamp
         from lapwing.cosim.log import LogWriter
         log = LogWriter({str(path)!r}, {{"seed": "7"}}, {{"scene.toml": b"x"}})
         for k in range(1000):

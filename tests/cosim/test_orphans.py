@@ -6,7 +6,7 @@ import sys
 BUSY = """
 import sys, time
 from types import SimpleNamespace
-from cosim import process
+from lapwing.cosim.executors import participant as process
 process.ORPHANED = 0.1
 process.Process.end_with_parent(SimpleNamespace(), sys.argv[1])
 print("busy", flush=True)

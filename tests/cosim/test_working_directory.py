@@ -8,7 +8,7 @@ LAPWING = Path(sys.executable).with_name("lapwing")
 
 
 def test_folders_of_our_packages_names_in_the_working_directory_do_no_harm(tmp_path):
-    for name in ("messages", "services", "cosim", "dynamics", "numpy"):
+    for name in ("messages", "services", "lapwing", "numpy"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise SystemExit('imported from the working directory')\n")
     command = [LAPWING, "run", "gyrostat_blocked", "--set", "run.duration=50.0", "--key-prefix", "test-directory"]

@@ -41,7 +41,7 @@ def test_two_hosts_have_every_service_once_and_one_table():
     assert len(set(tables[0].values())) == len(tables[0])
     assert set(tables[0]) == {*plant, *others}
     assert not {*plant} & {*others}
-    for scene in (ROOT / "scenes").glob("*.toml"):
+    for scene in (ROOT / "lapwing/scenes").glob("*.toml"):
         assert {WATCHER, *process_table.needed(resolve(load(scene)))} <= set(tables[0])
 
 

@@ -18,7 +18,7 @@ from lapwing.services.common import flight_plan_file, parameter_file
 from tests.fuzz.sockets import frames, link, page, requests, websocket
 from tests.fuzz.target import Target
 
-SCENES = Path("scenes")
+SCENES = Path("lapwing/scenes")
 SMALL_SCENES = (  # of which more are tried in a second than of those that ship
     b"""run = { duration = 2.0 }
 vehicle.airframe = 'hexacopter'

@@ -9,7 +9,7 @@ from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import start_height
 from lapwing.services.scene_resolver import load, resolve
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[2] / "lapwing/scenes"
 
 
 class Case(NamedTuple):

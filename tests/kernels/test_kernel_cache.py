@@ -172,7 +172,7 @@ def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
 
 def test_whoever_is_stopped_while_he_compiles_is_not_waited_for_long(package, compiling):
     compiling.send_signal(signal.SIGSTOP)
-    ended = package.run(f"from lapwing.kernels import _locks; _locks.PATIENCE = 0.1; {SLOW}")
+    ended = package.run(f"from lapwing.kernels.compiler import file_locks; file_locks.PATIENCE = 0.1; {SLOW}")
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 
@@ -243,7 +243,10 @@ def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_f
 def test_what_a_wheel_carries_is_read_where_nothing_is_kept(package, tmp_path):
     package.run(ALL)
     shipped = package.cache.rename(tmp_path / "shipped")
-    placed = f"from pathlib import Path; from lapwing.kernels import _files; _files.SHIPPED = Path({str(shipped)!r})\n"
+    placed = (
+        "from pathlib import Path; from lapwing.kernels.compiler import cache_files;"
+        f"cache_files.SHIPPED = Path({str(shipped)!r})\n"
+    )
     run = package.run(placed + ALL)
     assert (run["values"], run["compiled"]) == (VALUES, 0)
     assert not files(package)

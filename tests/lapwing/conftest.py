@@ -14,7 +14,7 @@ ROOT = Path.cwd()
 @pytest.fixture
 def lapwing(monkeypatch, tmp_path, capfd):
     """Calls `lapwing` in an empty folder with the scenes in it: exit code, standard output, standard error."""
-    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    (tmp_path / "scenes").symlink_to(ROOT / "lapwing/scenes")
     monkeypatch.chdir(tmp_path)
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 

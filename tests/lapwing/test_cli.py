@@ -13,7 +13,7 @@ from lapwing.cosim.transport.key_prefix import check_key_prefix
 from lapwing.runs import single_process_run
 
 ROOT = Path.cwd()
-HOVER, DELIVERY = "lapwing/scenes/hover.toml", "lapwing/scenes/delivery_mission.toml"
+HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
 PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 
 OPEN = ("--peers", "foxglove=unixsock-stream/x")
@@ -41,8 +41,8 @@ BAD = {
     "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
     "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),
     "missing file": (
-        ["lapwing/scenes/hovr.toml"],
-        "lapwing/scenes/hovr.toml: no such file or directory; did you mean lapwing/scenes/hover",
+        ["scenes/hovr.toml"],
+        "scenes/hovr.toml: no such file or directory; did you mean scenes/hover",
     ),
     "folder": (["scenes"], "scenes: is a folder; expected a scene file"),
     "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: no such file or directory"),
@@ -99,9 +99,9 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["check", "lapwing/scenes/none.toml"], "no such file"),
-        (["warm", "lapwing/scenes/none.toml"], "no such file"),
-        (["warm", "lapwing/scenes/plans"], "lapwing/scenes/plans: no scenes there; expected a folder with .toml files"),
+        (["check", "scenes/none.toml"], "no such file"),
+        (["warm", "scenes/none.toml"], "no such file"),
+        (["warm", "scenes/plans"], "scenes/plans: no scenes there; expected a folder with .toml files"),
         (["scenes", "none"], "none: no scenes there"),
         (["report", "none.mcap"], "none.mcap"),
         (["report", "none.mcap", "--out", "a.txt"], "--out a.txt: expected a name that ends in .html, .pdf or .png"),
@@ -191,10 +191,10 @@ def test_check_tells_what_flies(lapwing):
 
 
 def test_the_command_itself_shows_no_traceback():
-    command = [sys.executable, "-m", "lapwing", "run", "lapwing/scenes/none.toml"]
+    command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 2
-    assert result.stderr.startswith("lapwing: lapwing/scenes/none.toml: no such file")
+    assert result.stderr.startswith("lapwing: scenes/none.toml: no such file")
     assert result.stderr.count("\n") == 1
 
 

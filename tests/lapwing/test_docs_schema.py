@@ -13,7 +13,7 @@ from lapwing.services.scene_resolver import load
 
 ROOT = Path(__file__).parents[2]
 FILES = {
-    "scene": sorted((ROOT / "scenes").glob("*.toml")),
+    "scene": sorted((ROOT / "lapwing/scenes").glob("*.toml")),
     "airframe": sorted((ROOT / "lapwing/scenes/vehicles").glob("*.toml")),
     "gains": sorted((ROOT / "services/autopilot/gains").glob("*.toml")),
 }

@@ -102,7 +102,7 @@ def test_what_a_killed_writer_has_flushed_is_recovered(lapwing, tmp_path):
     code = textwrap.dedent(
         """
         import os, signal, time
-        from messages import Clock, stamp
+        from lapwing.messages import Clock, stamp
         from lapwing.cosim.log import LogWriter
         log = LogWriter("killed.mcap", {"seed": "7"}, {"scene.toml": b"x"})
         for k in range(3000):

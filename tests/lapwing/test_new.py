@@ -26,7 +26,7 @@ def scene(tmp_path):
     """Loads the hover scene with a new effect beside it."""
     write_effect(NAME, tmp_path)
     path = tmp_path / "hover.toml"
-    path.write_text(Path("lapwing/scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
+    path.write_text(Path("scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
     return lambda *overrides: load(path, ["run.duration=1.5", *overrides])
 
 

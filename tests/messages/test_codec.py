@@ -165,7 +165,7 @@ def test_defaults_are_zero_but_for_the_identity_quaternion():
 
 def test_unknown_names_are_errors():
     with pytest.raises(ImportError):
-        exec("from messages import NoSuchMessage")
+        exec("from lapwing.messages import NoSuchMessage")
     with pytest.raises(ValueError, match="unknown message type a/msg/B; known: builtin_interfaces/msg/Time"):
         lapwing.messages.message_class("a/msg/B")
 

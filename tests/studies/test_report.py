@@ -230,7 +230,8 @@ def test_the_page_needs_nothing_from_elsewhere(page):
 
 def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
     code = (
-        "import sys; from pathlib import Path; from lapwing.studies.flight_data import Flight; from lapwing.studies.report import write;"
+        "import sys; from pathlib import Path; from lapwing.studies.flight_data import Flight;"
+        "from lapwing.studies.report import write;"
         f"write(Flight.read({str(log)!r}), Path({str(log.with_suffix('.html'))!r}));"
         "print([name for name in ('matplotlib', 'plotly') if name in sys.modules])"
     )

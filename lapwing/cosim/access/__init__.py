@@ -1,1 +1,1 @@
-""""""
+"""Access control: certificates, Zenoh rules, publisher identity, private sockets."""

@@ -20,7 +20,8 @@ AUTHORITY, CERTIFICATE, KEY, CONFIGURATION = "authority.pem", "certificate.pem",
 _CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
 _LINKS = {
     "enable_mtls": True,
-    # who is at the other end is told by the common name, at both ends (lapwing.cosim.access.zenoh_access), whatever its address
+    # who is at the other end is told by the common name, at both ends (lapwing.cosim.access.zenoh_access),
+    # whatever its address
     "verify_name_on_connect": False,
     "close_link_on_expiration": True,
 }

@@ -27,7 +27,8 @@ class Each(NamedTuple):
 class Setup(NamedTuple):
     """One run, resolved.
 
-    In that of a fleet (`lapwing.cosim.diagram.multi_vehicle.joined`) the parameters of a service are `Each` vehicle's `ServiceSetup`, and a
+    In that of a fleet (`lapwing.cosim.diagram.multi_vehicle.joined`) the parameters of a service are `Each`
+    vehicle's `ServiceSetup`, and a
     port has the vehicle's name in front: "left/truth".
     """
 

@@ -68,7 +68,7 @@ class Absent:
 
 
 ABSENT = Absent()
-OWN = ("cosim", "dynamics", "messages", "services")  # packages whose modules a text may have imported
+OWN = ("lapwing",)  # packages whose modules a text may have imported
 
 
 def first_difference(a: Any, b: Any) -> tuple[str, Any, Any] | None:

@@ -1,1 +1,1 @@
-""""""
+"""Block diagrams: compiled blocks, ports, schedule, topic encoders."""

@@ -101,7 +101,8 @@ class Process:
 
     @property
     def bundles_ahead(self) -> bool:
-        """Whether a service that runs ahead hands over several ticks at once (`lapwing.cosim.transport.packet_schedule`); a program of somebody
+        """Whether a service that runs ahead hands over several ticks at once
+        (`lapwing.cosim.transport.packet_schedule`); a program of somebody
         else's takes one at a time, as do services that may be started again, and those of several hosts."""
         return not (self.restarts or self.participants.external or self.compares)
 

@@ -1,1 +1,1 @@
-""""""
+"""Processes of a run: start, supervision, shutdown."""

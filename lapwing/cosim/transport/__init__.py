@@ -1,1 +1,1 @@
-""""""
+"""Transport: the Zenoh bus, keys, packets and their exchange between participants."""

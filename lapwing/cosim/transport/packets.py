@@ -2,7 +2,8 @@
 of encoded messages for those who record.
 
 A bundle is the rows of the service's ports that are due at the tick, in the order of its set-up, one after the other:
-little-endian float64, nothing between them. One of several ticks (`lapwing.cosim.transport.packet_schedule`) has, port by port, all rows that are
+little-endian float64, nothing between them. One of several ticks (`lapwing.cosim.transport.packet_schedule`) has,
+port by port, all rows that are
 due in them. A service that gives nothing in these ticks sends none. An empty bundle says that there will be no other.
 
 A batch is the ticks [start, stop) of which it has all messages (two int64), then pages: length of the topic's

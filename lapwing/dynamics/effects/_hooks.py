@@ -35,7 +35,8 @@ and between evaluations:
                                                        the air that others feel
 
 While all effects that can sleep are asleep, steps are taken without them, at no cost but the question. While one that
-is stiff is awake, steps are taken under error control, their memory included (`lapwing.dynamics.vehicles.multirotor_stepper`).
+is stiff is awake, steps are taken under error control, their memory included
+(`lapwing.dynamics.vehicles.multirotor_stepper`).
 
 The memory of an effect is a tuple of floats that its parameter class gives with `initial_memory()`; () without it.
 """

@@ -2,7 +2,8 @@
 
 A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on the manifold to round-off?), a class
 `Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h, where
-`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three more if they apply:
+`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three
+more if they apply:
 `EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
 higher, and `unfit(p, x)` of a method that is not for every system.
 """

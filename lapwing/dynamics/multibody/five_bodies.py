@@ -1,6 +1,7 @@
 """The delivery drone's five bodies, each with its own pose, on the fast path: redundant coordinates on SE(3).
 
-State trees for `lapwing.dynamics.integrators`; constraints hold through the accelerations (index 1) and drift as they would in
+State trees for `lapwing.dynamics.integrators`; constraints hold through the accelerations (index 1) and drift as
+they would in
 the general engine, unless `hold` brings them back after a step. A hinge holds a leaf's centre of mass on a chassis
 point; both its axes are z.
 """

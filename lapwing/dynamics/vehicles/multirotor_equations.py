@@ -1,7 +1,8 @@
 """The equations of motion of a multirotor under the effects that its scene names.
 
 Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
-every force is an effect (lapwing/dynamics/effects). All functions are pure. What stands for the motion in the state is a form
+every force is an effect (lapwing/dynamics/effects). All functions are pure. What stands for the motion in the
+state is a form
 (`FORMS`): here one rigid body; other modules add theirs, under the same effects and with the same steps.
 """
 

@@ -27,7 +27,8 @@ BECOMES = {  # what may become of a propeller: (spins, powered, held)
     "torn_off": (1.0, 0.0, 0.0),  # its hinge and its drive are gone: gravity alone acts on it, no ground stops it
 }
 STABILISATIONS = {
-    "none": five_body_stabilisation.NONE, "partitioning": five_body_stabilisation.PARTITION, "projection": five_body_stabilisation.PROJECTION, "baumgarte": five_body_stabilisation.NONE,
+    "none": five_body_stabilisation.NONE, "partitioning": five_body_stabilisation.PARTITION, "projection":
+    five_body_stabilisation.PROJECTION, "baumgarte": five_body_stabilisation.NONE,
 }  # fmt: skip
 
 

@@ -1,1 +1,1 @@
-""""""
+"""Compile pipeline on top of numba: decorators, cache, calling convention."""

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 CHECKSUM = 32  # bytes, before the content
-SHIPPED = Path(__file__).parent / "shipped"  # what a wheel carries, laid out as in `root()`
+SHIPPED = Path(__file__).parents[1] / "shipped"  # what a wheel carries, laid out as in `root()`
 KEPT = 4  # versions of one file, so that two checkouts do not take it from each other
 
 

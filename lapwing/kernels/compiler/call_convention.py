@@ -127,10 +127,12 @@ class KernelLower(Lower):
             set.add(self.function.attributes, WIDEST)  # which llvmlite would refuse as unknown
 
     def incref(self, typ: types.Type, val: Any) -> None:
+        """Count a new reference, unless the type holds no arrays."""
         if self._is_counted(typ):
             super().incref(typ, val)
 
     def decref(self, typ: types.Type, val: Any) -> None:
+        """Release a reference, unless the type holds no arrays."""
         if self._is_counted(typ):
             super().decref(typ, val)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from lapwing.kernels.compiler.import_scan import imports
 from lapwing.kernels.compiler.start_time import BEGAN
 
-OURS = {"cosim", "dynamics", "lapwing", "messages", "services", "studies"}
+OURS = {"lapwing"}
 STANDARD = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
 INSTALLED = {"site-packages", "dist-packages"}
 

@@ -29,7 +29,7 @@ from lapwing.studies.simulate import fly_each
 REFUSED = "refused"  # the verdict on a run whose values the scene refuses
 TRIED = 16  # first runs, of which the scene has to take one at least, or else of as many all over the campaign
 _FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # of an absolute path
-_OURS = ("cosim", "dynamics", "messages", "services", "studies")
+_OURS = ("lapwing",)
 _NUMBERS_OF = ("llvmlite", "numba", "numpy", "scipy")
 
 Row = dict[str, Any]  # values by column

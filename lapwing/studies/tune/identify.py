@@ -59,9 +59,7 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
     for k, name in enumerate(LOOPS):
         moved = float(signals.demand[signals.used, k].std())
         if moved < QUIET * hovering:
-            raise ValueError(
-                f"{log}: {name} was not moved ({moved:.2g} N); fly lapwing/scenes/excitation.toml and give its log"
-            )
+            raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly excitation.toml and give its log")
     found = minimize_scalar(
         lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
         bounds=np.log(LAGS),
@@ -77,7 +75,7 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
         if fit[name] < LEAST_FIT:
             raise ValueError(
                 f"{log}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
-                "fly lapwing/scenes/excitation.toml in less wind and give its log"
+                "fly excitation.toml in less wind and give its log"
             )
     return Identified(guess._replace(lag=lag, **gains), fit)
 

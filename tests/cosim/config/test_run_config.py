@@ -30,7 +30,7 @@ def test_resolving_a_scene_twice_gives_the_same_and_an_override_another():
     assert digest(resolved()) == digest(resolved())
     assert first_difference(resolved(), resolved("run.seed=7"))[0] == "seed"
     path, before, after = first_difference(resolved(), resolved("airframe.mass.total=9.5"))
-    assert path == "lapwing.services.autopilot.parameters.airframe.mass"
+    assert path == "services.autopilot.parameters.airframe.mass"
     assert after == 9.5 != before
 
 

@@ -104,10 +104,10 @@ def test_a_class_is_named_and_found_again():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('{"$":"none.such:Thing"}', "none.such:Thing: no such class; expected one of cosim, "),
+        ('{"$":"none.such:Thing"}', "none.such:Thing: no such class; expected one of lapwing or "),
         ('{"$":"lapwing.dynamics.effects.gravity:Weight"}', "Weight: no such class"),
         ('{"$":"pathlib:Path"}', "pathlib:Path: expected a NamedTuple"),
-        ('{"$":"this:Thing"}', "this:Thing: no such class; expected one of cosim, "),
+        ('{"$":"this:Thing"}', "this:Thing: no such class; expected one of lapwing or "),
         ('{"$":"lapwing.dynamics.effects.gravity:Gravity","g":1}', "has the fields acceleration, got g"),
         ('{"$":"tuple"}', "damaged 'tuple'"),
         ("{", "Expecting"),
@@ -146,7 +146,10 @@ def test_the_first_difference_has_its_path():
 
 
 def test_it_is_imported_without_what_is_slow():
-    code = "import lapwing.cosim.config.serialise, sys; print([m for m in ('pydantic', 'scipy', 'numba') if m in sys.modules])"
+    code = (
+        "import lapwing.cosim.config.serialise, sys; print([m for m in ('pydantic', 'scipy', 'numba') if m in "
+        "sys.modules])"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
 

@@ -11,7 +11,7 @@ from lapwing.cosim.diagram.tick_schedule import KEPT, Input, due, execution_orde
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.scene_resolver import load, resolve
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
+SCENES = sorted((Path(__file__).parents[3] / "lapwing/scenes").glob("*.toml"))
 
 
 def stamps(period, stop):

@@ -20,7 +20,7 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.sensors.rangefinder import Rangefinder
 from tests.cosim.scalar_encoding import BUILDERS
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
+SCENES = sorted((Path(__file__).parents[3] / "lapwing/scenes").glob("*.toml"))
 FIRST, COUNT = 10_000, 40  # ticks
 WORDS = (
     Words("mission", "", False, False, "", 0, 0, 65535, 1, False, (), (0.0, 0.0, 0.0), False, 0),

@@ -30,7 +30,8 @@ def newest_needed(setup, producer, consumer, tick):
 
 
 def end(setup):
-    """The ticks that each service has stepped when nobody can go on: as `lapwing.cosim.executors.lockstep` does, one after another."""
+    """The ticks that each service has stepped when nobody can go on: as `lapwing.cosim.executors.lockstep` does,
+    one after another."""
     stepped = dict.fromkeys(setup.services, 0)
     moved = True
     while moved and min(stepped.values()) <= LAST:

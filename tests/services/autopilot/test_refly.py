@@ -11,7 +11,7 @@ from lapwing.runs.resimulate import recorded_setup, refly
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 
-SCENES = Path(__file__).parents[3] / "scenes"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 
 
 def fly(log, setup, operator=None, sources=None):

@@ -18,7 +18,7 @@ from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
 
-SCENES = Path(__file__).parents[3] / "scenes"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 SATELLITE, OS4 = SCENES / "gyrostat_feedback.toml", SCENES / "os4_experiment_3.toml"
 LOAD, CRATE = SCENES / "cooperative_load.toml", SCENES / "unload.toml"
 

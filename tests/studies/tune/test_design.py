@@ -12,7 +12,7 @@ from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.design import GAIN, PHASE, assumed_airframe, design, gain_set, shortfalls
 from lapwing.studies.tune.linearise import hover
 
-SCENE = load_scene(Path(__file__).parents[3] / "scenes" / "hover.toml")
+SCENE = load_scene(Path(__file__).parents[3] / "lapwing/scenes" / "hover.toml")
 TICK = 0.004
 
 

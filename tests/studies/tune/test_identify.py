@@ -14,7 +14,7 @@ from lapwing.studies.simulate import fly
 from lapwing.studies.tune.identify import identify
 from lapwing.studies.tune.linearise import hover
 
-SCENES = Path(__file__).parents[3] / "scenes"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, duration = 4.0 }\n'
 CLOSE = {"altitude": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "spin_up_zero": 0.15, "lag": 0.1}
 

@@ -16,7 +16,7 @@ from lapwing.studies.tune.procedure import tune, write
 
 pytestmark = pytest.mark.long
 
-SCENES = Path(__file__).parents[3] / "scenes"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 HOVER = SCENES / "hover.toml"
 
 

@@ -15,7 +15,7 @@ from lapwing.services.scene_resolver import load as load_scene
 from lapwing.studies.tune.systems import closed, step, systems
 
 TICK, DELAY = 0.004, 1
-SCENES = Path(__file__).parents[3] / "scenes"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 
 
 @pytest.fixture(scope="module", params=["hover", "delivery_mission"])

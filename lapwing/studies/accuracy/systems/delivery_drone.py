@@ -31,7 +31,7 @@ from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.problem import Outcome, Problem, Way
 from lapwing.studies.accuracy.reference import TOLERANCE, turning
 
-AIRFRAME = Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml"
+AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
 DURATION, SAMPLES, COARSEST, HALVINGS = 2.0, 8, 64, 10
 SPEED = 100.0  # [rad/s] of the propellers: slow, so that their uneven inertia shows most
 ATTITUDE, OMEGA = exp((0.2, -0.4, 0.1)), (1.0, -0.7, 0.4)

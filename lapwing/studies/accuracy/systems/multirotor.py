@@ -16,7 +16,7 @@ from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, dop853, turning
 
-AIRFRAME = Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml"
+AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
 DURATION = 2.0  # [s]
 VOLTAGE = (31.0, 32.5, 30.0, 33.0)  # [V] around hover
 START = Motion(
