@@ -14,7 +14,7 @@ pytestmark = pytest.mark.long
 OWN = {"lapwing"}
 NEEDED = {"annotated_types", "llvmlite", "numba", "numpy", "typing_extensions", "zenoh"}
 # numpy's, and what numba imports where it is installed
-BY_OTHERS = {"cffi", "cython_runtime", "pycparser", "scipy", "yaml"}
+BY_OTHERS = {"cffi", "charset_normalizer", "colorama", "cython_runtime", "pycparser", "scipy", "yaml"}
 CHILD = """
 import sys
 before = set(sys.modules)
