@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from cosim.log import LogReader
+from lapwing.cosim.log import LogReader
 
 LAPWING = [sys.executable, "-m", "lapwing"]
 MAVLINK = ["--mavlink", "udpout:127.0.0.1:9", "--speed", "max"]  # the port that discards
