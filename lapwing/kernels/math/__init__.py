@@ -1,0 +1,64 @@
+"""Elementary functions that give the same bits on every machine, in place of Python's `math`.
+
+    from lapwing.kernels import math
+
+Functions that the C library would round in its own way are computed here (docs/elementary_functions.md); the others,
+which IEEE 754 or integer arithmetic determines, and the constants are those of Python's `math`. In compiled code every
+function is a kernel. Called from Python it runs as plain Python on the same operations, with the same result.
+Differences from Python's `math`: where it raises a ValueError or OverflowError, the result is NaN or infinite.
+"""
+
+from math import (
+    ceil,
+    copysign,
+    degrees,
+    e,
+    fabs,
+    factorial,
+    floor,
+    fmod,
+    frexp,
+    inf,
+    isfinite,
+    isinf,
+    isnan,
+    isqrt,
+    ldexp,
+    nan,
+    nextafter,
+    pi,
+    radians,
+    remainder,
+    sqrt,
+    tau,
+    trunc,
+    ulp,
+)  # fmt: skip
+
+from lapwing.kernels.math import exponential, inverse_trigonometric, logarithm, roots, trigonometric
+from lapwing.kernels.math._export import exported
+from lapwing.kernels.math.lengths import dist, hypot
+
+sin = exported(trigonometric.sin)
+cos = exported(trigonometric.cos)
+sincos = exported(trigonometric.sincos)
+tan = exported(trigonometric.tan)
+asin = exported(inverse_trigonometric.asin)
+acos = exported(inverse_trigonometric.acos)
+atan = exported(inverse_trigonometric.atan)
+atan2 = exported(inverse_trigonometric.atan2)
+exp = exported(exponential.exp)
+expm1 = exported(exponential.expm1)
+tanh = exported(exponential.tanh)
+log = exported(logarithm.log)
+log1p = exported(logarithm.log1p)
+pow = exported(logarithm.pow)
+cbrt = exported(roots.cbrt)
+square = exported(roots.square)
+
+__all__ = [
+    "acos", "asin", "atan", "atan2", "cbrt", "ceil", "copysign", "cos", "degrees", "dist", "e", "exp", "expm1", "fabs",
+    "factorial", "floor", "fmod", "frexp", "hypot", "inf", "isfinite", "isinf", "isnan", "isqrt", "ldexp", "log",
+    "log1p", "nan", "nextafter", "pi", "pow", "radians", "remainder", "sin", "sincos", "sqrt", "square", "tan", "tanh",
+    "tau", "trunc", "ulp",
+]  # fmt: skip

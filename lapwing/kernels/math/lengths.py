@@ -1,0 +1,28 @@
+"""Lengths of vectors of any number of coordinates, in place of `math.hypot` and `math.dist`."""
+
+from collections.abc import Iterable
+
+from lapwing.kernels.compiler.decorators import uncompiled
+from lapwing.kernels.math import roots
+from lapwing.kernels.math._export import compiled_as
+
+_hypot = uncompiled(roots.hypot)
+
+
+def hypot(*coordinates: float) -> float:
+    """Return the Euclidean length of a vector, without overflow; of two coordinates in compiled code.
+
+    Each coordinate more is one more rounding.
+    """
+    length = 0.0
+    for index, coordinate in enumerate(coordinates):
+        length = _hypot(length, coordinate) if index else abs(float(coordinate))
+    return length
+
+
+compiled_as(hypot, roots.hypot)
+
+
+def dist(p: Iterable[float], q: Iterable[float]) -> float:
+    """Return the Euclidean distance of two points; not in compiled code."""
+    return hypot(*(a - b for a, b in zip(p, q, strict=True)))

@@ -1,0 +1,68 @@
+"""Sine, cosine and tangent.
+
+The angle is reduced to the nearest of 128 directions (`reduction`); sine and cosine follow from those of the direction
+by the addition theorems, with short polynomials for the remainder (Tang, "Table-lookup algorithms for elementary
+functions and their error analysis", ARITH 10, 1991). The largest terms are exact products of 26 bits each, so that the
+sum has about 65 correct bits before its one rounding.
+"""
+
+from lapwing.kernels.compiler.decorators import apart, leaf
+from lapwing.kernels.math._primitives import quotient, split, table
+from lapwing.kernels.math._tables import COSINE, SINE, SINES
+from lapwing.kernels.math.reduction import reduced
+
+_S3, _S5, _S7 = SINE
+_C4, _C6, _C8 = COSINE
+_sines = table("sines", SINES)  # of each direction: upper and lower part of the sine, of the cosine
+
+
+@leaf
+def _parts(x):
+    """Return sine and cosine as two numbers each, to be added."""
+    k, r, r_low = reduced(x)
+    at = 4 * k
+    s1, s2, c1, c2 = _sines(at), _sines(at + 1), _sines(at + 2), _sines(at + 3)
+    h1 = split(r)
+    h2 = (r - h1) + r_low
+    z = r * r
+    sine = r * z * (_S3 + z * (_S5 + z * _S7))  # sin(r) - r
+    cosine = z * (-0.5 + z * (_C4 + z * (_C6 + z * _C8))) - r * r_low  # cos(r) - 1
+    s, c = s1 + s2, c1 + c2
+    p = c1 * h1
+    first_s = s1 + p
+    rest_s = (p - (first_s - s1)) + ((s2 + (c * h2 + c2 * h1)) + (s * cosine + c * sine))
+    q = s1 * h1
+    first_c = c1 - q
+    rest_c = ((c1 - first_c) - q) + ((c2 - (s * h2 + s2 * h1)) + (c * cosine - s * sine))
+    return first_s, rest_s, first_c, rest_c
+
+
+@apart
+def sin(x):
+    """Return the sine of an angle [rad]."""
+    s, s_low, _, _ = _parts(x)
+    return s + s_low if x != 0.0 else x
+
+
+@apart
+def cos(x):
+    """Return the cosine of an angle [rad]."""
+    _, _, c, c_low = _parts(x)
+    return c + c_low
+
+
+@apart
+def sincos(x):
+    """Return sine and cosine of an angle [rad], bit-for-bit those of `sin` and `cos`."""
+    s, s_low, c, c_low = _parts(x)
+    return (s + s_low if x != 0.0 else x), c + c_low
+
+
+@apart
+def tan(x):
+    """Return the tangent of an angle [rad]."""
+    s, s_low, c, c_low = _parts(x)
+    a = s + s_low
+    b = c + c_low
+    first, rest = quotient(a, s_low - (a - s), b, c_low - (b - c))
+    return first + rest if x != 0.0 else x
