@@ -12,12 +12,12 @@ from statistics import median
 
 import lapwing.studies.simulate
 from benchmarks._targets import Row, show
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.studies.campaign import runs as campaign_runs
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 
 SCENE = "delivery_mission"
 VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.wind_random.mean.0": parse("uniform(0, 12)")}
@@ -25,9 +25,9 @@ FLIGHT = "flight"
 PARTS = {
     "scene and set-up": (campaign_runs, "setup_of"),
     "services": (lapwing.studies.simulate, "create_all"),
-    "graph": (lapwing.studies.simulate, "Graph"),
-    FLIGHT: (Graph, "advance"),
-    "rows as columns": (Flight, "of_each"),
+    "graph": (lapwing.studies.simulate, "BlockDiagram"),
+    FLIGHT: (BlockDiagram, "advance"),
+    "rows as columns": (FlightData, "of_each"),
     "figures": (campaign_runs, "figures"),
 }
 """What the parts of a run are called, and the functions that do them."""

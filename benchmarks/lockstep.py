@@ -17,12 +17,12 @@ from statistics import median
 
 from benchmarks._targets import Row, show
 from lapwing.cosim.access.private_sockets import private_endpoints
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import ServiceSetup, Setup
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.executors.lockstep import pin, run_lockstep
-from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.kernels.row_packing import to_row
 from lapwing.services.common import ports
@@ -35,15 +35,15 @@ HOPS = 3
 NONE = PlantWiring(5, False, 0, 0.0, ())
 PARTS = {  # inputs and ports of the mission's services
     "plant": (
-        (Input(ports.ACTUATORS, 1),),
+        (InputPort(ports.ACTUATORS, 1),),
         (Port(ports.TRUTH, TrueState(*[(1.0,) * 4 if v == () else v for v in TrueState()])),),
     ),
-    "sensors": ((Input(ports.TRUTH),), (Port(ports.IMU, ports.ImuReading()),)),
+    "sensors": ((InputPort(ports.TRUTH),), (Port(ports.IMU, ports.ImuReading()),)),
     "autopilot": (
-        (Input(ports.IMU), Input(ports.TRAJECTORY)),
+        (InputPort(ports.IMU), InputPort(ports.TRAJECTORY)),
         (Port(ports.ACTUATORS, MotorCommand((1.0,) * 4, True, (1.0,) * 4, (0.0,) * 3)),),
     ),
-    "trajectory": ((Input(ports.TRUTH, round(250 * LEAD)),), (Port(ports.TRAJECTORY, Reference()),)),
+    "trajectory": ((InputPort(ports.TRUTH, round(250 * LEAD)),), (Port(ports.TRAJECTORY, Reference()),)),
 }
 
 
@@ -69,14 +69,14 @@ class Constant:
 
 
 def lockstep_process(name, peers, cycles, core):
-    services = {name: ServiceSetup(None, *parts) for name, parts in PARTS.items()}
-    setup = Setup("benchmark", "", 1, cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    services = {name: ServiceConfig(None, *parts) for name, parts in PARTS.items()}
+    setup = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
     part = Constant(name, cycles)
     wires = plant_wires(setup, NONE) if name == "plant" else []
-    participants = Participants("bench")
+    participants = PublisherIds("bench")
     with ZenohBus(*mesh(name, peers), mark=participants.mark(name)) as bus:
         run_lockstep(
-            Process(name, setup, bus, participants, list(peers), core=core),
+            Participant(name, setup, bus, participants, list(peers), core=core),
             Service(name, [part], wires),
             name == "plant",
             "recorder",

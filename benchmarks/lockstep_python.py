@@ -10,10 +10,10 @@ import time
 from types import SimpleNamespace
 
 from benchmarks.lockstep import NONE, PARTS, Constant
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import ServiceSetup, Setup
-from lapwing.cosim.diagram.block_diagram import Graph, Service
-from lapwing.cosim.transport.packet_exchange import PAGE, Outlets, sources
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.transport.packet_exchange import PAGE, PacketSender, sources
 from lapwing.services.plant.encoders import wires as plant_wires
 
 
@@ -42,17 +42,17 @@ def prepare(bus, giver, tick, interval_ns):
 
 def own(name, cycles):
     """Seconds a cycle of (taking, stepping, publishing) in the service `name`."""
-    services = {service: ServiceSetup(None, *parts) for service, parts in PARTS.items()}
-    setup = Setup("benchmark", "", 1, 2 * cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    services = {service: ServiceConfig(None, *parts) for service, parts in PARTS.items()}
+    setup = RunConfig("benchmark", "", 1, 2 * cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
     bus = Idle()
     process = SimpleNamespace(
-        setup=setup, name=name, bus=bus, participants=Participants("bench"), key_prefix="bench",
+        setup=setup, name=name, bus=bus, participants=PublisherIds("bench"), key_prefix="bench",
         tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), restarts=False,
         journal=None, bundles_ahead=True,
     )  # fmt: skip
     service = Service(name, [Constant(name, 2 * cycles)], plant_wires(setup, NONE) if name == "plant" else [])
-    graph = Graph(setup, [service], 2 * PAGE)
-    givers, outlets = sources(process, graph), Outlets(process, service, graph)
+    graph = BlockDiagram(setup, [service], 2 * PAGE)
+    givers, outlets = sources(process, graph), PacketSender(process, service, graph)
     taken = [0.0, 0.0, 0.0]
     for tick in range(cycles):
         for giver in givers:

@@ -17,11 +17,11 @@ from types import SimpleNamespace
 import numpy as np
 
 from lapwing.cosim.access.private_sockets import private_endpoints
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Page
-from lapwing.cosim.executors.log_backpressure import Backlog
-from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.executors.log_backpressure import LogBackpressure
+from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.log.mcap_writer import Container
 from lapwing.cosim.transport.bus import ZenohBus, mesh
@@ -33,7 +33,7 @@ from lapwing.messages.topics import IMU, ODOM, POSE, TRUTH
 from lapwing.services.recorder import service as recorder
 
 SOURCE, RECORDER = "source", "recorder"
-PARTICIPANTS = Participants("bench-log")
+PARTICIPANTS = PublisherIds("bench-log")
 MOTORS = dict.fromkeys(("rotor_speed", "motor_voltage", "motor_current", "motor_power"), (0.0,) * 4)
 SAMPLES = {
     TRUTH: VehicleState(header(0, "world"), **MOTORS),
@@ -52,7 +52,9 @@ ROWS = (  # messages a second, bytes a second that the disk takes; 0: as it is
 def setup(rate, seconds):
     ticks = rate // len(SAMPLES)
     services = {SOURCE: None}
-    return Setup("bench", "", 1, int(ticks * seconds), ticks, 10**9 // ticks, "sequential", "drone1", services, {}, {})
+    return RunConfig(
+        "bench", "", 1, int(ticks * seconds), ticks, 10**9 // ticks, "sequential", "drone1", services, {}, {}
+    )
 
 
 def batch(given, first, stop):
@@ -66,7 +68,7 @@ def batch(given, first, stop):
         for name in ("pose.position", "velocity", "acceleration", "rotor_speed", "linear_acceleration"):
             if record.dtype.names and name in record.dtype.names:
                 columns[name] = noise.normal(size=(len(ticks), *record.dtype[name].shape))
-        pages.append(Page(topic, ticks, record.encode(len(ticks), columns)))
+        pages.append(RecordBatch(topic, ticks, record.encode(len(ticks), columns)))
     return pack_batch(pages, first, stop)
 
 
@@ -74,8 +76,11 @@ def hand_over(given, endpoints, seconds):
     """At the rate of the set-up, ten times a second; messages handed over, and seconds it took."""
     listen, connect = mesh(SOURCE, endpoints)
     with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(SOURCE)) as bus:
-        process = Process(SOURCE, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
-        backlog, put = Backlog(process, RECORDER), bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}")
+        process = Participant(SOURCE, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        backlog, put = (
+            LogBackpressure(process, RECORDER),
+            bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}"),
+        )
         process.join()
         step = -(-given.rate // 10)
         started, first, end = time.perf_counter(), 0, int(given.rate * seconds)
@@ -105,7 +110,7 @@ def record(given, endpoints, log, disk):
         Container._write = slow
     listen, connect = mesh(RECORDER, endpoints)
     with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(RECORDER)) as bus:
-        process = Process(RECORDER, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        process = Participant(RECORDER, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
         recorder.run(process, SimpleNamespace(log=log, mode="bench", external=None, sources=None))
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 

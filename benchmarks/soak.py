@@ -19,11 +19,11 @@ from typing import NamedTuple
 from benchmarks._targets import Row, show
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.processes.interrupt import Interrupted
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
 from lapwing.runs.single_process_run import fly_single
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import load, resolve
 
 SCENE, HOVER = "delivery_mission", "trajectory.phase.2.duration=1e6"
@@ -125,7 +125,7 @@ def processes(minutes: float, log: Path) -> list[Sample]:
     sampler = Sampler(log, minutes=minutes)
     setup = resolve(load(SCENE, [HOVER, "run.duration=1e6"]))
     with suppress(Interrupted):
-        fly_processes(Participation(WATCHER, setup, {}, "soak", log=str(log)), sampler)
+        fly_processes(ProcessSpec(MONITOR, setup, {}, "soak", log=str(log)), sampler)
     return sampler.samples
 
 

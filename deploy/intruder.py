@@ -11,14 +11,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from lapwing.cosim.access.certificates import AUTHORITY, CERTIFICATE, KEY, tls
-from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.run_errors import BusError
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import DIVERGED_KEY, ENDED_KEY, STEP_KEY
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.process_table import MAVLINK
 
-RUN, KEYS = Participants("lapwing"), Path("keys")
+RUN, KEYS = PublisherIds("lapwing"), Path("keys")
 FORGED = b"forged"
 WRONG = (
     (OPERATOR_KEY, MAVLINK),

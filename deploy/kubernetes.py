@@ -10,19 +10,19 @@ import argparse
 import json
 from typing import Any
 
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.services import process_table
 from lapwing.services.scene_resolver import load, resolve
 
 NAMESPACE, PORT, USER = "lapwing", 7447, 1000
 RECORDINGS = {"name": "recordings", "mountPath": "/app/recordings"}
-MEMORY = {"recorder": "2Gi", WATCHER: "2Gi"}  # of each other 1 GiB
+MEMORY = {"recorder": "2Gi", MONITOR: "2Gi"}  # of each other 1 GiB
 LABELS = {"app.kubernetes.io/part-of": NAMESPACE}
 
 
 def manifests(scene: str, image: str) -> list[dict[str, Any]]:
     """All objects of a run of a scene."""
-    names = [*process_table.needed(resolve(load(scene))), WATCHER]
+    names = [*process_table.needed(resolve(load(scene))), MONITOR]
     table = ",".join(f"{name}=tls/{name}:{PORT}" for name in names)
     found: list[dict[str, Any]] = [
         {
@@ -82,10 +82,10 @@ def _service(name: str) -> dict[str, Any]:
 def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
     log = ["--log", "recordings/flight.mcap"]
     command = {
-        WATCHER: ["lapwing", "run", scene, *log, "--json", "recordings/flight.json"],
+        MONITOR: ["lapwing", "run", scene, *log, "--json", "recordings/flight.json"],
         process_table.RECORDER: ["lapwing", "service", name, scene, *log],
     }.get(name, ["lapwing", "service", name, scene])
-    writes = name in (WATCHER, process_table.RECORDER)
+    writes = name in (MONITOR, process_table.RECORDER)
     keys = {"name": "keys", "mountPath": f"/app/keys/{name}"}
     restricted = {
         "allowPrivilegeEscalation": False,

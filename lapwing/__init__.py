@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from lapwing.simulator import Observation, Simulator
     from lapwing.studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
     from lapwing.studies.flight_events import Event
-    from lapwing.studies.outcome import Verdict
+    from lapwing.studies.outcome import FlightOutcome
 
 _WHERE = {
     "Batch": "lapwing.batch_simulator",
@@ -35,7 +35,7 @@ _WHERE = {
     "Scene": "lapwing.cosim.scene",
     "SceneError": "lapwing.cosim.scene",
     "Simulator": "lapwing.simulator",
-    "Verdict": "lapwing.studies.outcome",
+    "FlightOutcome": "lapwing.studies.outcome",
     "campaign": "lapwing.api",
     "choice": "lapwing.studies.campaign.distributions",
     "fly": "lapwing.api",
@@ -52,13 +52,13 @@ __all__ = [
     "BatchState",
     "Event",
     "Flight",
+    "FlightOutcome",
     "LockStepError",
     "Observation",
     "Reference",
     "Scene",
     "SceneError",
     "Simulator",
-    "Verdict",
     "campaign",
     "choice",
     "fly",

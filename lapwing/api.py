@@ -7,7 +7,7 @@ from os import cpu_count
 from pathlib import Path
 from typing import Any
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.flight import Flight
 from lapwing.services import scene_resolver
@@ -131,5 +131,5 @@ def campaign(
         return [first, *pool.map(one, range(1, len(seeds)))]
 
 
-def _flown(setup: Setup) -> Flight:
+def _flown(setup: RunConfig) -> Flight:
     return studied.fly(setup, kind=Flight)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Flight(studied.Flight):
+class Flight(studied.FlightData):
     """What was said in a flight, topic by topic, and what that comes to.
 
     `flight.truth.position` is an array by time, shape (n, 3) [m] in the world frame, `flight.truth.times` its times
@@ -62,7 +62,7 @@ class Flight(studied.Flight):
                 writer.write(EVENTS.key(self.vehicle), EVENTS.message, payload, time_ns, deterministic=False)
         return target
 
-    def report(self, path: str | Path | None = None, beside: studied.Flight | None = None) -> Path:
+    def report(self, path: str | Path | None = None, beside: studied.FlightData | None = None) -> Path:
         """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
 
         Args:

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
-from lapwing.cosim.diagram.tick_schedule import KEPT, Port
-from lapwing.cosim.scene import Overrides, Scene, SceneError, Source
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.cosim.scene import KeyOrigin, Overrides, Scene, SceneError
 from lapwing.kernels.row_packing import to_row, width
-from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, Order
+from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, ControllerInput
 from lapwing.services.common import ports
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
 from lapwing.services.process_table import create
@@ -31,7 +31,7 @@ class Observation(NamedTuple):
     ended: bool  # the run's duration is over
 
 
-class Given:
+class UserCommandBlock:
     """Stands for the autopilot, or for its commander: gives what the user has asked for."""
 
     name = "simulator.given"
@@ -39,7 +39,7 @@ class Given:
     def __init__(self, *outputs: Port):
         self.outputs = outputs
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Nothing to be known."""
 
     def act(self, tick: int) -> int:
@@ -84,12 +84,12 @@ class Simulator:
             SceneError: the scene is not sound, or nobody steers in it.
         """
         self._scene = load_one(scene, overrides)
-        self._graph: Graph | None = None
+        self._graph: BlockDiagram | None = None
         self._kind = ""
         self._set_up(seed)
 
     @property
-    def setup(self) -> Setup:
+    def setup(self) -> RunConfig:
         """What is simulated."""
         return self._setup
 
@@ -125,7 +125,7 @@ class Simulator:
             raise ValueError(f"step: expected {self._kind} as before; reset() to go over to {kind}")
         graph = self._graph
         if setpoint is not None:
-            graph.put(ORDER, graph.tick, Order(False, _sound(setpoint), armed=True))
+            graph.put(ORDER, graph.tick, ControllerInput(False, _sound(setpoint), armed=True))
         voltages = () if motor_voltages is None else self._voltages(motor_voltages)
         stop = min(graph.tick + ticks, self._setup.last_tick + 1)
         while graph.tick < stop and not graph.ended:
@@ -138,22 +138,22 @@ class Simulator:
         scene = load(self._scene, () if seed is None else {"run.seed": seed})
         self._setup = resolve(scene)
         if "autopilot" not in self._setup.services:
-            raise SceneError("autopilot", "nobody steers there", "a scene with [autopilot]", Source(scene.path))
+            raise SceneError("autopilot", "nobody steers there", "a scene with [autopilot]", KeyOrigin(scene.path))
 
-    def _begin(self, kind: str) -> Graph:
+    def _begin(self, kind: str) -> BlockDiagram:
         setup = self._setup
         names = [name for name in ("plant", "sensors") if name in setup.services]
         services = [create(setup, name) for name in names]
         if kind == "motor_voltages":
             outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-            services.append(Service("simulator", [Given(*outputs)], []))
-            return Graph(setup, services, KEEP)
+            services.append(Service("simulator", [UserCommandBlock(*outputs)], []))
+            return BlockDiagram(setup, services, KEEP)
         autopilot = create(setup, "autopilot")
-        given = Given(Port(ORDER, Order(), KEPT), Port(NO_TRAJECTORY, Reference(), KEPT))
+        given = UserCommandBlock(Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Reference(), LATCHED))
         autopilot.parts = [given if part.name == "autopilot.commander" else part for part in autopilot.parts]
         if ports.TRAJECTORY in setup.ports:
-            services.append(Service("trajectory", [Given(setup.port(ports.TRAJECTORY))], []))
-        return Graph(setup, [*services, autopilot], KEEP)
+            services.append(Service("trajectory", [UserCommandBlock(setup.port(ports.TRAJECTORY))], []))
+        return BlockDiagram(setup, [*services, autopilot], KEEP)
 
     def _voltages(self, given: Sequence[float]) -> tuple[float, ...]:
         n = len(self._setup.port(ports.ACTUATORS).like.motor_voltage)
@@ -165,7 +165,7 @@ class Simulator:
             raise ValueError(f"motor_voltages: expected {n} numbers [V], got {given!r}")
         return found
 
-    def _command(self, graph: Graph, voltages: tuple[float, ...]) -> None:
+    def _command(self, graph: BlockDiagram, voltages: tuple[float, ...]) -> None:
         like: MotorCommand = self._setup.port(ports.ACTUATORS).like
         for i, value in enumerate(voltages):
             if not math.isfinite(value):
@@ -179,7 +179,7 @@ class Simulator:
         if graph.tick % self._setup.port(ports.STATUS).period == 0:
             graph.put(ports.STATUS, graph.tick, AutopilotStatus())
 
-    def _observe(self, graph: Graph) -> Observation:
+    def _observe(self, graph: BlockDiagram) -> Observation:
         last = graph.tick - 1
         sensors = self._setup.services["sensors"].ports if "sensors" in self._setup.services else ()
         return Observation(

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 Values = Mapping[str, float]
 CELL_VOLTAGE = 3.7  # [V] nominal
@@ -26,13 +26,13 @@ class Figure(NamedTuple):
     def check(self, value: float) -> None:
         """KeyedError for a value that cannot be."""
         if self.unit == "count" and not float(value).is_integer():
-            raise KeyedError(self.name, f"got {value:g}", "a whole number")
+            raise ConfigError(self.name, f"got {value:g}", "a whole number")
         if self.name == "rotors" and value not in ROTORS:
-            raise KeyedError(self.name, f"got {value:g}", "4, 6 or 8; write others into the file by hand")
+            raise ConfigError(self.name, f"got {value:g}", "4, 6 or 8; write others into the file by hand")
         if not (self.least < value or (self.zero and value == self.least)) or not value < self.most:
             low = f"{'from' if self.zero else 'above'} {self.least:g}"
             high = f" and below {self.most:g}" if self.most < math.inf else ""
-            raise KeyedError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
+            raise ConfigError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
 
     def doubt(self, value: float, guess: float) -> str:
         """What to ask of a value that is far from its guess; "" of one that is not."""

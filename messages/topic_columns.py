@@ -21,7 +21,7 @@ class _Group(NamedTuple):
     records: np.ndarray  # shape (m,)
 
 
-class History(Mapping[str, Column]):
+class TopicColumns(Mapping[str, Column]):
     """The columns of n messages; each is put together when it is asked for.
 
     - A number: shape (n,). An array, a sequence of numbers, or a message within the message that holds float64 only:
@@ -96,7 +96,7 @@ class History(Mapping[str, Column]):
         return column
 
 
-def history(message: Any, payloads: Sequence[bytes]) -> History:
+def history(message: Any, payloads: Sequence[bytes]) -> TopicColumns:
     """Messages of one type as columns by dotted field name.
 
     Args:
@@ -106,10 +106,10 @@ def history(message: Any, payloads: Sequence[bytes]) -> History:
     Raises:
         ValueError: a payload is not a message of the class.
     """
-    return History(message, list(_groups(message, payloads)))
+    return TopicColumns(message, list(_groups(message, payloads)))
 
 
-class Gathered:
+class ColumnBuilder:
     """Messages of one type as they come, put together page by page: so that no more than a page is there twice."""
 
     def __init__(self, message: Any) -> None:
@@ -124,11 +124,11 @@ class Gathered:
         if len(self._waiting) == PAGE:
             self._put_together()
 
-    def history(self) -> tuple[np.ndarray, History]:
+    def history(self) -> tuple[np.ndarray, TopicColumns]:
         """Times [ns], int64, shape (n,), and columns of all that have come, as of `history`."""
         if self._waiting or not self._groups:
             self._put_together()
-        return np.concatenate(self._times), History(self._message, self._groups)
+        return np.concatenate(self._times), TopicColumns(self._message, self._groups)
 
     def _put_together(self) -> None:
         times, payloads = zip(*self._waiting, strict=True) if self._waiting else ((), ())
@@ -140,7 +140,7 @@ class Gathered:
         self._waiting.clear()
 
 
-def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> History:
+def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> TopicColumns:
     """The same from pages of messages that have one shape each.
 
     Args:
@@ -152,7 +152,7 @@ def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]
         rows = payloads if payloads.dtype == np.uint8 else _bytes(payloads)
         layout = message.layouts.measure(rows[0].tobytes())
         groups.append(_Group(places, layout, rows.view(record_dtype(layout)).reshape(len(rows))))
-    return History(message, groups or list(_groups(message, ())))
+    return TopicColumns(message, groups or list(_groups(message, ())))
 
 
 def _bytes(records: np.ndarray) -> np.ndarray:

@@ -14,19 +14,19 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from lapwing.cosim.config import user_module
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json, to_json
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 
 _LENGTH = struct.Struct("<Q")
 LONGEST = 15  # characters that the system keeps of a process's name
 
 
-class Participation(NamedTuple):
+class ProcessSpec(NamedTuple):
     """What a process of a run is given."""
 
     name: str
-    setup: Setup
+    setup: RunConfig
     peers: dict[str, str]  # endpoint of every participant
     key_prefix: str  # key prefix
     secret: str = ""  # of a run on one machine (lapwing.cosim.access.publisher_ids)
@@ -50,14 +50,14 @@ class Participation(NamedTuple):
     with_parent: bool = False  # ends when standard input closes
 
 
-def hand_over(given: Participation, stream: IO[bytes]) -> None:
+def hand_over(given: ProcessSpec, stream: IO[bytes]) -> None:
     """Write what a process is given; the stream stays open."""
     data = to_json(given).encode()
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def take_over() -> Participation:
+def take_over() -> ProcessSpec:
     """Read what this process is given, from standard input."""
     text = _read(_LENGTH.unpack(_read(_LENGTH.size))[0]).decode()
     modules = json.loads(text)["setup"]["resolved"].get("modules", {})  # the set-up may name their classes
@@ -76,7 +76,7 @@ def _read(size: int) -> bytes:
     return data
 
 
-def take_part(given: Participation) -> None:
+def take_part(given: ProcessSpec) -> None:
     """Take part in a run to its end.
 
     Raises:
@@ -84,9 +84,9 @@ def take_part(given: Participation) -> None:
         LockStepError: the lock step cannot go on.
     """
     from lapwing.cosim.access import private_sockets
-    from lapwing.cosim.access.publisher_ids import Participants
+    from lapwing.cosim.access.publisher_ids import PublisherIds
     from lapwing.cosim.executors.lockstep import run_encoder, run_lockstep
-    from lapwing.cosim.executors.participant import Process, Stopped
+    from lapwing.cosim.executors.participant import Participant, Stopped
     from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.transport.bus import ZenohBus, mesh
     from lapwing.cosim.transport.input_journal import Journal
@@ -95,35 +95,35 @@ def take_part(given: Participation) -> None:
 
     setup, encoded = given.setup, process_table.encoded(given.name)
     entry = process_table.entry(encoded or given.name)
-    participants = Participants(given.key_prefix, given.secret, tuple(given.external or ()))
+    participants = PublisherIds(given.key_prefix, given.secret, tuple(given.external or ()))
     listen, connect = mesh(given.name, given.peers)
     if given.with_parent:
         security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
     else:
         security = settings(setup, given.name, given.key_prefix, given.keys)
-    # All wait for one another later (`Process.join`); only one that is started again asks others before
+    # All wait for one another later (`Participant.join`); only one that is started again asks others before
     awaits = given.journal >= 0
     with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security, awaits) as bus:
-        watched = WATCHER in given.peers and not given.with_parent
-        others = [*process_table.needed(setup, given.external or ()), *([WATCHER] if WATCHER in given.peers else [])]
+        watched = MONITOR in given.peers and not given.with_parent
+        others = [*process_table.needed(setup, given.external or ()), *([MONITOR] if MONITOR in given.peers else [])]
         if given.with_parent and process_table.ROUTER in given.peers:
             others.append(process_table.ROUTER)  # one that cannot listen ends the run
         # all that one launcher has started have the same set-up; a program of somebody else's may have another
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
         journal = Journal(given.name, given.journal) if given.journal >= 0 else None
-        process = Process(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
+        process = Participant(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
         if given.with_parent:
             process.end_with_parent(given.peers[given.name])
         elif watched:
-            process.end_with(WATCHER)
+            process.end_with(MONITOR)
         try:
             if encoded:
                 run_encoder(process, process_table.create(setup, encoded))
             elif entry.lock_step:
                 operators = _heard(process) if given.name == "autopilot" else {}
                 service = process_table.create(setup, given.name, operators)
-                run_lockstep(process, service, given.name == process_table.TIME_OWNER, process_table.RECORDER)
+                run_lockstep(process, service, given.name == process_table.CLOCK_OWNER, process_table.RECORDER)
             else:
                 module = __import__(f"{entry.package}.service", fromlist=["run"])
                 module.run(process, given)
@@ -146,7 +146,7 @@ def import_ahead(names: Iterable[str]) -> None:
 def _heard(process: Any) -> dict[str, Any]:
     """The operator commands that have come on the bus for each vehicle, from the processes that give any."""
     from lapwing.cosim.transport.input_journal import NOTHING
-    from lapwing.services.common.operator_inbox import OPERATOR_KEY, Mailbox
+    from lapwing.services.common.operator_inbox import OPERATOR_KEY, OperatorInbox
     from lapwing.services.process_table import MAVLINK, ROS2
 
     get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
@@ -158,7 +158,7 @@ def _heard(process: Any) -> dict[str, Any]:
         found = process.journal.take(come) if process.journal else come()
         return None if found == NOTHING else found
 
-    mailbox = Mailbox(process.setup.vehicles, arrived)
+    mailbox = OperatorInbox(process.setup.vehicles, arrived)
     return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
 
 

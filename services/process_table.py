@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.multi_vehicle import joined_service, members
 from lapwing.cosim.transport.bus_keys import ENCODER
@@ -41,7 +41,7 @@ PROCESSES = (
     ProcessEntry("ros2", "lapwing.services.ros2", False, needs=("ros2",), optional=True),
 )
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"
-TIME_OWNER = "plant"  # keeps the pace, and says which tick is the last
+CLOCK_OWNER = "plant"  # keeps the pace, and says which tick is the last
 
 
 def entry(name: str) -> ProcessEntry:
@@ -56,7 +56,7 @@ def entry(name: str) -> ProcessEntry:
     raise ValueError(f"unknown service {name}; expected one of {', '.join(p.name for p in PROCESSES)}")
 
 
-def needed(setup: Setup, external: Iterable[str] = ()) -> list[str]:
+def needed(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
     """The processes without which a run cannot go on; a service in `external` is a program of somebody else's."""
     own = [p.name for p in PROCESSES if (p.name in setup.services if p.lock_step else not p.optional)]
     return own + [f"{name}{ENCODER}" for name in external]
@@ -75,11 +75,11 @@ def encoded(name: str) -> str:
 Operator = Callable[[int], Iterable[Any]]  # gives the commands that have come until a tick, besides those of the plan
 
 
-def create(setup: Setup, name: str, operators: Mapping[str, Operator] = MappingProxyType({})) -> Service:
+def create(setup: RunConfig, name: str, operators: Mapping[str, Operator] = MappingProxyType({})) -> Service:
     """A service of the lock step of a run; `operators` give the commands of each vehicle, by its name."""
     module = importlib.import_module(f"{entry(name).package}.service")
 
-    def of(member: Setup) -> Service:
+    def of(member: RunConfig) -> Service:
         own = {"operator": operators[member.vehicle]} if name == "autopilot" and member.vehicle in operators else {}
         return module.create(member, **own)
 
@@ -89,7 +89,7 @@ def create(setup: Setup, name: str, operators: Mapping[str, Operator] = MappingP
     return joined_service(name, [(member, of(member)) for member in having])
 
 
-def create_all(setup: Setup, operator: Operator | Mapping[str, Operator] | None = None) -> list[Service]:
+def create_all(setup: RunConfig, operator: Operator | Mapping[str, Operator] | None = None) -> list[Service]:
     """All services of the lock step of a run, in their order of execution.
 
     Args:

@@ -12,13 +12,13 @@ from typing import Any
 
 import lapwing.services
 from lapwing.cosim import scene as scenes
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram import multi_vehicle
 from lapwing.cosim.scene import Overrides, Scene, SceneError, Vocabulary
 from lapwing.services.common import communication_schema as exchange
 from lapwing.services.common import environment_schema, mesh_schema, run_schema, success_criteria, user_modules
 from lapwing.services.common import vehicle_schema as vehicle
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.services.plant import models
@@ -73,7 +73,7 @@ def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
     return scenes.from_resolved(tree, vocabulary(), name)
 
 
-def reseed(setup: Setup, seed: int) -> Setup:
+def reseed(setup: RunConfig, seed: int) -> RunConfig:
     """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again.
 
     Raises:
@@ -94,7 +94,7 @@ def reseed(setup: Setup, seed: int) -> Setup:
     return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
 
 
-def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> Setup:
+def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> RunConfig:
     """The set-up of a run of this scene.
 
     Args:
@@ -117,7 +117,7 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
         return setup._replace(resolved=_restarts_listed(scene, setup.services))
 
 
-def _acquainted(members: list[Setup], key: str) -> list[Setup]:
+def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
     """The set-ups of a run's vehicles, once services whose `resolve.py` has `fleet` have seen those of all.
 
     `key`: what the keys of a vehicle begin with, with its number for {}.
@@ -137,8 +137,8 @@ def _acquainted(members: list[Setup], key: str) -> list[Setup]:
     return members
 
 
-def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
-    exchange, run = scene[Exchange], scene[Run]
+def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
+    exchange, run = scene[Communication], scene[Run]
     found: dict[str, Any] = {}
     beside: dict[str, Any] = {}
     for process in PROCESSES:
@@ -149,7 +149,7 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> Setup:
     if plan := plans.get(scene[Vehicle].name):
         autopilot = found["autopilot"]
         found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
-    return Setup(
+    return RunConfig(
         scene.name,
         run.title,
         run.seed,

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from lapwing.cosim.access.certificates import make
 from lapwing.cosim.access.zenoh_access import VIEWER
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.distributed_run import parse_peers
 from lapwing.services import process_table as processes
 from lapwing.services import security
@@ -159,7 +159,7 @@ def endpoints():
 @pytest.mark.parametrize("scene", sorted(Path("scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_process_that_a_scene_needs_has_a_container_and_an_endpoint(scene):
     peers, started = endpoints()
-    needed = {WATCHER, *processes.needed(resolve(load(scene)))}
+    needed = {MONITOR, *processes.needed(resolve(load(scene)))}
     assert needed <= set(peers)
     assert needed <= started
 

@@ -13,9 +13,9 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import Input
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort
 from lapwing.services.process_table import PROCESSES, create_all
 from lapwing.services.scene_resolver import load, resolve
 
@@ -48,7 +48,7 @@ LANES = {"battery": 2.35, "actuators": 1.8, "status": 1.35}  # height of arrows 
 BUS = 0.25  # height of the line of batches
 
 
-def rate(setup: Setup, port: str) -> str:
+def rate(setup: RunConfig, port: str) -> str:
     """How often a port is given, in words."""
     return f"{setup.rate / setup.port(port).period:g} Hz"
 
@@ -76,10 +76,10 @@ def arrow(axes: Axes, x0: float, x1: float, y: float, text: str) -> None:
     )
 
 
-def ports(axes: Axes, setup: Setup) -> None:
+def ports(axes: Axes, setup: RunConfig) -> None:
     """One arrow for each port that somebody takes."""
     for consumer, service in setup.services.items():
-        taken: dict[str, list[Input]] = {}
+        taken: dict[str, list[InputPort]] = {}
         for needed in service.inputs:
             taken.setdefault(setup.producers[needed.port], []).append(needed)
         for producer, inputs in taken.items():
@@ -94,7 +94,7 @@ def ports(axes: Axes, setup: Setup) -> None:
                 arrow(axes, x0, x1, {**heights, **LANES}[needed.port], text)
 
 
-def batches(axes: Axes, setup: Setup) -> None:
+def batches(axes: Axes, setup: RunConfig) -> None:
     """What every service hands to the processes beside the lock step, and what comes from outside."""
     style = {"color": GREY, "lw": 1.1, "ls": ":", "zorder": 1}
     for name, x in {"plant": 1.0, "sensors": 4.75, "trajectory": 6.7, "autopilot": 10.4}.items():
@@ -125,7 +125,7 @@ def draw(path: Path) -> None:
         lines = []
         for part in service.parts:
             name = part.name.removeprefix(f"{service.name}.")
-            python = not isinstance(part, Part)
+            python = not isinstance(part, Block)
             lines.append((f"{name} (Python)", ORANGE) if python else (name, DARK))
         process(axes, SERVICES[service.name], f"{number}  {service.name}", lines if len(lines) > 1 else [])
     what = {"recorder": "log.mcap", "router": "--open: topics for clients", "mavlink": "--mavlink"}

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load
 from lapwing.services.sensors.registry import parameters
@@ -74,7 +74,7 @@ def frames(axes: Axes, title: str, world: dict[str, tuple], body: dict[str, tupl
 def schedule(axes: Axes) -> None:
     """What is due at which tick in the delivery mission."""
     scene = load("delivery_mission")
-    exchange, last = scene[Exchange], 54
+    exchange, last = scene[Communication], 54
     rows = []
     for name in ("imu", "magnetometer", "barometer", "sonar", "gps"):
         p = parameters(name, scene.tables("sensors")[name], exchange.interval)

@@ -26,16 +26,16 @@ from lapwing.cli.output_paths import check_writable
 
 if TYPE_CHECKING:
     from lapwing.services.mavlink.link_options import Options
-    from lapwing.services.mavlink.link_server import Hub
+    from lapwing.services.mavlink.link_server import LinkServer
 
 
-def _recorded_hubs(log: Path, options: "Options", stack: ExitStack) -> "dict[str, Hub]":
+def _recorded_hubs(log: Path, options: "Options", stack: ExitStack) -> "dict[str, LinkServer]":
     """The links of each vehicle of a log, by its name; those of a fleet wait with the first's."""
     from lapwing.cosim.config.provenance import SETUP_FILE
     from lapwing.cosim.diagram.multi_vehicle import members
     from lapwing.cosim.log import LogReader
     from lapwing.runs.resimulate import recorded_setup
-    from lapwing.services.mavlink.link_server import Hub
+    from lapwing.services.mavlink.link_server import LinkServer
     from lapwing.services.mavlink.links import numbered
     from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
@@ -44,10 +44,10 @@ def _recorded_hubs(log: Path, options: "Options", stack: ExitStack) -> "dict[str
             flown = {m.vehicle: m.beside.get("mavlink") for m in members(recorded_setup(recorded))}
         else:  # another tool's, or a part of one
             flown = {next((t.split("/")[1] for t in recorded.topics() if t.endswith("/status")), "drone1"): None}
-    hubs: dict[str, Hub] = {}
+    hubs: dict[str, LinkServer] = {}
     for i, (name, description) in enumerate(flown.items()):
         own = options._replace(urls=tuple(numbered(url, i) for url in options.urls))
-        hub = Hub(description or VehicleDescription(name), own, None, next(iter(hubs.values()), None))
+        hub = LinkServer(description or VehicleDescription(name), own, None, next(iter(hubs.values()), None))
         hubs[name] = stack.enter_context(hub)
     return hubs
 
@@ -104,7 +104,7 @@ def replay(
             check_address(foxglove, insecure)
         router = check_ros2(ros2, ros2_router, insecure)
         with ExitStack() as stack:
-            hubs: dict[str, Hub] = {}
+            hubs: dict[str, LinkServer] = {}
             if mavlink:
                 hubs = _recorded_hubs(log, mavlink_options(mavlink, mavlink_key, insecure, log, factor), stack)
             listeners: list[Callable[[str, int, bytes], None]] = [hub.replay for hub in hubs.values()]

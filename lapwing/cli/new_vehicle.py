@@ -10,7 +10,7 @@ import typer
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.new_command import new
 from lapwing.cosim.processes.interrupt import Interrupted
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure
@@ -150,9 +150,9 @@ def _given(measured: list[str]) -> dict[str, float]:
     for text in measured:
         name, _, value = (part.strip() for part in text.partition("="))
         if name not in names:
-            raise KeyedError.unknown(f"--set {text}", "figure", name, names)
+            raise ConfigError.unknown(f"--set {text}", "figure", name, names)
         try:
             found[name] = float(value)
         except ValueError:
-            raise KeyedError(f"--set {text}", f"got {value!r}", "a number") from None
+            raise ConfigError(f"--set {text}", f"got {value!r}", "a number") from None
     return found

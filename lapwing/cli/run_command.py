@@ -36,7 +36,7 @@ from lapwing.cosim.processes.child_process import Child, started_early
 if TYPE_CHECKING:
     from lapwing.flight import Flight
     from lapwing.runs.observer import Elapsed
-    from lapwing.services.process_main import Participation
+    from lapwing.services.process_main import ProcessSpec
 
 
 @app.command()
@@ -82,11 +82,11 @@ def run(
     asked = {"router": bool(open_), "mavlink": bool(mavlink), "foxglove": bool(foxglove), "ros2": ros2 is not None}
     with user_errors(), _started_early(mode == "processes" and peers is None, **asked) as early:
         from lapwing.cosim.executors.realtime import why_not
-        from lapwing.cosim.processes.run_monitor import WATCHER
+        from lapwing.cosim.processes.run_monitor import MONITOR
         from lapwing.runs.distributed_run import check_complete, check_endpoint, elsewhere, parse_external, parse_peers
         from lapwing.services.common.run_schema import Run
         from lapwing.services.common.success_criteria import Success
-        from lapwing.services.process_main import Participation
+        from lapwing.services.process_main import ProcessSpec
         from lapwing.services.process_table import needed
         from lapwing.services.ros2.schema import Bus
         from lapwing.services.scene_resolver import load, resolve
@@ -140,13 +140,13 @@ def run(
         if table is not None:
             if loaded[Run].restart:
                 raise ValueError("run.restart: `lapwing run` starts again what it has started; leave out --peers")
-            check_complete(table, [*needed(setup, elsewhere(table)), WATCHER])
+            check_complete(table, [*needed(setup, elsewhere(table)), MONITOR])
         check_distinct({"SCENE": scene, "--log": log, "--json": json, "--report": report})
         path = log_path(loaded, log, exists=table is not None)
         check_writable(json)
         check_report("--report", report)
-        given = Participation(
-            name=WATCHER,
+        given = ProcessSpec(
+            name=MONITOR,
             setup=setup,
             peers=table or {},
             key_prefix=key_prefix,
@@ -226,7 +226,7 @@ def _started_early(in_processes: bool, **options: bool) -> Iterator[dict[str, Ch
         yield early
 
 
-def _fly(given: "Participation", log: Path, view: bool, early: dict[str, Child]) -> "Elapsed":
+def _fly(given: "ProcessSpec", log: Path, view: bool, early: dict[str, Child]) -> "Elapsed":
     from lapwing.cli.progress import Display
     from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2
     from lapwing.studies.terminal import console
@@ -261,6 +261,6 @@ def _fly(given: "Participation", log: Path, view: bool, early: dict[str, Child])
                 shows.append(page.show)
             if not (view or FOXGLOVE in beside or ROS2 in beside):
                 return fly()
-            from lapwing.runs.live_feed import Following
+            from lapwing.runs.live_feed import LiveFeed
 
-            return fly(live=Following(setup, shows).observe)
+            return fly(live=LiveFeed(setup, shows).observe)

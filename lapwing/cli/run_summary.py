@@ -19,7 +19,7 @@ from lapwing.studies.tracking import shown
 
 if TYPE_CHECKING:
     from lapwing.runs.observer import Elapsed
-    from lapwing.services.process_main import Participation
+    from lapwing.services.process_main import ProcessSpec
 
 MOST = 60  # events that are printed
 COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all others
@@ -35,7 +35,7 @@ def fleet(log: Path) -> list[Flight]:
 
 def conclude(
     scene: Scene,
-    given: "Participation",
+    given: "ProcessSpec",
     flights: Sequence[Flight],
     elapsed: "Elapsed | None",
     write_to: Path | None,

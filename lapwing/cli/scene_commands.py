@@ -39,7 +39,7 @@ def scenes(
 @app.command()
 def check(scene: SceneFile, set_: Overrides = None) -> None:
     """Validate a scene."""
-    from lapwing.services.common.communication_schema import Exchange
+    from lapwing.services.common.communication_schema import Communication
     from lapwing.services.common.run_schema import Run
     from lapwing.services.common.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
@@ -47,7 +47,7 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
     with user_errors():
         loaded = decided(scene, set_ or [])
         setup = resolve(loaded)
-        exchange, lines = loaded[Exchange], [("title", loaded[Run].title or loaded.name)]
+        exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
         warn_of_gains(loaded)
         for each in loaded.vehicles or (loaded,):

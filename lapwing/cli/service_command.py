@@ -53,7 +53,7 @@ def service(
     from lapwing.runs.distributed_run import elsewhere, parse_peers
     from lapwing.services import process_table
     from lapwing.services.foxglove.server import check_address
-    from lapwing.services.process_main import Participation, take_part
+    from lapwing.services.process_main import ProcessSpec, take_part
     from lapwing.services.scene_resolver import resolve
 
     with user_errors():
@@ -80,7 +80,7 @@ def service(
             typer.echo(f"{name}: {scene} does not call for it")  # compose starts every service there is
             return
         take_part(
-            Participation(
+            ProcessSpec(
                 name=name,
                 setup=setup,
                 peers=table,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from lapwing.cosim.scene import Section
+from lapwing.cosim.scene import SceneTable
 from lapwing.cosim.scene.vehicle_scenes import MOST
 from lapwing.docs.annotations import Schema, closed, required, table_schema
 from lapwing.docs.catalogue import effect_tables, flight_parameters, sensor_tables
@@ -75,11 +75,11 @@ def _head(title: str) -> Schema:
     return {"$schema": DRAFT, "title": title}
 
 
-def _section(section: type[Section]) -> Schema:
+def _section(section: type[SceneTable]) -> Schema:
     return {"description": " ".join((section.__doc__ or "").split()), **table_schema(section)}
 
 
-def _fleet(tables: Schema, sections: dict[str, type[Section]]) -> Schema:
+def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
     """Several vehicles: each has the keys of a vehicle, and what it says of the tables that it need not share."""
     names = [name for name, section in sections.items() if name != "vehicle" and not section.SHARED]
     own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import Any, get_args
 
-from lapwing.cosim.scene import Section
+from lapwing.cosim.scene import SceneTable
 from lapwing.docs.catalogue import effect_tables, flight_parameters, sensor_tables
 from lapwing.docs.key_docs import first_sentence, is_table, keys
 from lapwing.docs.markdown import key_table, number, table
@@ -75,16 +75,16 @@ def _doc(thing: Any) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
-def _section(section: type[Section]) -> str:
+def _section(section: type[SceneTable]) -> str:
     needed = "" if section.OPTIONAL else " Always there, with these defaults."
     return f"### [{section.TABLE}]\n\n{_doc(section)}{needed if not _required(section) else ''}\n\n{_keys(section)}"
 
 
-def _required(section: type[Section]) -> bool:
+def _required(section: type[SceneTable]) -> bool:
     return any(field.is_required() for field in section.model_fields.values())
 
 
-def _keys(section: type[Section]) -> str:
+def _keys(section: type[SceneTable]) -> str:
     """The keys of a section, those of the tables within it, and what is checked of the whole scene."""
     parts = [key_table(keys(section))]
     parts += _inner_tables(section, section.TABLE)
@@ -110,7 +110,7 @@ def _tables_in(hint: Any) -> list[type]:
     return [found for part in get_args(hint) for found in _tables_in(part)]
 
 
-def _tables_by_model() -> dict[type[Section], str]:
+def _tables_by_model() -> dict[type[SceneTable], str]:
     """The tables that only one model of the plant has, with its name."""
     return {
         section: name
@@ -120,7 +120,7 @@ def _tables_by_model() -> dict[type[Section], str]:
     }
 
 
-def _models(by_model: dict[type[Section], str]) -> Iterator[str]:
+def _models(by_model: dict[type[SceneTable], str]) -> Iterator[str]:
     yield "`vehicle.model` names one of these."
     for name in models.names():
         parts = [f"### {name}", _doc(models.get(name))]

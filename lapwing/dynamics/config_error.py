@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable
 
 
-class KeyedError(ValueError):
+class ConfigError(ValueError):
     """What is wrong with a key; `str` is one line."""
 
     def __init__(self, key: str, message: str, expected: str = ""):
@@ -19,16 +19,16 @@ class KeyedError(ValueError):
         self.key, self.message, self.expected = key, message, expected
 
     @classmethod
-    def unknown(cls, key: str, what: str, name: object, choices: Iterable[str]) -> "KeyedError":
+    def unknown(cls, key: str, what: str, name: object, choices: Iterable[str]) -> "ConfigError":
         """A name that is none of the choices: lists them, the nearest first."""
         listed = sorted(choices)
         near = difflib.get_close_matches(str(name), listed, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
         return cls(key, f"unknown {what} {name!r}{hint}", f"one of {', '.join(listed)}" if listed else "none")
 
-    def under(self, prefix: str) -> "KeyedError":
+    def under(self, prefix: str) -> "ConfigError":
         """The same fault, with the key seen from the table around it."""
-        return KeyedError(".".join(filter(None, (prefix, self.key))), self.message, self.expected)
+        return ConfigError(".".join(filter(None, (prefix, self.key))), self.message, self.expected)
 
     @property
     def sentence(self) -> str:

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a table, as a `KeyedError` in the words of a user."""
+"""What pydantic finds wrong with a table, as a `ConfigError` in the words of a user."""
 
 import types
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.field_comments import comments, split
 
 BOUNDS = {Gt: ("gt", "above"), Ge: ("ge", "at least"), Lt: ("lt", "below"), Le: ("le", "at most")}
@@ -19,7 +19,7 @@ OF_NUMBERS = ("float_type", "int_type", "int_from_float", "float_parsing", "int_
 LONGEST = 60  # characters of a wrong value that are shown
 
 
-def fault(error: ValidationError, model: type) -> KeyedError:
+def fault(error: ValidationError, model: type) -> ConfigError:
     """The most telling of the faults that pydantic found.
 
     Args:
@@ -35,15 +35,15 @@ def fault(error: ValidationError, model: type) -> KeyedError:
     location = [part for part in first["loc"] if part != "[key]"]  # [key]: the key itself is at fault
     key = ".".join(map(str, location))
     if kind in UNKNOWN_KEY:
-        return KeyedError.unknown(key, "key", location[-1], keys(follow(model, location[:-1])))
+        return ConfigError.unknown(key, "key", location[-1], keys(follow(model, location[:-1])))
     hint = follow(model, location)
     if kind in ("missing", "missing_argument"):
-        return KeyedError(key, "missing", describe(hint) + _unit(model, location))
+        return ConfigError(key, "missing", describe(hint) + _unit(model, location))
     if kind == "value_error":
         cause = context["error"]
-        return cause.under(key) if isinstance(cause, KeyedError) else KeyedError(key, str(cause))
+        return cause.under(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
     unit = _unit(model, location) if kind in OF_NUMBERS else ""
-    return KeyedError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
+    return ConfigError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
 
 
 def _unit(model: type, location: Sequence[str | int]) -> str:

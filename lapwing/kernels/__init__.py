@@ -13,14 +13,14 @@ by name: put kernels and classes into modules.
 from lapwing.kernels.compiler.cache import Statistics, on_compile, statistics
 from lapwing.kernels.compiler.cache_files import root as cache_folder
 from lapwing.kernels.compiler.decorators import apart, kernel, leaf, uncompiled, uncounted, unkept, vectorised
-from lapwing.kernels.compiler.dispatch_table import ByClass
+from lapwing.kernels.compiler.dispatch_table import DispatchTable
 from lapwing.kernels.compiler.pipeline import Pipeline
 from lapwing.kernels.compiler.source_digest import digest as source_digest
 from lapwing.kernels.compiler.source_digest import forget as forget_sources
 from lapwing.kernels.compiler.start_time import BEGAN  # noqa: F401 (first of all)
 
 __all__ = [
-    "ByClass",
+    "DispatchTable",
     "Pipeline",
     "Statistics",
     "apart",

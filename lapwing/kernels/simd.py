@@ -25,18 +25,18 @@ FLOAT, INDEX = ir.DoubleType(), ir.IntType(32)
 VECTOR = ir.VectorType(FLOAT, 4)
 
 
-class LanesType(types.Type):
+class Float64x4Type(types.Type):
     """The numba type of four floats side by side."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")
 
 
-LANES = LanesType()
-NUMBERS.append(LanesType)
+LANES = Float64x4Type()
+NUMBERS.append(Float64x4Type)
 
 
-@register_model(LanesType)
+@register_model(Float64x4Type)
 class _Model(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any):
         super().__init__(dmm, fe_type, VECTOR)

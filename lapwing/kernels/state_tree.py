@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from numba.core import types
 from numba.core.errors import TypingError
 
-from lapwing.kernels import ByClass
+from lapwing.kernels import DispatchTable
 from lapwing.kernels.codegen import define, generated
 
 
@@ -35,7 +35,7 @@ class Manifold(NamedTuple):
     transport: Callable  # (u, v) -> v parallel-transported from retract(x, u) back to x along the geodesic
 
 
-MANIFOLDS = ByClass()
+MANIFOLDS = DispatchTable()
 NUMBERS: list[type] = [types.Float]
 """The numba types that are numbers in a tree."""
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.kernels import cache_folder, on_compile
 
 EACH = 5.0  # [s] a service takes to compile, on an idle core of 2024, where nothing is known of this machine
@@ -43,7 +43,7 @@ class Stopwatch:
     disk tells it of neither, and nothing is said.
     """
 
-    def __init__(self, mode: str, setup: Setup, say: Callable[[Compilation], None]):
+    def __init__(self, mode: str, setup: RunConfig, say: Callable[[Compilation], None]):
         """`say` is called once, when something compiles."""
         self._key, self._say, self._started = _key(mode, setup), say, 0.0
         self._guess = guessed(setup, mode)
@@ -63,7 +63,7 @@ class Stopwatch:
 
 
 @contextmanager
-def told(setup: Setup, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
+def told(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
     """Say so once, as soon as a kernel is compiled within the context for a run in this process.
 
     Args:
@@ -86,13 +86,13 @@ def told(setup: Setup, say: Callable[[Compilation], None], alone: bool = True) -
         waiting = False
 
 
-def guessed(setup: Setup, mode: str = ONE) -> Compilation:
+def guessed(setup: RunConfig, mode: str = ONE) -> Compilation:
     """What a run compiles where none of its kernels is kept."""
     seconds = _known().get(_key(mode, setup), EACH * len(setup.services))
     return Compilation(setup.scene, tuple(setup.services), seconds)
 
 
-def _key(mode: str, setup: Setup) -> str:
+def _key(mode: str, setup: RunConfig) -> str:
     return f"{mode}: {setup.scene}: {', '.join(setup.services)}"
 
 

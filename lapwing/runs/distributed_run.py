@@ -4,10 +4,10 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.processes.interrupt import Stop
-from lapwing.cosim.processes.run_monitor import WATCHER, Watch
+from lapwing.cosim.processes.run_monitor import MONITOR, RunMonitor
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENCODER
@@ -15,7 +15,7 @@ from lapwing.cosim.transport.key_prefix import check_key_prefix
 from lapwing.runs.multi_process_run import Clock
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.security import settings
 
 LOST = 6.0  # [s] without news after which a run counts as lost: after a cut of 2 s, TCP takes up to 4 s to send again
@@ -24,7 +24,9 @@ JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
 CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has failed
 
 
-def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch], None] = lambda watch: None) -> Elapsed:
+def fly_joined(
+    given: ProcessSpec, observer: Observer, live: Callable[[RunMonitor], None] = lambda watch: None
+) -> Elapsed:
     """Watch a run whose services are started elsewhere, to its end; `live` is shown it some five times a second.
 
     Raises:
@@ -35,13 +37,13 @@ def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch],
     setup, peers, key_prefix = given.setup, given.peers, given.key_prefix
     check_key_prefix(key_prefix)
     external = given.external or {}
-    clock, participants = Clock(observer, setup), Participants(key_prefix, external=tuple(external))
+    clock, participants = Clock(observer, setup), PublisherIds(key_prefix, external=tuple(external))
     names = set(process_table.needed(setup, external))
-    listen, connect = mesh(WATCHER, peers)
-    mark, security = participants.mark(WATCHER), settings(setup, WATCHER, key_prefix, given.keys)
+    listen, connect = mesh(MONITOR, peers)
+    mark, security = participants.mark(MONITOR), settings(setup, MONITOR, key_prefix, given.keys)
     with Stop() as stop, ZenohBus(listen, connect, mark=mark, security=security) as bus:
-        watch = Watch(bus, participants, peers, LOST, setup.services)
-        leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{WATCHER}")
+        watch = RunMonitor(bus, participants, peers, LOST, setup.services)
+        leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{MONITOR}")
         try:
             _follow(watch, clock, stop, names, live)
         except RunFailed:
@@ -53,8 +55,8 @@ def fly_joined(given: Participation, observer: Observer, live: Callable[[Watch],
     return clock.elapsed
 
 
-def _follow(watch: Watch, clock: Clock, stop: Stop, names: set[str], live: Callable[[Watch], None]) -> None:
-    """Watch the run of the participants `names` to its end; errors as of `fly_joined`."""
+def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: Callable[[RunMonitor], None]) -> None:
+    """RunMonitor the run of the participants `names` to its end; errors as of `fly_joined`."""
     deadline = time.monotonic() + JOIN_TIMEOUT
     while not (watch.ended and process_table.RECORDER in watch.gone):
         live(watch)
@@ -79,7 +81,7 @@ def _follow(watch: Watch, clock: Clock, stop: Stop, names: set[str], live: Calla
         raise RunFailed(early)
 
 
-def _comes(watch: Watch, news: Callable[[], bool], seconds: float) -> bool:
+def _comes(watch: RunMonitor, news: Callable[[], bool], seconds: float) -> bool:
     """Whether some news arrives within so many seconds, by other links than the news that somebody has gone."""
     deadline = time.monotonic() + seconds
     while not news() and time.monotonic() < deadline:
@@ -116,7 +118,7 @@ def elsewhere(peers: Mapping[str, str]) -> dict[str, str]:
     return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
 
 
-def parse_external(texts: Iterable[str], setup: Setup) -> dict[str, str]:
+def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
     """Each "name=endpoint" as a table.
 
     Raises:
@@ -125,7 +127,7 @@ def parse_external(texts: Iterable[str], setup: Setup) -> dict[str, str]:
     found = {}
     for text in texts:
         name, _, endpoint = text.partition("=")
-        choices = [service for service in setup.services if service != process_table.TIME_OWNER]
+        choices = [service for service in setup.services if service != process_table.CLOCK_OWNER]
         if name not in choices:
             raise ValueError(f"--external {text}: expected NAME=ENDPOINT with one of {', '.join(choices)}")
         check_endpoint(f"--external {name}", endpoint)

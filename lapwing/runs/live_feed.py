@@ -2,28 +2,28 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import members
-from lapwing.cosim.diagram.topic_encoder import Page
-from lapwing.cosim.processes.run_monitor import Watch
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.processes.run_monitor import RunMonitor
 from lapwing.messages.topics import EVENTS
 from lapwing.runs.log_events import event_messages
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.live_flight import LiveFlight, new_events
 
-Shows = Callable[[Sequence[Flight], Sequence[list[Event]]], None]
+Shows = Callable[[Sequence[FlightData], Sequence[list[Event]]], None]
 
 
-class Following:
+class LiveFeed:
     """Tells of each step of a run; events also go out on their topic, for viewers that are processes of the run."""
 
-    def __init__(self, setup: Setup, shows: Iterable[Shows] = ()):
+    def __init__(self, setup: RunConfig, shows: Iterable[Shows] = ()):
         """Of a run that is about to begin; each of `shows` is given a step of every vehicle and what happened in it."""
         self._flights, self._after = [LiveFlight(member) for member in members(setup)], -1.0
         self._services, self._shows = set(setup.services), tuple(shows)
 
-    def observe(self, watch: Watch) -> None:
+    def observe(self, watch: RunMonitor) -> None:
         """Take in what is new in a run that is watched."""
         watch.listen = self._take
         if not watch.spoken >= self._services:
@@ -39,6 +39,6 @@ class Following:
         for show in self._shows:
             show(steps, happened)
 
-    def _take(self, pages: list[Page]) -> None:
+    def _take(self, pages: list[RecordBatch]) -> None:
         for flight in self._flights:
             flight.take(pages)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.studies.flight_data import Flight
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.report.motion_3d import steps_to_json
 from lapwing.studies.report.page import live_page
@@ -24,7 +24,7 @@ OVER = "event: over\ndata:\n\n"
 class LivePage:
     """Serves the page; a context manager. The sockets are closed at its end."""
 
-    def __init__(self, setup: Setup):
+    def __init__(self, setup: RunConfig):
         """Of a run that is about to begin."""
         self._lock = threading.Lock()
         self._steps: list[str] = []
@@ -37,7 +37,7 @@ class LivePage:
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/{token}/"
         threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True).start()
 
-    def show(self, steps: Sequence[Flight], events: Sequence[list[Event]]) -> None:
+    def show(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         """Show what is new of every vehicle, and what happened in it."""
         self._put(f"data: {steps_to_json(steps, events, first=not self._steps)}\n\n")
 

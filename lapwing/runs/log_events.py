@@ -7,7 +7,7 @@ from lapwing.cosim.log.append import append
 from lapwing.messages import Log, stamp
 from lapwing.messages.topics import EVENTS
 from lapwing.services.common.event_kinds import KINDS
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
 
 
@@ -21,7 +21,7 @@ def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
     return found
 
 
-def add_events(log: Path, flight: Flight) -> None:
+def add_events(log: Path, flight: FlightData) -> None:
     """Write the events of a recorded flight into its log, which has its end and does not tell of them.
 
     Raises:

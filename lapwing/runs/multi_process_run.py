@@ -7,28 +7,28 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import IO
 
-from lapwing.cosim.access.publisher_ids import Participants, new_secret
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import leading
 from lapwing.cosim.processes.child_process import Child
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.launcher import launch
 from lapwing.cosim.processes.restart_policy import Restarts
-from lapwing.cosim.processes.run_monitor import Watch
+from lapwing.cosim.processes.run_monitor import RunMonitor
 from lapwing.cosim.transport.key_prefix import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Stopwatch
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
 from lapwing.services.common.run_schema import Run
-from lapwing.services.process_main import Participation, hand_over
+from lapwing.services.process_main import ProcessSpec, hand_over
 
 
 def fly_processes(
-    given: Participation,
+    given: ProcessSpec,
     observer: Observer,
     beside: Iterable[str] = (),
-    live: Callable[[Watch], None] = lambda watch: None,
+    live: Callable[[RunMonitor], None] = lambda watch: None,
     early: dict[str, Child] | None = None,
 ) -> Elapsed:
     """Fly with every service in a process of its own.
@@ -67,12 +67,12 @@ def fly_processes(
         )
         hand_over(own, stream)
 
-    participants = Participants(given.key_prefix, given.secret, tuple(external))
+    participants = PublisherIds(given.key_prefix, given.secret, tuple(external))
     with Stop() as stop, ExitStack() as stack:
         journals = {name: stack.enter_context(_journal(given.log)).fileno() for name in again}
         restarts = Restarts(journals, observer.say)
 
-        def ended(watch: Watch) -> bool:
+        def ended(watch: RunMonitor) -> bool:
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
@@ -87,7 +87,7 @@ def fly_processes(
     return clock.elapsed
 
 
-def restarted(setup: Setup) -> tuple[str, ...]:
+def restarted(setup: RunConfig) -> tuple[str, ...]:
     """The services that are started again where they are killed."""
     return tuple(setup.resolved[Run.TABLE].get("restart", ()))
 
@@ -103,13 +103,13 @@ def _journal(log: str) -> IO[bytes]:
 class Clock:
     """Follows a run for the observer, and measures it from its first batch to its last."""
 
-    def __init__(self, observer: Observer, setup: Setup):
+    def __init__(self, observer: Observer, setup: RunConfig):
         self._observer, self._began, self._slow_disk = observer, False, False
         self._pose, self._status = leading(setup, POSE), leading(setup, STATUS)
         self._compiling = Stopwatch("processes", setup, observer.compiling)
         self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
 
-    def observe(self, watch: Watch) -> bool:
+    def observe(self, watch: RunMonitor) -> bool:
         """Show what is new; never asks to stop."""
         self.refused = watch.refused
         if watch.began is None:
@@ -128,7 +128,7 @@ class Clock:
         return False
 
 
-def shared_core(setup: Setup) -> int | None:
+def shared_core(setup: RunConfig) -> int | None:
     """The core for all services of a sequential lock step, in which only one works at a time; None: leave it free."""
     if setup.coupling != "sequential" or not hasattr(os, "sched_getaffinity"):
         return None

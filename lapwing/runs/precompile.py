@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, Task, TextColumn
 from rich.progress_bar import ProgressBar
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.runs.compile_notice import Compilation, guessed, told
 from lapwing.services.process_table import create_all
@@ -26,7 +26,7 @@ class _Bar(BarColumn):
         return ProgressBar(total=task.total, completed=task.completed + now, width=self.bar_width)
 
 
-def compile_ahead(setups: Mapping[str, Setup], console: Console) -> None:
+def compile_ahead(setups: Mapping[str, RunConfig], console: Console) -> None:
     """Compile what scenes need, one after the other; says of each how long it took, and in a bar how far it is.
 
     Args:
@@ -49,7 +49,7 @@ def compile_ahead(setups: Mapping[str, Setup], console: Console) -> None:
 
             started = time.perf_counter()
             with told(setup, say):
-                Graph(setup, create_all(setup), PAGE).advance(1)  # what steps the parts is compiled, too
+                BlockDiagram(setup, create_all(setup), PAGE).advance(1)  # what steps the parts is compiled, too
                 metrics.compile_ahead()
             done += guess
             console.print(f"{name}: ready after {time.perf_counter() - started:.1f} s", soft_wrap=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from lapwing.cosim.config import user_module
 from lapwing.cosim.config.provenance import SETUP_FILE
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json
 from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput
@@ -18,7 +18,7 @@ from lapwing.runs.single_process_run import fly_single
 from lapwing.services.process_table import Operator
 
 
-def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> Setup:
+def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> RunConfig:
     """The set-up of a run's log, which may have classes of these modules.
 
     Raises:
@@ -30,7 +30,7 @@ def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> Setup:
         found = from_json(read.attachments[SETUP_FILE].decode(), modules)
     except ValueError as error:
         raise ValueError(f"{read.path}: its set-up cannot be read: {error}; expected {read.versions}") from None
-    if not isinstance(found, Setup):
+    if not isinstance(found, RunConfig):
         raise ValueError(f"{read.path}: its attachment {SETUP_FILE} is no set-up")
     return found
 
@@ -43,7 +43,7 @@ def carried_modules(read: LogReader) -> dict[str, str]:
         return {}
 
 
-def given_commands(read: LogReader, setup: Setup, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
+def given_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
     """The commands from outside, with the ticks at which they applied; none where nobody was listened to.
 
     Args:
@@ -98,7 +98,7 @@ def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
     return lambda tick: given.get(tick, ())
 
 
-def without_plan(setup: Setup) -> Setup:
+def without_plan(setup: RunConfig) -> RunConfig:
     """The set-up without the plan's commands, which a log has among those that the autopilot took."""
     if "autopilot" not in setup.services or not setup.vehicle:  # a fleet has no plan
         return setup

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lapwing.cosim.config.provenance import attachments, failure, metadata
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.multi_vehicle import leading
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.log import LogWriter
@@ -20,7 +20,7 @@ from lapwing.services.process_table import Operator, create_all
 
 
 def fly_single(
-    setup: Setup,
+    setup: RunConfig,
     log: Path,
     sources: Mapping[str, str] | None = None,
     speed: float | None = None,
@@ -46,12 +46,12 @@ def fly_single(
     """
     watcher = observer or Silent()
     with told(setup, watcher.compiling):
-        graph = Graph(setup, create_all(setup, operator), PAGE)
+        graph = BlockDiagram(setup, create_all(setup, operator), PAGE)
     with Stop() as stop, LogWriter(log, metadata(setup, "single"), attachments(setup, sources or {})) as writer:
         recording = Recording(writer, setup)
         pose, status = leading(setup, POSE), leading(setup, STATUS)
 
-        def observe(graph: Graph) -> bool:
+        def observe(graph: BlockDiagram) -> bool:
             newest = recording.newest
             watcher.show((graph.tick - 1) * setup.interval_ns, newest.get(pose), newest.get(status))
             return stop.number is not None

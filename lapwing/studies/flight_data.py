@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from lapwing.cosim.config.provenance import DIVERGED, FAILURE, RESTARTS
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.log import LogReader
 from lapwing.messages import TYPES
@@ -29,7 +29,7 @@ from lapwing.studies import tracking
 from lapwing.studies.flight_events import Event, events, ordered, restarts, slack
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.flight_topics import FlightTopics
-from lapwing.studies.outcome import Verdict, judge
+from lapwing.studies.outcome import FlightOutcome, judge
 from lapwing.studies.port_columns import columns_of
 from lapwing.studies.topic_view import TopicView
 
@@ -40,7 +40,7 @@ IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle i
 SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which verdict, events, figures and report are made
 
 
-class Flight(FlightTopics):
+class FlightData(FlightTopics):
     """What was said in a flight, topic by topic, and what that comes to.
 
     `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
@@ -59,7 +59,7 @@ class Flight(FlightTopics):
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
         self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
-        self.others: tuple[Flight, ...] = ()
+        self.others: tuple[FlightData, ...] = ()
 
     @classmethod
     def read(cls, path: str | Path, vehicle: str | None = None, only: Collection[Topic] | None = None) -> Self:
@@ -118,7 +118,9 @@ class Flight(FlightTopics):
         return found
 
     @classmethod
-    def of(cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False) -> Self:
+    def of(
+        cls, graph: BlockDiagram, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
+    ) -> Self:
         """A flight that was flown in this process.
 
         Args:
@@ -132,7 +134,7 @@ class Flight(FlightTopics):
 
     @classmethod
     def of_each(
-        cls, graph: Graph, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
+        cls, graph: BlockDiagram, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
     ) -> list[Self]:
         """The flights of all vehicles of a run; arguments as of `of`."""
         if graph.setup.vehicle:
@@ -217,7 +219,7 @@ class Flight(FlightTopics):
         return self.has("status") and bool(self.status.finished[-1])
 
     @cached_property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> FlightOutcome:
         """How it ended: `kind` is "landed", "crashed", "timed out", "diverged", "broken off" or "flown"."""
         no_end = self.origin.recorded and not self.digest
         failure = self.failure or ("the log has no end" if no_end else "")

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from lapwing.cosim.config import provenance
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json
 from lapwing.cosim.diagram.multi_vehicle import member
 
@@ -24,7 +24,7 @@ class Origin:
         self,
         source: str,
         vehicle: str,
-        setup: Setup | None,
+        setup: RunConfig | None,
         metadata: Mapping[str, str],
         attachments: Mapping[str, bytes],
     ):
@@ -37,12 +37,12 @@ class Origin:
         return cls(source, vehicle, None, dict(metadata), dict(attachments))
 
     @classmethod
-    def of_setup(cls, setup: Setup) -> Self:
+    def of_setup(cls, setup: RunConfig) -> Self:
         """The origin of a flight in memory."""
         return cls(setup.scene, setup.vehicle, setup, {}, {})
 
     @cached_property
-    def setup(self) -> Setup:
+    def setup(self) -> RunConfig:
         """What was flown.
 
         Raises:

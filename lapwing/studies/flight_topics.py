@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.messages.digest import Digest
 from lapwing.messages.topics import Topic, topic_named
 from lapwing.studies.flight_provenance import Origin
@@ -27,7 +27,7 @@ class FlightTopics:
         self._topics = dict(topics)
 
     @property
-    def setup(self) -> Setup:
+    def setup(self) -> RunConfig:
         """What was flown.
 
         Raises:

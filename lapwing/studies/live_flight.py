@@ -4,12 +4,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.messages.topic_columns import history
 from lapwing.messages.topics import STATUS, Topic, of_all
 from lapwing.services.common.event_kinds import KINDS
-from lapwing.studies.flight_data import IN_SPACE, Flight
+from lapwing.studies.flight_data import IN_SPACE, FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.topic_view import TopicView
@@ -20,13 +20,13 @@ TAKEN = (*IN_SPACE, STATUS)
 class LiveFlight:
     """Takes the messages of a run as its services hand them over, in whatever order they come."""
 
-    def __init__(self, setup: Setup):
+    def __init__(self, setup: RunConfig):
         """Of a run that is about to begin; of a fleet the set-up of one vehicle
         (`lapwing.cosim.diagram.multi_vehicle.members`)."""
         self._setup = setup
         self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
 
-    def take(self, pages: Iterable[Page]) -> None:
+    def take(self, pages: Iterable[RecordBatch]) -> None:
         """What a service has handed over."""
         interval = self._setup.interval_ns
         for page in pages:
@@ -35,7 +35,7 @@ class LiveFlight:
                 rows = zip(page.ticks, page.payloads, strict=True)
                 self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
 
-    def step(self, until_ns: int) -> Flight | None:
+    def step(self, until_ns: int) -> FlightData | None:
         """What has come up to an instant since the step before, begun with the newest message before it.
 
         None where the truth tells nothing new.
@@ -50,9 +50,9 @@ class LiveFlight:
                 del said[: len(now) - 1]  # the newest begins the next step
         if "truth" not in views or len(views["truth"]) < 2:
             return None
-        return Flight(views, Origin.of_setup(self._setup))
+        return FlightData(views, Origin.of_setup(self._setup))
 
 
-def new_events(flight: Flight, after: float) -> list[Event]:
+def new_events(flight: FlightData, after: float) -> list[Event]:
     """What happened in a step after the time `after` [s]."""
     return [event for event in flight.events if event.time > after and not KINDS[event.kind].afterwards]

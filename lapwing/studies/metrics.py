@@ -10,7 +10,7 @@ import numpy as np
 from lapwing.cosim.scene import Scene
 from lapwing.kernels import kernel
 from lapwing.services.common.success_criteria import Success
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.ground_contacts import touches
 from lapwing.studies.saturation import limits, saturation
 from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided, total
@@ -44,7 +44,7 @@ def check_success(scene: Scene) -> None:
         scene[Success].check_names(FIGURES)
 
 
-def figures(flight: Flight) -> dict[str, Any]:
+def figures(flight: FlightData) -> dict[str, Any]:
     """The figures of a flight by name; NaN where it says nothing of one."""
     truth, verdict, armed = flight.truth, flight.verdict, flight.armed
     n, t = len(armed), truth.times
@@ -86,7 +86,7 @@ def _tilt(cosine: float) -> float:
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def _of_estimate(flight: Flight, armed: np.ndarray) -> dict[str, float]:
+def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
     """What only an estimate at every tick tells."""
     n = len(armed)
     if not flight.has("estimate") or len(flight.estimate) < n:
@@ -112,14 +112,14 @@ def _inside(estimate: Any, position: Any, deviation: Any, armed: Any) -> tuple[f
     return x / rows, y / rows, z / rows
 
 
-def end_state(flight: Flight) -> str:
+def end_state(flight: FlightData) -> str:
     """Digest of the true state at the last tick: two flights that share it went the same way, to the bit."""
     truth = flight.truth
     numbers = [truth.times[-1:], truth.position[-1], truth.orientation[-1], truth.velocity[-1], truth.rotor_speed[-1]]
     return hashlib.blake2b(np.concatenate(numbers).astype("<f8").tobytes(), digest_size=8).hexdigest()
 
 
-def joint_end_state(flights: Sequence[Flight]) -> str:
+def joint_end_state(flights: Sequence[FlightData]) -> str:
     """Digest of the end of one flight, as of `end_state`; of several vehicles one digest over those of all."""
     states = [end_state(flight) for flight in flights]
     return states[0] if len(states) == 1 else hashlib.blake2b("".join(states).encode(), digest_size=8).hexdigest()

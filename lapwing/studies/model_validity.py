@@ -12,14 +12,14 @@ from lapwing.studies.topic_view import TopicView
 SLOWEST_DESCENT, FASTEST_DESCENT, FASTEST_ACROSS = 0.5, 1.5, 1.0
 
 
-class Doubt(NamedTuple):
+class ValidityWarning(NamedTuple):
     """A stretch of a flight where it is not to be trusted."""
 
     start: float  # [s]
     text: str
 
 
-def warnings(truth: TopicView, scene: dict[str, Any]) -> list[Doubt]:
+def warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
     """All of a flight, in no order.
 
     Args:
@@ -32,13 +32,13 @@ def warnings(truth: TopicView, scene: dict[str, Any]) -> list[Doubt]:
         for start, stop in stretches(in_vortex_ring(truth, diameter), truth.times):
             lasted = _seconds(truth, start, stop)
             text = f"descends into the vortex ring of its rotors for {lasted} s: their thrust is not sure there"
-            found.append(Doubt(float(truth.times[start]), text))
+            found.append(ValidityWarning(float(truth.times[start]), text))
     grid = _table(scene, "environment", "terrain", "grid")
     if grid.get("heights"):
         for start, stop in stretches(off_the_grid(truth, grid), truth.times):
             lasted = _seconds(truth, start, stop)
             text = f"is beyond the edge of the terrain's grid for {lasted} s: the ground is level across it there"
-            found.append(Doubt(float(truth.times[start]), text))
+            found.append(ValidityWarning(float(truth.times[start]), text))
     return found
 
 

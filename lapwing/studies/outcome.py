@@ -18,7 +18,7 @@ UPRIGHT = math.cos(math.radians(30.0))  # and is tilted less
 RESTING = 0.1  # [m] from the height at which it stood at first; for plants that tell of no contact
 
 
-class Verdict(NamedTuple):
+class FlightOutcome(NamedTuple):
     """How a flight ended, when and where.
 
     "landed": the mission is over, upright and at rest on its feet. "crashed": it turned over, hit the ground at more
@@ -43,7 +43,7 @@ class Verdict(NamedTuple):
         return f"{self.kind.capitalize()} at {self.time:.2f} s{': ' if self.how else ''}{self.how}{where}"
 
 
-def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverged: bool = False) -> Verdict:
+def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverged: bool = False) -> FlightOutcome:
     """The verdict on a flight.
 
     Args:
@@ -57,8 +57,10 @@ def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverge
     x, y, z = map(float, truth.position[-1])
     tilt = math.acos(max(-1.0, min(1.0, float(cosine[-1]))))
 
-    def verdict(kind: Kind, time: float, how: str) -> Verdict:
-        return Verdict(kind, round(time, 9), how, (x, y, z), tilt, max((touch.speed for touch in found), default=0.0))
+    def verdict(kind: Kind, time: float, how: str) -> FlightOutcome:
+        return FlightOutcome(
+            kind, round(time, 9), how, (x, y, z), tilt, max((touch.speed for touch in found), default=0.0)
+        )
 
     if diverged:
         return verdict("diverged", end, failure)

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import Graph
-from lapwing.cosim.diagram.topic_encoder import Wire, due_ticks, encode
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.topic_encoder import TopicEncoder, due_ticks, encode
 from lapwing.kernels.row_packing import columns
-from lapwing.messages.topic_columns import History, history, history_of_pages
+from lapwing.messages.topic_columns import TopicColumns, history, history_of_pages
 from lapwing.messages.topics import Topic, of_all
 
 
 def columns_of(
-    graph: Graph, only: Collection[Topic] | None = None
+    graph: BlockDiagram, only: Collection[Topic] | None = None
 ) -> Iterator[tuple[Topic, np.ndarray, Mapping[str, Any]]]:
     """Topic, times [ns] (n,) and columns of all that was said in a graph that has come to its end.
 
@@ -36,12 +36,13 @@ def columns_of(
 
 
 class PortColumns(Mapping[str, Any]):
-    """The same mapping as the `History` of the topic's messages, which are encoded only when that is asked for more.
+    """The same mapping as the `TopicColumns` of the topic's messages, which are encoded only when that is asked
+    for more.
 
     Encoding takes half as long as flying; who looks at many flights wants numbers that stand in the rows anyhow.
     """
 
-    def __init__(self, graph: Graph, wire: Wire):
+    def __init__(self, graph: BlockDiagram, wire: TopicEncoder):
         """Of a topic of a graph that has come to its end and has kept all rows of its port."""
         self._graph, self._wire = graph, wire
         self.ticks = due_ticks(0, graph.tick, wire.period)
@@ -61,7 +62,7 @@ class PortColumns(Mapping[str, Any]):
         return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
 
     @cached_property
-    def messages(self) -> History:
+    def messages(self) -> TopicColumns:
         """The encoded messages."""
         port = self._graph.ports[self._wire.port]
         pages = list(encode(self._wire, port, self._graph.setup, self.ticks, self._rows))

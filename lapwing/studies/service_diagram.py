@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.services.process_table import MAVLINK, PROCESSES, ProcessEntry
 from lapwing.studies.report.style import DPI, FLOWN
 
@@ -37,7 +37,7 @@ class Arrow(NamedTuple):
     both_ways: bool = False
 
 
-def handed(setup: Setup) -> dict[tuple[str, str], list[str]]:
+def handed(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
     """The ports for each pair (producer, consumer); "*" behind those that are taken later."""
     found: dict[tuple[str, str], list[str]] = {}
     producers = setup.producers
@@ -47,17 +47,17 @@ def handed(setup: Setup) -> dict[tuple[str, str], list[str]]:
     return found
 
 
-def listeners(setup: Setup) -> list[ProcessEntry]:
+def listeners(setup: RunConfig) -> list[ProcessEntry]:
     """The processes that stand outside of the lock step; the MAVLink link where somebody steers."""
     return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.beside)]
 
 
-def places(setup: Setup) -> dict[str, Point]:
+def places(setup: RunConfig) -> dict[str, Point]:
     """Middle of each service."""
     return {name: (WIDE * x, HIGH * y) for name in setup.services for x, y in [PLACES.get(name, (0.5, 0.5))]}
 
 
-def arrows(setup: Setup) -> list[Arrow]:
+def arrows(setup: RunConfig) -> list[Arrow]:
     """An arrow for each topic that a service takes of another, side by side; and those to and from who listens."""
     at, pairs, found = places(setup), handed(setup), []
     for one, other in dict.fromkeys((min(pair), max(pair)) for pair in pairs):
@@ -76,7 +76,7 @@ def arrows(setup: Setup) -> list[Arrow]:
     return found
 
 
-def draw(setup: Setup, path: Path) -> None:
+def draw(setup: RunConfig, path: Path) -> None:
     """Write the picture of a run in the format of the file's ending."""
     figure = Figure(figsize=(9.4, 9.0))
     axes = figure.add_subplot(aspect="equal")
@@ -97,7 +97,7 @@ def draw(setup: Setup, path: Path) -> None:
     figure.savefig(path, dpi=DPI, bbox_inches="tight")
 
 
-def _listening(setup: Setup) -> dict[ProcessEntry, Point]:
+def _listening(setup: RunConfig) -> dict[ProcessEntry, Point]:
     beside = listeners(setup)
     step = (WIDE + 2.0 * OUTER) / max(len(beside) - 1, 1)
     return {entry: (step * k - OUTER, BOTTOM) for k, entry in enumerate(beside)}

@@ -5,26 +5,26 @@ from typing import TypeVar
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import Topic, of_all
 from lapwing.services.common.operator_inbox import Operator, nobody
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 
-F = TypeVar("F", bound=Flight)
+F = TypeVar("F", bound=FlightData)
 
 PAGE = 64  # ticks of ports that nobody asks for; the commander looks back less
 
 
 def fly(
-    run: Setup | Scene,
+    run: RunConfig | Scene,
     only: Collection[Topic] | None = None,
     operator: Operator = nobody,
-    kind: type[F] = Flight,  # type: ignore[assignment]
+    kind: type[F] = FlightData,  # type: ignore[assignment]
     rows: dict[str, np.ndarray] | None = None,
 ) -> F:
     """Fly to the end, or until a state is not sound: the verdict then says so.
@@ -40,21 +40,21 @@ def fly(
 
 
 def fly_each(
-    setup: Setup, only: Collection[Topic] | None = None, rows: dict[str, np.ndarray] | None = None
-) -> list[Flight]:
+    setup: RunConfig, only: Collection[Topic] | None = None, rows: dict[str, np.ndarray] | None = None
+) -> list[FlightData]:
     """The flights of all vehicles of a run, one or several; arguments as of `fly`."""
-    return Flight.of_each(*_flown(setup, only, nobody, rows))
+    return FlightData.of_each(*_flown(setup, only, nobody, rows))
 
 
 def _flown(
-    run: Setup | Scene, only: Collection[Topic] | None, operator: Operator, rows: dict[str, np.ndarray] | None
-) -> tuple[Graph, Collection[Topic] | None, str, bool]:
+    run: RunConfig | Scene, only: Collection[Topic] | None, operator: Operator, rows: dict[str, np.ndarray] | None
+) -> tuple[BlockDiagram, Collection[Topic] | None, str, bool]:
     """(the graph at its end, only, why that was before its time, whether a state is not sound)."""
-    setup = run if isinstance(run, Setup) else resolve(run)
+    setup = run if isinstance(run, RunConfig) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
     wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else of_all(wire.topic) in only)}
-    graph, failure, diverged = Graph(setup, services, PAGE, wanted, rows), "", False
+    graph, failure, diverged = BlockDiagram(setup, services, PAGE, wanted, rows), "", False
     try:
         graph.advance(setup.last_tick + 1)
     except LockStepError as error:

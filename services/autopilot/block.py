@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf, uncompiled
 from lapwing.services.autopilot import control, interface, motor_failure
 from lapwing.services.autopilot.commander_wakeup import battery_warning
@@ -13,7 +13,7 @@ ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
 NO_TRAJECTORY = "no_trajectory"  # stands for that of the trajectory where there is none; never written
 
 
-class Order(NamedTuple):
+class ControllerInput(NamedTuple):
     """What the commander asks of the controller, until it asks for something else."""
 
     follow: bool = True  # the scene's trajectory, instead of `reference`
@@ -77,7 +77,7 @@ def outcome(
     watched: motor_failure.State,
     still_from: int,
     battery_charge: float,
-    order: Order,
+    order: ControllerInput,
     e: StateEstimate,
     wanted: Reference,
     stage: int,
@@ -114,7 +114,7 @@ def outcome(
 
 @leaf
 def step(
-    p: Controller, s: ControllerState, tick: int, inputs: tuple[Received, ...]
+    p: Controller, s: ControllerState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[ControllerState, tuple, int]:
     """The command at `tick`."""
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
@@ -126,4 +126,4 @@ def step(
     failed = watched.failed
     controlled, c = control.step(p.law.value, controlled, p.interval, estimate_of(e), setpoint_of(wanted), failed)
     watched, outputs = outcome(p, watched, still_from, charge, order, e, wanted, controlled.stage.name, c)
-    return ControllerState(controlled, watched, still_from, charge), outputs, GO_ON
+    return ControllerState(controlled, watched, still_from, charge), outputs, CONTINUE

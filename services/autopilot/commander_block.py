@@ -7,20 +7,20 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
-from lapwing.cosim.diagram.tick_schedule import KEPT, Port
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.kernels.cell import Cell, write
 from lapwing.messages import CommandAcks, header
 from lapwing.messages import topics as topic
-from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Flight, Order
+from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, ControllerInput, Flight
 from lapwing.services.autopilot.commander.commander import Commander
-from lapwing.services.autopilot.commander.commander_input import Constants, View
-from lapwing.services.autopilot.commander.commander_output import Request, Status
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
+from lapwing.services.autopilot.commander.commander_output import CommanderOutput, Status
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
-from lapwing.services.autopilot.commander_wakeup import LOOK_EVERY
+from lapwing.services.autopilot.commander_wakeup import ESTIMATE_POLL_TICKS
 from lapwing.services.autopilot.controller_parameters import build, lift
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
-from lapwing.services.autopilot.failure_injection.motor_failures import Direct
+from lapwing.services.autopilot.failure_injection.motor_failures import DirectMotorControl
 from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
 from lapwing.services.autopilot.service_config import AutopilotSetup
@@ -32,7 +32,7 @@ from lapwing.services.common.ports import Reference
 Operator = Callable[[int], Iterable[Any]]
 
 
-class Texts:
+class TextTable:
     """Texts by number; a new one gets the next number."""
 
     def __init__(self, known: Iterable[Any] = ()):
@@ -48,7 +48,7 @@ class Texts:
         return self._number[text]
 
 
-class Commanding:
+class CommanderBlock:
     """Shows the commander what it is to see, and puts what it asks for into the port that the controller follows."""
 
     name = "autopilot.commander"
@@ -72,8 +72,8 @@ class Commanding:
             operator: gives the commands that have come until a tick.
             injection: where failures are injected.
         """
-        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), KEPT),)
-        self.outputs = (Port(ORDER, Order(), KEPT), *unwritten)
+        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), LATCHED),)
+        self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
         a = given.airframe
         self._given, self._law, self._thresholds, self._service, self._operator = (
             given,
@@ -99,17 +99,17 @@ class Commanding:
         )
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
-        self.phases, self.words = Texts(given.phases), Texts([_words(self._commander.initial_status())])
+        self.phases, self.words = TextTable(given.phases), TextTable([_words(self._commander.initial_status())])
         self._driven: tuple[float, ...] | None = None  # voltages from outside that hold
         self._asked = -1  # [tick] at which the commander was asked last
         self._estimate: Any = None  # that it is shown
         self._shown = -1  # [tick] of it
         self._estimate_every_tick = False
-        self._ordered: Order | None = None  # what stands in the port
+        self._ordered: ControllerInput | None = None  # what stands in the port
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Before the first tick the trajectory is followed."""
         self._graph = graph
         self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
@@ -121,16 +121,16 @@ class Commanding:
             self._skip(range(self._asked + 1, tick))
         self._asked = tick
         elapsed = 0.0
-        looked = tick - tick % LOOK_EVERY
+        looked = tick - tick % ESTIMATE_POLL_TICKS
         if tick == looked or self._estimate_every_tick:
-            elapsed = self._interval * (1 if self._estimate_every_tick else LOOK_EVERY)
+            elapsed = self._interval * (1 if self._estimate_every_tick else ESTIMATE_POLL_TICKS)
             looked = tick
         if looked > self._shown:
             self._estimate, self._shown = graph.latest(ports.ESTIMATE, looked), looked
         flight = self._flight(tick)
         followed = self._followed(tick) if self._given.phases else None
         request = self._commander.step(
-            View(
+            CommanderInput(
                 self._interval,
                 self._estimate,
                 elapsed,
@@ -162,7 +162,7 @@ class Commanding:
         """The tick of the next say, after a request at `tick` that is quiet for so long [s]."""
         ticks = int(quiet / self._interval) if quiet < math.inf else NEVER
         if self._given.operator:
-            ticks = min(ticks, *[every - tick % every for every in (LOOK_EVERY, self._given.answers_every)])
+            ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._given.answers_every)])
         return min(tick + max(1, ticks), NEVER)
 
     def _skip(self, missed: range) -> None:
@@ -182,11 +182,11 @@ class Commanding:
     def _followed(self, tick: int) -> Setpoint:
         return _setpoint(self._graph.latest(ports.TRAJECTORY, tick))
 
-    def _direct(self, volts: tuple[float, ...] | None) -> Direct:
+    def _direct(self, volts: tuple[float, ...] | None) -> DirectMotorControl:
         """Voltages from outside within what the motors take; None: the controller's."""
         if volts is None:
             return self._injection.released
-        return Direct(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
+        return DirectMotorControl(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
 
     def _thrust(self, tick: int) -> float:
         """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""
@@ -203,16 +203,16 @@ class Commanding:
         self._service.messages.append((topic.OPERATOR, tick, message.encode()))
         return tuple(message.commands)
 
-    def _order(self, tick: int, request: Request, flight: Flight) -> Order:
+    def _order(self, tick: int, request: CommanderOutput, flight: Flight) -> ControllerInput:
         status, wanted = request.status, request.setpoint
         restart = tick if request.reset_controller and flight.stage != ON_GROUND else -1
         words = self.words.number(_words(status))
         if wanted is None:
-            return Order(True, Reference(), words, False, False, status.released, restart)
+            return ControllerInput(True, Reference(), words, False, False, status.released, restart)
         reference = Reference(*wanted, self.phases.number(status.phase), False)
-        return Order(False, reference, words, status.armed, status.finished, status.released, restart)
+        return ControllerInput(False, reference, words, status.armed, status.finished, status.released, restart)
 
-    def _answer(self, tick: int, request: Request) -> None:
+    def _answer(self, tick: int, request: CommanderOutput) -> None:
         self._acknowledgements += request.acknowledgements
         self._texts += request.texts
         if self._given.operator and tick % self._given.answers_every == 0:

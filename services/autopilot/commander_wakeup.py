@@ -2,25 +2,25 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.kernels import leaf
 from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, needs_attention
 
-LOOK_EVERY = 5  # ticks between two looks of the commander at the estimate
+ESTIMATE_POLL_TICKS = 5  # ticks between two looks of the commander at the estimate
 
 
-class Attention(NamedTuple):
+class WakeupParameters(NamedTuple):
     """What the conditions depend on."""
 
     thresholds: Any  # cell of `BatteryThresholds`, which an operator may change
 
 
 @leaf
-def attention_due(p: Attention, tick: int, health: int, battery: Received, flight: Received) -> bool:
+def attention_due(p: WakeupParameters, tick: int, health: int, battery: InputSample, flight: InputSample) -> bool:
     """Whether the commander has a say at `tick`; battery and flight as they were received."""
     charge = battery.value.charge if battery.due else 1.0
     failed = flight.value.failed_motor if flight.due else 0
-    return needs_attention(p.thresholds.value, health, charge, failed, tick % LOOK_EVERY == 0)
+    return needs_attention(p.thresholds.value, health, charge, failed, tick % ESTIMATE_POLL_TICKS == 0)
 
 
 @leaf

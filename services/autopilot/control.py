@@ -11,8 +11,17 @@ from lapwing.kernels import kernel, leaf
 from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
 from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
 from lapwing.services.autopilot.interface import Command, Estimate, Setpoint
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LANDED, Stage, advance_stage
-from lapwing.services.autopilot.mixer import Demands, Shares, at_rest, clamp, mix, possible, saturate, shares_in_force
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LANDED, LandedState, advance_stage
+from lapwing.services.autopilot.mixer import (
+    Shares,
+    VirtualControls,
+    at_rest,
+    clamp,
+    mix,
+    possible,
+    saturate,
+    shares_in_force,
+)
 from lapwing.services.autopilot.motor import Motor, voltages
 from lapwing.services.autopilot.pid import Pid, integrate, output
 
@@ -41,16 +50,16 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Memory of the controller."""
 
-    stage: Stage
+    stage: LandedState
     integral_world: Vec3  # of the position error [m s]
     integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
     tilt_x: Angle  # reference of the pitch
     tilt_y: Angle  # reference of the tilt to the left, -roll
-    cut: Demands  # sign of what saturation cut off each demand at the last tick
+    cut: VirtualControls  # sign of what saturation cut off each demand at the last tick
     tilt_cut: tuple[float, float]  # the same of the limited tilts, in world axes
 
 
-START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, Demands(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @leaf
@@ -143,7 +152,7 @@ def step(
         integrate(p.pitch_inner, s.integral_angles[1], turn[1], s.cut.pitch, dt),
         integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
     )
-    wanted = Demands(
+    wanted = VirtualControls(
         collective_demand(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
         output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
         - p.torque_demands[0] * tilt_y.demand_acceleration,
@@ -153,7 +162,7 @@ def step(
     )
     shares = shares_in_force(p.shares, failed)
     given = saturate(shares, wanted, p.thrust_max)
-    cut = Demands(
+    cut = VirtualControls(
         sign(wanted.collective - given.collective),
         sign(wanted.roll - given.roll),
         sign(wanted.pitch - given.pitch),

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import Actuators, Estimate, Status, Vector3, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
@@ -17,8 +17,8 @@ from lapwing.services.common.reference_encoder import reference_wire
 
 
 def wires(
-    setup: Setup, estimate_every: int, status_every: int, texts: Sequence[str], words: Sequence[Any]
-) -> list[Wire]:
+    setup: RunConfig, estimate_every: int, status_every: int, texts: Sequence[str], words: Sequence[Any]
+) -> list[TopicEncoder]:
     """The autopilot's topics.
 
     Args:
@@ -31,10 +31,12 @@ def wires(
     actuators = setup.port(ports.ACTUATORS).like
     command = Actuators(header(0, "body"), actuators.motor_voltage, False, actuators.thrust)
     return [
-        Wire(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command),
-        Wire(topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]),
+        TopicEncoder(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command),
+        TopicEncoder(
+            topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]
+        ),
         reference_wire(topic.SETPOINT, ports.SETPOINT, texts),
-        Wire(
+        TopicEncoder(
             topic.STATUS,
             ports.STATUS,
             status_every,

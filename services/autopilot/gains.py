@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar
 from annotated_types import Gt, Lt
 from pydantic import ConfigDict, Field, ValidationError
 
-from lapwing.cosim.scene import Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.autopilot.controller_parameters import Gains
 
@@ -18,7 +18,7 @@ Positive = Annotated[Finite, Gt(0.0)]
 Triple = tuple[Finite, Finite, Finite]  # P, I, D
 
 
-class GainSet(Section):
+class GainSet(SceneTable):
     """A gain set as its file writes it: P, I, D of each loop; outputs of altitude, yaw and the inner loops are the
     force demand of every rotor [N], those of the outer loops are tilts [rad]."""
 
@@ -56,7 +56,7 @@ def load(name: str) -> GainSet:
     """
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if path.parent == FOLDER and path.stem not in names():
-        raise KeyedError.unknown("", "gain set", name, names())
+        raise ConfigError.unknown("", "gain set", name, names())
     try:
         return GainSet.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except OSError as error:

@@ -14,26 +14,28 @@ LANDED_HEIGHT_ERROR = 0.5  # [m] how wrong the estimated height may be for that
 LANDED_SPEED = 0.1  # [m/s] greatest estimated vertical speed of a vehicle that stands
 
 
-class Stage(NamedTuple):
+class LandedState(NamedTuple):
     """Where the flight is."""
 
     name: int  # ON_GROUND, FLYING or LANDED
     waiting: float  # [s] since the vehicle was asked to stand and seemed still
 
 
-INITIAL_STAGE = Stage(ON_GROUND, 0.0)
+INITIAL_STAGE = LandedState(ON_GROUND, 0.0)
 
 
 @leaf
-def advance_stage(stage: Stage, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float) -> Stage:
+def advance_stage(
+    stage: LandedState, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float
+) -> LandedState:
     """The stage one tick of dt [s] on; `resting_height` is world z of the standing vehicle [m]."""
     height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
     asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
     if stage.name == ON_GROUND:
-        return Stage(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else ON_GROUND, 0.0)
+        return LandedState(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else ON_GROUND, 0.0)
     if asked_height >= CUT_HEIGHT or asked_speed > 0.0:
-        return Stage(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
+        return LandedState(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
     if stage.name == LANDED:
         return stage
     waiting = stage.waiting + dt if abs(speed) < LANDED_SPEED and height < LANDED_HEIGHT_ERROR else 0.0
-    return Stage(LANDED if height < CUT_HEIGHT or waiting > LANDED_TIME else FLYING, waiting)
+    return LandedState(LANDED if height < CUT_HEIGHT or waiting > LANDED_TIME else FLYING, waiting)

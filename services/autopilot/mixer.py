@@ -11,7 +11,7 @@ Share = tuple[float, float, float, float]  # of a rotor in the demands: collecti
 Shares = tuple[Share, ...]  # of every rotor
 
 
-class Demands(NamedTuple):
+class VirtualControls(NamedTuple):
     """What each loop asks of every rotor [N], on the mean over the rotors; shares give each its own."""
 
     collective: float
@@ -38,12 +38,12 @@ def shares_in_force(tables: tuple[Shares, ...], failed: int) -> Shares:
 
 
 @leaf
-def _thrust(q: Demands, share: Share, _: Share) -> float:
+def _thrust(q: VirtualControls, share: Share, _: Share) -> float:
     return share[0] * q.collective + share[1] * q.roll + share[2] * q.pitch + share[3] * q.yaw
 
 
 @leaf
-def mix(shares: Shares, q: Demands) -> PerRotor:
+def mix(shares: Shares, q: VirtualControls) -> PerRotor:
     """The rotors' thrusts [N] of demands q without saturation."""
     return each(_thrust, q, shares, shares)
 
@@ -66,7 +66,7 @@ def possible(values: PerRotor, highest: float) -> PerRotor:
 
 
 @leaf
-def saturate(shares: Shares, q: Demands, thrust_max: float) -> Demands:
+def saturate(shares: Shares, q: VirtualControls, thrust_max: float) -> VirtualControls:
     """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
     Attitude comes first, then collective; yaw is given up first: it gets what room the others leave. So demands stay
@@ -95,4 +95,4 @@ def saturate(shares: Shares, q: Demands, thrust_max: float) -> Demands:
             bare = s[0] * collective + s[1] * roll + s[2] * pitch
             up, down = (thrust_max - bare) / s[3], -bare / s[3]
             low, high = max(low, min(up, down)), min(high, max(up, down))
-    return Demands(collective, roll, pitch, clamp(q.yaw, min(low, 0.0), max(high, 0.0)))
+    return VirtualControls(collective, roll, pitch, clamp(q.yaw, min(low, 0.0), max(high, 0.0)))

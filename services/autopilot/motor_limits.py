@@ -3,7 +3,7 @@
 import math
 
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, hover_torque
 from lapwing.services.common.vehicle_schema import Effects, airframe
 
@@ -28,4 +28,6 @@ def check(scene: Scene, known: Airframe) -> None:
     ):
         if needed >= limit:
             message = f"hovering takes {needed:.1f} {unit} of a motor, which gets {limit:.1f} {unit} at the most"
-            raise KeyedError("airframe.motor", message, "a lighter vehicle, or higher limits of motor, ESC and battery")
+            raise ConfigError(
+                "airframe.motor", message, "a lighter vehicle, or higher limits of motor, ESC and battery"
+            )

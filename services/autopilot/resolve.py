@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.services.autopilot import estimator
@@ -16,7 +16,7 @@ from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot
 from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
 from lapwing.services.common import autopilot_parameters, ports, user_modules
-from lapwing.services.common.communication_schema import Exchange, Rates, ticks
+from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference
 from lapwing.services.common.run_schema import follows_trajectory
@@ -25,21 +25,21 @@ from lapwing.services.common.vehicle_schema import gravity, start_place
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR, ports.RANGEFINDER, ports.OPTICAL_FLOW)
 
 
-def resolve(scene: Scene) -> ServiceSetup | None:
+def resolve(scene: Scene) -> ServiceConfig | None:
     """The autopilot of the scene; None where there is none."""
     if not scene.has(Autopilot):
         return None
-    config, exchange, rates = scene[Autopilot], scene[Exchange], scene[Rates]
+    config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
     truth, own = config.estimator == "truth", config.estimator not in ESTIMATORS
     carried = sorted(scene.tables("sensors"))
     sensors = [name for name in FUSED if name in carried and not truth and not own]
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
-    inputs = [Input(ports.TRUTH)] if truth else [Input(name) for name in (carried if own else sensors)]
+    inputs = [InputPort(ports.TRUTH)] if truth else [InputPort(name) for name in (carried if own else sensors)]
     if ports.AIRSPEED in carried and config.operator and not own:
-        inputs.append(Input(ports.AIRSPEED))  # not flown by: told to the operator
-    inputs += [Input(ports.BATTERY), *([Input(ports.TRAJECTORY)] if follows else [])]
+        inputs.append(InputPort(ports.AIRSPEED))  # not flown by: told to the operator
+    inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)
     given = AutopilotSetup(
@@ -63,7 +63,7 @@ def resolve(scene: Scene) -> ServiceSetup | None:
         distance_sensor(scene),
     )
     none = (0.0,) * len(given.airframe.rotor_x)
-    return ServiceSetup(
+    return ServiceConfig(
         given,
         tuple(inputs),
         (
@@ -81,7 +81,7 @@ def _phases(scene: Scene) -> tuple[str, ...]:
 
 def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """The code that the key names, tried."""
-    config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Exchange].interval)
+    config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Communication].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
     found = rate(name, user_modules.texts(scene), vehicle, options)
     return CustomCode(name, options, ticks(scene, found, f"autopilot.{key}"))
@@ -96,7 +96,7 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
         found = found._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
         ground -= scene.lookup("sensors.rangefinder.position")[2]  # the distance counts from its place
     return found._replace(
-        interval=scene[Exchange].interval * imu_every,
+        interval=scene[Communication].interval * imu_every,
         home=around.home,
         gravity=gravity(scene),
         atmosphere=around.atmosphere,
@@ -109,4 +109,4 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
 def _lateness(scene: Scene, imu_every: int) -> int:
     """Readings of the IMU by which the receiver is late."""
     late = scene.lookup("sensors.gps.latency_samples") / scene.lookup("sensors.gps.rate")
-    return round(round(late * 1e9) / scene[Exchange].interval_ns / imu_every)
+    return round(round(late * 1e9) / scene[Communication].interval_ns / imu_every)

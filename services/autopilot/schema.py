@@ -5,9 +5,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import laid_over, named
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.autopilot import motor_limits
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import FOLDER, GainSet
@@ -25,7 +25,7 @@ WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unrel
 Option = bool | int | float | str | list[float]
 
 
-class Autopilot(Section):
+class Autopilot(SceneTable):
     """How the vehicle is flown."""
 
     TABLE: ClassVar[str] = "autopilot"
@@ -51,7 +51,7 @@ class Autopilot(Section):
             code, where = named(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
             if key == "estimator" and isinstance(code, str) and ":" not in code:
                 if code not in ESTIMATORS:
-                    raise KeyedError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
+                    raise ConfigError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
             elif isinstance(code, str) and (module := user_code.parted(where, code)[0]) != user_code.MEMORY:
                 user_modules.embed(tree, files, where, module)
         if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
@@ -64,30 +64,30 @@ class Autopilot(Section):
         parameters.table(scene)
         if not self.trajectory and not self.operator:
             message = "false leaves nobody to say what to fly; set operator = true too"
-            raise KeyedError("autopilot.trajectory", message)
+            raise ConfigError("autopilot.trajectory", message)
         told = known_airframe(scene)
         try:
             build(scene[GainSet].plain(), told)
-        except KeyedError:
+        except ConfigError:
             raise
         except ValueError as error:
-            raise KeyedError("airframe", str(error)) from None
+            raise ConfigError("airframe", str(error)) from None
         motor_limits.check(scene, told)
         for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 message = "nobody to take them"
-                raise KeyedError(f"autopilot.{key}_options", message, f'autopilot.{key} = "module:Name" too')
+                raise ConfigError(f"autopilot.{key}_options", message, f'autopilot.{key} = "module:Name" too')
         if self.estimator == "sensors":
             missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
-                raise KeyedError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
+                raise ConfigError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
             horizontal = math.hypot(*environment(scene).magnetic_field_world[:2])
             if horizontal < WEAKEST_FIELD:
                 message = f"got {horizontal:.1g} T across the vertical, of which the estimator takes its heading"
-                raise KeyedError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
+                raise ConfigError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
             reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
             sensor = parameters.HEIGHT_SENSORS[reference]
             known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
             if known not in scene.tables("sensors"):
                 message = f"{reference} takes the height from a sensor that is not carried"
-                raise KeyedError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")
+                raise ConfigError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")

@@ -3,17 +3,17 @@
 import math
 from typing import Any
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.kernels.cell import Cell
 from lapwing.messages import topics as topic
 from lapwing.services.autopilot import block, motor_failure
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
-from lapwing.services.autopilot.commander_block import Commanding, Operator, controller
-from lapwing.services.autopilot.commander_wakeup import Attention
+from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.custom.custom_blocks import controller_parts, estimator_parts
 from lapwing.services.autopilot.encoders import wires
 from lapwing.services.autopilot.estimator.blocks.correction import Correction
@@ -36,13 +36,13 @@ NO_HEIGHT = 1e8  # [m^2] variance of a height that tells nothing
 BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
 
 
-def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
+def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     """The autopilot of a run; `operator` gives the commands that have come until a tick, besides those of the plan."""
     given: AutopilotSetup = setup.services[NAME].parameters
     outputs = {port.name: port for port in setup.services[NAME].ports}
     values = {p.name: p.default for p in given.parameters}
     law, thresholds = Cell(controller(given, values)), Cell(battery_thresholds(values))
-    attention = Attention(thresholds)
+    attention = WakeupParameters(thresholds)
     service = Service(NAME, [], [])
 
     def speak(tick: int) -> list[Any]:
@@ -51,16 +51,16 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
     faults = Cell(Faults(motors=(SOUND,) * len(given.airframe.rotor_x))) if given.operator else None
     read = () if given.own_estimator else [i.port for i in setup.services[NAME].inputs]
     injection = Injection(faults, setup, read, given.airframe.motor)
-    commanding = Commanding(given, law, thresholds, service, speak, injection)
+    commanding = CommanderBlock(given, law, thresholds, service, speak, injection)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
         law, motor_failure.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
     )
     battery, actuators = injection.received(ports.BATTERY), outputs[ports.ACTUATORS]
-    inputs = (Input(ports.ESTIMATE), Input(ORDER), Input(battery), Input(reference))
+    inputs = (InputPort(ports.ESTIMATE), InputPort(ORDER), InputPort(battery), InputPort(reference))
     gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
     if given.controller is None:
-        control = [Part(f"{NAME}.control", common, Cell(block.start(common)), inputs, gives)]
+        control = [Block(f"{NAME}.control", common, Cell(block.start(common)), inputs, gives)]
     else:
         control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
     navigation = _navigation(setup, given, attention, outputs[ports.ESTIMATE], injection)
@@ -75,10 +75,10 @@ def create(setup: Setup, operator: Operator = lambda tick: ()) -> Service:
 
 
 def _navigation(
-    setup: Setup, given: AutopilotSetup, attention: Attention, estimate: Port, injection: Injection
-) -> list[Part]:
+    setup: RunConfig, given: AutopilotSetup, attention: WakeupParameters, estimate: Port, injection: Injection
+) -> list[Block]:
     """The parts that make the estimate, in their order."""
-    battery, flight = Input(injection.received(ports.BATTERY)), Input(FLIGHT, 1)
+    battery, flight = InputPort(injection.received(ports.BATTERY)), InputPort(FLIGHT, 1)
     p = given.estimator
     if given.own_estimator is not None:
         names = [port.name for port in setup.services["sensors"].ports] if "sensors" in setup.services else []
@@ -87,15 +87,15 @@ def _navigation(
             f"{NAME}.estimate", setup.modules, given, attention, sensors, (battery, flight), estimate
         )
     if p is None:
-        inputs = (Input(ports.TRUTH), battery, flight)
-        return [Part(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
+        inputs = (InputPort(ports.TRUTH), battery, flight)
+        return [Block(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
     height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
     known = setup.ports
     begin = InertialNavigation(p, given.start_world, STANDSTILL_EVERY * given.imu_every)
-    inputs = (Input(injection.received(ports.IMU)), Input(injection.received(ports.MAGNETOMETER)), flight)
-    parts = [Part(f"{NAME}.inertial", begin, state, inputs, (), given.imu_every)]
+    inputs = (InputPort(injection.received(ports.IMU)), InputPort(injection.received(ports.MAGNETOMETER)), flight)
+    parts = [Block(f"{NAME}.inertial", begin, state, inputs, (), given.imu_every)]
     for port, fusion in (
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),
@@ -105,7 +105,7 @@ def _navigation(
     ):
         if port in known:
             parts.append(
-                Part(f"{NAME}.{port}", fusion, state, (Input(injection.received(port)),), (), known[port].period)
+                Block(f"{NAME}.{port}", fusion, state, (InputPort(injection.received(port)),), (), known[port].period)
             )
     told = FilterEstimate(p, attention, before(given.start_world))
-    return [*parts, Part(f"{NAME}.estimate", told, state, (battery, flight), (estimate,))]
+    return [*parts, Block(f"{NAME}.estimate", told, state, (battery, flight), (estimate,))]

@@ -8,7 +8,7 @@ from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import excess, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 
 MODELS = ("reduced", "multibody", "slung_load")  # of vehicles whose hover the margins are for
 
@@ -19,7 +19,7 @@ def unstable_loops(scene: Scene) -> list[str]:
         return []
     if scene[Autopilot].controller is not None:
         return []  # whose loops are not known
-    config, exchange, airframe = scene[Autopilot], scene[Exchange], known_airframe(scene)
+    config, exchange, airframe = scene[Autopilot], scene[Communication], known_airframe(scene)
     p = build(scene[GainSet].plain(), airframe)
     loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)
     found = {name: excess(response) for name, response in loops.items()}

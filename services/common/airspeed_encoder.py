@@ -5,16 +5,16 @@ import math
 import numpy as np
 
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import FluidPressure, header
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.messages.topics import Topic
 from lapwing.services.common.ports import AirspeedReading
 
 
-def airspeed_wire(topic: Topic, frame: str, port: Port) -> Wire:
+def airspeed_wire(topic: Topic, frame: str, port: Port) -> TopicEncoder:
     """A topic of the readings on `port`; `frame` is the vehicle's name."""
-    return Wire(topic, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))
+    return TopicEncoder(topic, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))
 
 
 def _fields(r: AirspeedReading, time_ns: np.ndarray) -> Fields:

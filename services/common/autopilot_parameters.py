@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.cosim.scene import Scene
@@ -49,7 +49,7 @@ class Parameter(NamedTuple):
         """KeyedError if it cannot have this value."""
         if not self.allows(value):
             kind = "a whole number" if self.whole else "a number"
-            raise KeyedError(self.name, f"got {value:g}", f"{kind} from {self.least:g} to {self.most:g}")
+            raise ConfigError(self.name, f"got {value:g}", f"{kind} from {self.least:g} to {self.most:g}")
 
 
 _FLIGHT = (
@@ -126,10 +126,10 @@ def _table(scene: "Scene") -> dict[str, Parameter]:
     known = {p.name: p for p in (*of_gains(scene.section("gains")), *_FLIGHT, *_FAILSAFES)}
     for name, value in scene.lookup("autopilot.parameters").items():
         if name not in known:
-            raise KeyedError.unknown(f"autopilot.parameters.{name}", "parameter", name, known)
+            raise ConfigError.unknown(f"autopilot.parameters.{name}", "parameter", name, known)
         try:
             known[name].check(value)
-        except KeyedError as error:
+        except ConfigError as error:
             raise error.under("autopilot.parameters") from None
         known[name] = known[name]._replace(default=float(value))
     return known

@@ -4,12 +4,12 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.messages.topics import Topic
 
 
-class Exchange(Section):
+class Communication(SceneTable):
     """The communication step: how often services exchange messages, and whether the command closes the loop at once."""
 
     TABLE: ClassVar[str] = "exchange"
@@ -36,10 +36,10 @@ class Exchange(Section):
         """A tick is a whole number of nanoseconds."""
         if 1_000_000_000 % self.rate:
             expected = "a rate whose interval is a whole number of ns (100, 125, 200, 250, 400, 500, 1000, ...)"
-            raise KeyedError("exchange.rate", f"got {self.rate} Hz", expected)
+            raise ConfigError("exchange.rate", f"got {self.rate} Hz", expected)
 
 
-class Rates(Section):
+class Rates(SceneTable):
     """How often derived messages are published [Hz], at the most once a tick; each divides exchange.rate."""
 
     TABLE: ClassVar[str] = "rates"
@@ -56,7 +56,7 @@ class Rates(Section):
         """Every rate divides the exchange rate."""
         for key in type(self).model_fields:
             if (rate := getattr(self, key)) is not None:
-                ticks(scene, min(rate, scene[Exchange].rate), f"rates.{key}")
+                ticks(scene, min(rate, scene[Communication].rate), f"rates.{key}")
 
 
 def ticks(scene: Scene, rate: float, key: str) -> int:
@@ -65,10 +65,10 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
     Raises:
         KeyedError: the rate, which is that of `key`, does not divide the exchange rate.
     """
-    exchange = scene[Exchange].rate
+    exchange = scene[Communication].rate
     if rate <= 0 or exchange % rate:
         divisors = ", ".join(str(exchange // n) for n in range(1, 51) if exchange % n == 0)
-        raise KeyedError(key, f"got {rate:g}", f"a rate that divides exchange.rate = {exchange} Hz ({divisors})")
+        raise ConfigError(key, f"got {rate:g}", f"a rate that divides exchange.rate = {exchange} Hz ({divisors})")
     return int(exchange // rate)
 
 
@@ -76,4 +76,4 @@ def period(scene: Scene, topic: Topic) -> int:
     """Ticks between two messages of a topic: its rate is the scene key that the topic table names."""
     if topic.rate is None:
         return 1
-    return ticks(scene, min(scene.lookup(topic.rate), scene[Exchange].rate), topic.rate)
+    return ticks(scene, min(scene.lookup(topic.rate), scene[Communication].rate), topic.rate)

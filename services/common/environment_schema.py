@@ -7,9 +7,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.dynamics.atmosphere import Atmosphere
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.environment import FIRST_YEAR, LAST_YEAR, STANDARD, Environment, magnetic_field
 from lapwing.dynamics.geodesy import Home, normal_gravity
 from lapwing.dynamics.terrain import Level, Relief, relief
@@ -42,7 +42,9 @@ class Steps(Table):
     def pairs(self) -> list[tuple[float, float]]:
         """(distance, rise) of each; KeyedError where there are not as many of one as of the other."""
         if len(self.distance) != len(self.rise):
-            raise KeyedError("steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}")
+            raise ConfigError(
+                "steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}"
+            )
         return list(zip(self.distance, self.rise, strict=True))
 
 
@@ -88,10 +90,10 @@ class Terrain(Table):
         """What kernels are given. Raises KeyedError, the key seen from this table."""
         grid, steps = self.grid, self.steps
         if grid and grid.heights is None:
-            raise KeyedError("grid", "got neither", "heights, or a file of them")
+            raise ConfigError("grid", "got neither", "heights, or a file of them")
         rows = [len(row) for row in grid.heights or ()] if grid else []
         if len(set(rows)) > 1:
-            raise KeyedError("grid.heights", f"got rows of {min(rows)} to {max(rows)} numbers", "rows of equal length")
+            raise ConfigError("grid.heights", f"got rows of {min(rows)} to {max(rows)} numbers", "rows of equal length")
         return relief(
             self.slope,
             self.bump_height,
@@ -106,7 +108,7 @@ class Terrain(Table):
         )
 
 
-class EnvironmentTable(Section):
+class EnvironmentTable(SceneTable):
     """Where and when: home on the Earth, the day's air, gravity, the magnetic field, the ground."""
 
     TABLE: ClassVar[str] = "environment"
@@ -129,19 +131,19 @@ class EnvironmentTable(Section):
         grid, key = given.terrain.grid, "environment.terrain.grid"
         if grid is None or grid.file is None:
             if grid and grid.reach is not None:
-                raise KeyedError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
+                raise ConfigError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
             return
         if grid.heights is not None:
-            raise KeyedError(key, "has file and heights", "one of them")
+            raise ConfigError(key, "has file and heights", "one of them")
         path, table = files.folder / grid.file, tree[cls.TABLE]["terrain"]["grid"]
         if path.suffix in height_file.GEOTIFF:
             points = _points(grid, key)
             heights = height_file.of_geotiff(f"{key}.file", path, given.home, points, grid.spacing)
             table["corner"] = [-points * grid.spacing] * 2
         elif path.suffix != ".npy":
-            raise KeyedError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")
+            raise ConfigError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")
         elif grid.reach is not None:
-            raise KeyedError(f"{key}.reach", "of an array all is taken", "none, or a GeoTIFF")
+            raise ConfigError(f"{key}.reach", "of an array all is taken", "none, or a GeoTIFF")
         else:
             heights = height_file.of_array(f"{key}.file", path)
         table["heights"] = heights.tolist()
@@ -150,7 +152,7 @@ class EnvironmentTable(Section):
         """There is such a day, and such a ground."""
         try:
             _resolved(self)
-        except KeyedError as error:
+        except ConfigError as error:
             raise error.under(self.TABLE) from None
 
     def resolved(self) -> dict[str, Any]:
@@ -163,7 +165,7 @@ def _resolved(table: EnvironmentTable) -> Environment:
     """In numbers. Raises KeyedError, the key seen from the table."""
     try:
         terrain = table.terrain.ground()
-    except KeyedError as error:
+    except ConfigError as error:
         raise error.under("terrain") from None
     field = table.magnetic_field or magnetic_field(table.home, _day(table.date))
     gravity = table.gravity
@@ -176,25 +178,25 @@ def _day(date: str) -> datetime.date:
     try:
         day = datetime.date.fromisoformat(date)
     except ValueError as error:
-        raise KeyedError("date", f"got {date}: {error}", "a day, as 2025-07-01") from None
+        raise ConfigError("date", f"got {date}: {error}", "a day, as 2025-07-01") from None
     if not FIRST_YEAR <= day.year <= LAST_YEAR:
         expected = f"a day of {FIRST_YEAR} to {LAST_YEAR}, or magnetic_field"
-        raise KeyedError("date", f"got {date}, of which no World Magnetic Model is known", expected)
+        raise ConfigError("date", f"got {date}, of which no World Magnetic Model is known", expected)
     return day
 
 
 def _points(grid: Grid, key: str) -> int:
     """How many points of a GeoTIFF's grid there are from home to each side."""
     if grid.reach is None:
-        raise KeyedError(f"{key}.reach", "missing", "[m] from home to each side of what is taken out of the GeoTIFF")
+        raise ConfigError(f"{key}.reach", "missing", "[m] from home to each side of what is taken out of the GeoTIFF")
     if grid.corner is not None:
-        raise KeyedError(f"{key}.corner", "follows from reach", "none beside a GeoTIFF")
+        raise ConfigError(f"{key}.corner", "follows from reach", "none beside a GeoTIFF")
     points = int(grid.reach / grid.spacing)
     if points < 1:
-        raise KeyedError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
+        raise ConfigError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
     if (2 * points + 1) ** 2 > height_file.MOST:
         expected = f"at most {height_file.MOST} points: a shorter reach or a wider spacing"
-        raise KeyedError(f"{key}.spacing", f"got {grid.spacing:g} over a reach of {grid.reach:g} m", expected)
+        raise ConfigError(f"{key}.spacing", f"got {grid.spacing:g} over a reach of {grid.reach:g} m", expected)
     return points
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home
 
 GEOTIFF = (".tif", ".tiff")
@@ -22,11 +22,11 @@ def of_array(key: str, path: Path) -> np.ndarray:
     try:
         found = np.load(path, allow_pickle=False)
     except OSError as error:
-        raise KeyedError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+        raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except (ValueError, EOFError) as error:
-        raise KeyedError(key, f"{path}: {error}", "an array of numbers, as numpy.save writes it") from None
+        raise ConfigError(key, f"{path}: {error}", "an array of numbers, as numpy.save writes it") from None
     if found.ndim != 2 or found.dtype.kind not in "fiu":
-        raise KeyedError(key, f"{path}: {found.ndim} dimensions of {found.dtype}", "two dimensions of numbers")
+        raise ConfigError(key, f"{path}: {found.ndim} dimensions of {found.dtype}", "two dimensions of numbers")
     return found.astype(float)
 
 
@@ -50,7 +50,7 @@ def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) ->
         import rasterio
         from rasterio.warp import Resampling, reproject
     except ImportError:
-        raise KeyedError(key, "rasterio is not installed; pip install lapwing[geotiff]") from None
+        raise ConfigError(key, "rasterio is not installed; pip install lapwing[geotiff]") from None
     side = 2 * points + 1
     east_north = f"+proj=aeqd +lat_0={home.latitude_deg!r} +lon_0={home.longitude_deg!r} +datum=WGS84 +units=m"
     edge = (points + 0.5) * spacing  # a pixel is an area about its point
@@ -69,18 +69,18 @@ def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) ->
             )
             heights = heights[::-1] * file.scales[0] + file.offsets[0]
     except rasterio.errors.RasterioError as error:
-        raise KeyedError(key, f"{path}: {error}", "a GeoTIFF of heights") from None
+        raise ConfigError(key, f"{path}: {error}", "a GeoTIFF of heights") from None
     if np.isnan(heights).any():
         row, column = np.argwhere(np.isnan(heights))[0] - points
         where = f"({column * spacing:g}, {row * spacing:g})"
-        raise KeyedError(key, f"{path} has no height at {where} m of home", "a file that covers grid.reach about home")
+        raise ConfigError(key, f"{path} has no height at {where} m of home", "a file that covers grid.reach about home")
     return heights
 
 
 def _check(key: str, path: Path, file: Any) -> None:
     if file.count != 1:
-        raise KeyedError(key, f"{path} has {file.count} bands", "one band of heights")
+        raise ConfigError(key, f"{path} has {file.count} bands", "one band of heights")
     if file.crs is None:
-        raise KeyedError(key, f"{path} states no coordinate system", "a GeoTIFF that does")
+        raise ConfigError(key, f"{path} states no coordinate system", "a GeoTIFF that does")
     if (unit := file.units[0] or "").lower() not in METRES:
-        raise KeyedError(key, f"{path} has heights in {unit!r}", "metres")
+        raise ConfigError(key, f"{path} has heights in {unit!r}", "metres")

@@ -7,16 +7,16 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import ConfigDict
 
-from lapwing.cosim.scene import Scene, Section
+from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.cosim.scene.files import named
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.mesh_file import SUFFIXES, Mesh, read
 
 KEY = "airframe.mesh"
 WIDEST = 20.0  # times as far as the farthest rotor is from the origin: no vehicle, but one in millimetres
 
 
-class Meshes(Section):
+class Meshes(SceneTable):
     """The triangles of the file that `airframe.mesh` names, by that name."""
 
     TABLE: ClassVar[str] = "meshes"
@@ -44,13 +44,13 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
         return
     path = folder / name
     if path.suffix.lower() not in SUFFIXES:
-        raise KeyedError(KEY, f"got {name!r}", "the path of an .stl or .obj file")
+        raise ConfigError(KEY, f"got {name!r}", "the path of an .stl or .obj file")
     try:
         tree[Meshes.TABLE] = {name: pack(read(path))}
     except OSError as error:
-        raise KeyedError(KEY, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+        raise ConfigError(KEY, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except ValueError as error:
-        raise KeyedError(KEY, f"{path}: {error}") from None
+        raise ConfigError(KEY, f"{path}: {error}") from None
 
 
 def check(scene: Scene, mesh: str | None, reach: float) -> None:
@@ -59,11 +59,11 @@ def check(scene: Scene, mesh: str | None, reach: float) -> None:
         return
     text = scene[Meshes].text(mesh) if scene.has(Meshes) else None
     if text is None:
-        raise KeyedError(KEY, f"got {mesh!r} as an override", "it in the airframe's file or the scene's [airframe]")
+        raise ConfigError(KEY, f"got {mesh!r} as an override", "it in the airframe's file or the scene's [airframe]")
     far = float(np.abs(unpack(text).vertices).max())
     if far > WIDEST * reach:
         message = f"{mesh} reaches {far:g} m from the origin, and the rotors {reach:g} m"
-        raise KeyedError(KEY, message, "metres along the airframe's axes (of millimetres, scale it by 0.001)")
+        raise ConfigError(KEY, message, "metres along the airframe's axes (of millimetres, scale it by 0.001)")
 
 
 def pack(mesh: Mesh) -> str:

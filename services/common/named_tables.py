@@ -5,12 +5,12 @@ from typing import Any
 
 from pydantic import ConfigDict
 
-from lapwing.cosim.scene import Files, Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common import user_code, user_modules
 
 
-class NamedTables(Section):
+class NamedTables(SceneTable):
     """A table for each thing of a kind, by its name; one of the user's own has the key `module`."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
@@ -32,7 +32,7 @@ class NamedTables(Section):
         """Every entry is a table."""
         for name, table in self.tables.items():
             if not isinstance(table, dict):
-                raise KeyedError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
+                raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
 
     def load(self, scene: Scene) -> None:
         """Import the modules of the user's own. KeyedError where one cannot be imported."""
@@ -41,5 +41,5 @@ class NamedTables(Section):
             if "module" in table:
                 key = f"{self.TABLE}.{name}.module"
                 if not isinstance(table["module"], str):
-                    raise KeyedError(key, f"got {table['module']!r}", "the name of a module")
+                    raise ConfigError(key, f"got {table['module']!r}", "the name of a module")
                 user_code.loaded(key, table["module"], texts)

@@ -21,7 +21,7 @@ def nobody(_: int) -> Iterable[OperatorCommand]:
     return ()
 
 
-class Mailbox:
+class OperatorInbox:
     """Sorts what has come from outside by vehicle: of several, the header's `frame_id` has the name."""
 
     def __init__(self, vehicles: Sequence[str], arrived: Callable[[], tuple[int, bytes] | None]):

@@ -7,7 +7,7 @@ that begin with # are comments. Source: QGroundControl developer guide, "Paramet
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from lapwing.cosim.scene import SceneError, Source
+from lapwing.cosim.scene import KeyOrigin, SceneError
 from lapwing.services.common.autopilot_parameters import Parameter
 
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
@@ -37,12 +37,12 @@ def parse(text: str, path: Path) -> dict[str, float]:
             continue
         if len(row) not in (2, 5):
             message = f"got {line.strip()!r}"
-            raise SceneError("", message, "name and value (or 5 columns)", Source(path, number))
+            raise SceneError("", message, "name and value (or 5 columns)", KeyOrigin(path, number))
         name, value = row if len(row) == 2 else row[2:4]
         try:
             found[name] = float(value)
         except ValueError:
-            raise SceneError(name, f"got {value!r}", "a number", Source(path, number)) from None
+            raise SceneError(name, f"got {value!r}", "a number", KeyOrigin(path, number)) from None
     return found
 
 

@@ -39,7 +39,7 @@ class TrueState(NamedTuple):
     angular_acceleration_body: Vec3 = ZERO  # [rad/s^2] of a multirotor
 
 
-class BatteryGauge(NamedTuple):
+class BatteryReading(NamedTuple):
     """State of the battery."""
 
     charge: float = 0.0  # fraction; NaN where no effect counts it

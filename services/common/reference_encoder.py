@@ -5,20 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import Setpoint, header
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.messages.topics import Topic
 from lapwing.services.common.ports import Reference
 
 
-def reference_wire(topic: Topic, port: str, texts: Sequence[str]) -> Wire:
+def reference_wire(topic: Topic, port: str, texts: Sequence[str]) -> TopicEncoder:
     """The topic of a port of references; `texts` names the phases by number, and may grow."""
 
     def sample(phase: int) -> Any:
         return Setpoint(header(0, "world"), phase=texts[phase])
 
-    return Wire(topic, port, 1, _fields, sample, lambda x: [x.phase])
+    return TopicEncoder(topic, port, 1, _fields, sample, lambda x: [x.phase])
 
 
 def _fields(x: Reference, time_ns: np.ndarray) -> Fields:

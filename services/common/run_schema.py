@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, field_validator
 
 import lapwing.scenes
-from lapwing.cosim.scene import Files, Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 
 SHIPPED = Path(str(importlib.resources.files(lapwing.scenes)))  # folder of the scenes that ship
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
@@ -17,7 +17,7 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]  # along x and y
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 
 
-class Run(Section):
+class Run(SceneTable):
     """What ends a run, and the seed of all its randomness."""
 
     TABLE: ClassVar[str] = "run"
@@ -34,7 +34,7 @@ class Run(Section):
     def _all_or_names(cls, value: object) -> object:
         names = isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
         if not (names or isinstance(value, bool)):
-            raise KeyedError("", f"got {value!r}", "true, false or a list of services")
+            raise ConfigError("", f"got {value!r}", "true, false or a list of services")
         return value
 
 
@@ -48,7 +48,7 @@ def title(scene: Path) -> str:
     return str(run.get("title", "")) if isinstance(run, dict) else ""
 
 
-class CooperativeLoad(Section):
+class CooperativeLoad(SceneTable):
     """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); a tuple has an entry for each."""
 
     TABLE: ClassVar[str] = "cooperative_load"
@@ -63,7 +63,7 @@ class CooperativeLoad(Section):
     gravity: float = 9.81  # [m/s^2]
 
 
-class Published(Section):
+class Published(SceneTable):
     """Figures from the literature that a run's figures are shown beside."""
 
     TABLE: ClassVar[str] = "published"

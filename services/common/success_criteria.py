@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 
 EXPECTED = "an expression over figures of the flight, for example \"rmse.x < 0.1 and verdict == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
@@ -22,7 +22,7 @@ _MAY_HAVE = (
 )  # fmt: skip
 
 
-class Success(Section):
+class Success(SceneTable):
     """What a flight has to be for a success; anything else is a failure: exit code 4 of a run, counted in campaigns."""
 
     TABLE: ClassVar[str] = "success"
@@ -36,13 +36,13 @@ class Success(Section):
             try:
                 _expression(text)
             except ValueError:
-                raise KeyedError(f"success.require.{i}", f"got {text!r}", EXPECTED) from None
+                raise ConfigError(f"success.require.{i}", f"got {text!r}", EXPECTED) from None
 
     def check_names(self, known: Mapping[str, Any]) -> None:
         """Every figure that is named is known. Raises KeyedError where one is not."""
         for i, text in enumerate(self.require):
             for name in sorted(_expression(text).names - set(known)):
-                raise KeyedError.unknown(f"success.require.{i}", "figure", name, known)
+                raise ConfigError.unknown(f"success.require.{i}", "figure", name, known)
 
     def unmet(self, figures: Mapping[str, Any]) -> list[str]:
         """The expressions that do not hold for these figures."""

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from lapwing.cosim.config import user_module
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 MEMORY = "memory"  # the module in the name of an object that only this process has: "memory:MyController"
 _lent: dict[str, Any] = {}  # such objects
@@ -51,7 +51,7 @@ def _carried(thing: Any, folder: Path) -> str:
         return ""
     try:
         file = user_module.find("", module.__name__, folder)[module.__name__]
-    except KeyedError:
+    except ConfigError:
         return ""
     same = user_module.source(module) in (None, file.read_text(encoding="utf-8"))
     return f"{module.__name__}:{name}" if same else ""
@@ -61,7 +61,7 @@ def parted(key: str, text: str) -> tuple[str, str]:
     """Module and name of "module:Name"; KeyedError where it is not of that form."""
     module, _, name = text.partition(":")
     if not module or not name.isidentifier():
-        raise KeyedError(key, f"got {text!r}", 'a text of the form "module:Name"')
+        raise ConfigError(key, f"got {text!r}", 'a text of the form "module:Name"')
     return module, name
 
 
@@ -70,9 +70,9 @@ def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
     try:
         return user_module.load(module, texts)
     except SyntaxError as error:
-        raise KeyedError(key, f"{module}.py, line {error.lineno}: {error.msg}") from error
+        raise ConfigError(key, f"{module}.py, line {error.lineno}: {error.msg}") from error
     except user_module.FAULTS as error:
-        raise KeyedError(key, f"{module}: {type(error).__name__}: {error}") from error
+        raise ConfigError(key, f"{module}: {type(error).__name__}: {error}") from error
 
 
 def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, Any]:
@@ -85,11 +85,11 @@ def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, An
     if module == MEMORY:
         if name not in _lent:
             message = f"{name} was an object in the memory of the Python session that flew it"
-            raise KeyedError(key, message, "a class in a module, which a log carries")
+            raise ConfigError(key, message, "a class in a module, which a log carries")
         thing = _lent[name]
         return sys.modules[getattr(thing, "__module__", type(thing).__module__)], thing
     found = loaded(key, module, texts)
     if not hasattr(found, name):
         own = [n for n, value in vars(found).items() if callable(value) and value.__module__ == found.__name__]
-        raise KeyedError.unknown(key, f"name in {module}", name, own)
+        raise ConfigError.unknown(key, f"name in {module}", name, own)
     return found, getattr(found, name)

@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 from pydantic import ConfigDict
 
 from lapwing.cosim.config import user_module
-from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene import Files, Scene, SceneTable
 
 
-class Modules(Section):
+class Modules(SceneTable):
     """The texts of the user's own modules, by name: what the keys that name one resolve to."""
 
     TABLE: ClassVar[str] = "modules"

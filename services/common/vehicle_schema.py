@@ -5,11 +5,11 @@ from typing import Any, ClassVar, NamedTuple
 
 from pydantic import ConfigDict, Field
 
-from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import laid_over, named
 from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import density
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.effects.coaxial_wash import CoaxialWash
 from lapwing.dynamics.effects.rotor_quadratic import RotorQuadratic
@@ -31,7 +31,7 @@ BURIED = 1e-6  # [m]
 STEEPEST_START = 46.0  # [deg] that a vehicle leans at its start: ground is at most 45 degrees steep
 
 
-class Vehicle(Section):
+class Vehicle(SceneTable):
     """What flies."""
 
     TABLE: ClassVar[str] = "vehicle"
@@ -67,16 +67,18 @@ class Vehicle(Section):
         if self.mass is None:
             return
         if not scene.has(VehicleAirframe):
-            raise KeyedError("vehicle.mass", "there is no airframe whose mass it could be; leave it out")
+            raise ConfigError("vehicle.mass", "there is no airframe whose mass it could be; leave it out")
         if scene[VehicleAirframe].payload:
-            raise KeyedError(
+            raise ConfigError(
                 "vehicle.mass", "airframe.payload is part of it", "airframe.mass.total, without the payload"
             )
         if (total := airframe(scene).mass.total) != self.mass:
-            raise KeyedError("vehicle.mass", f"{self.mass:g} kg, and airframe.mass.total = {total:g} kg", "one of them")
+            raise ConfigError(
+                "vehicle.mass", f"{self.mass:g} kg, and airframe.mass.total = {total:g} kg", "one of them"
+            )
 
 
-class VehicleAirframe(Airframe, Section):
+class VehicleAirframe(Airframe, SceneTable):
     """The airframe: the content of the file that `vehicle.airframe` names."""
 
     TABLE: ClassVar[str] = "airframe"
@@ -104,7 +106,7 @@ class Effects(NamedTables):
             if isinstance(entries[name], dict) and hasattr(module := effects.get(name), "embed"):
                 try:
                     module.embed(entries[name], files.folder)
-                except KeyedError as error:
+                except ConfigError as error:
                     raise error.under(f"{cls.TABLE}.{name}") from None
 
     def check(self, scene: Scene) -> None:
@@ -119,7 +121,7 @@ def airframe(scene: Scene) -> Airframe:
     Raises KeyedError where it names none.
     """
     if not scene.has(VehicleAirframe):
-        raise KeyedError("vehicle.airframe", "missing", "the name of an airframe, or the path of a .toml file")
+        raise ConfigError("vehicle.airframe", "missing", "the name of an airframe, or the path of a .toml file")
     return scene[VehicleAirframe].loaded.about_centre
 
 
@@ -155,7 +157,7 @@ def rotor_constants(scene: Scene) -> RotorConstants:
     frame = airframe(scene)
     if frame.propeller is None:
         expected = "[effects.rotor_quadratic] with both constants, or an airframe with [propeller]"
-        raise KeyedError("effects", "nothing says what the rotors give", expected)
+        raise ConfigError("effects", "nothing says what the rotors give", expected)
     known = RotorThrust.from_scene({}, frame)
     return RotorConstants(known.thrust_constant, known.torque_constant, True)
 
@@ -200,7 +202,7 @@ def _upright(pose: Pose) -> None:
     lean = math.degrees(math.acos(min(upward, 1.0)))
     if lean > STEEPEST_START:
         message = f"no place for the vehicle at its start: on its feet it would lean by {lean:.0f} degrees"
-        raise KeyedError("environment.terrain", message, "room for the vehicle where it starts")
+        raise ConfigError("environment.terrain", message, "room for the vehicle where it starts")
 
 
 def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
@@ -213,7 +215,7 @@ def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
         if under > BURIED:
             place = ", ".join(f"{p:g}" for p in part)
             message = f"buries the start: the vehicle's ({place}) m would be {under:.2f} m below the ground"
-            raise KeyedError("environment.terrain", message, "room for the vehicle where it starts")
+            raise ConfigError("environment.terrain", message, "room for the vehicle where it starts")
 
 
 def start_place(scene: Scene) -> Vec3:

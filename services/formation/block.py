@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vehicles.cooperative_control import formation_control
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState
 from lapwing.kernels import leaf
@@ -19,7 +19,7 @@ class FormationLaw(NamedTuple):
 
 
 @leaf
-def step(p: FormationLaw, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[RotorWrenches], int]:
+def step(p: FormationLaw, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[RotorWrenches], int]:
     """The command of a tick; the load comes first among the bodies, the quadrotors next. It has no state."""
     b = inputs[0].value
     load, velocity = b.position_world[0], b.velocity_world[0]
@@ -27,4 +27,4 @@ def step(p: FormationLaw, s: Any, tick: int, inputs: tuple[Received, ...]) -> tu
     found = each_index(links.link, attitudes, load, velocity, b.position_world[1:], b.velocity_world[1:])
     x = CooperativeLoadState(load, velocity, attitudes, omegas, found)
     given = formation_control(p.formation, tick * p.interval, x)
-    return s, (RotorWrenches(given.thrust, given.moment_body),), GO_ON
+    return s, (RotorWrenches(given.thrust, given.moment_body),), CONTINUE

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import LiftCommand, Vector3, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
@@ -13,11 +13,11 @@ from lapwing.services.common import ports
 from lapwing.services.common.ports import RotorWrenches
 
 
-def wires(setup: Setup) -> list[Wire]:
+def wires(setup: RunConfig) -> list[TopicEncoder]:
     """The thrusts and moments of the quadrotors."""
     n = len(setup.port(ports.LIFT).like.thrust)
     sample = LiftCommand(header(0, "body"), (0.0,) * n, (Vector3(),) * n)
-    return [Wire(topic.LIFT, ports.LIFT, 1, _lift, lambda: sample)]
+    return [TopicEncoder(topic.LIFT, ports.LIFT, 1, _lift, lambda: sample)]
 
 
 def _lift(x: RotorWrenches, time_ns: np.ndarray) -> Fields:

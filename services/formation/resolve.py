@@ -1,20 +1,20 @@
 """From a scene's `[formation]` to the control law."""
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vector import ZERO, norm, scale
 from lapwing.dynamics.vehicles.cooperative_control import FormationControl
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.ports import RotorWrenches
 from lapwing.services.common.run_schema import CooperativeLoad
 from lapwing.services.formation.block import FormationLaw
 from lapwing.services.formation.schema import Formation
 
 
-def resolve(scene: Scene) -> ServiceSetup | None:
+def resolve(scene: Scene) -> ServiceConfig | None:
     """The control of the scene's `[formation]`; None where there is none."""
     if not scene.has(Formation):
         return None
@@ -26,8 +26,8 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     )  # fmt: skip
     p = CooperativeLoadParameters(c.quad_mass, c.quad_inertia, c.link_length, c.load_mass, c.gravity, law)
     n = len(c.link_length)
-    return ServiceSetup(
-        FormationLaw(p, scene[Exchange].interval),
-        (Input(ports.BODIES),),
+    return ServiceConfig(
+        FormationLaw(p, scene[Communication].interval),
+        (InputPort(ports.BODIES),),
         (Port(ports.LIFT, RotorWrenches((0.0,) * n, (ZERO,) * n)),),
     )

@@ -4,12 +4,12 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.run_schema import CooperativeLoad, Triple
 
 
-class Formation(Section):
+class Formation(SceneTable):
     """Load tracking, link directions and attitudes (theory.md, eqs. (7.22) to (7.27))."""
 
     TABLE: ClassVar[str] = "formation"
@@ -29,8 +29,8 @@ class Formation(Section):
     def check(self, scene: Scene) -> None:
         """A direction for every link, and a load to control."""
         if not scene.has(CooperativeLoad):
-            raise KeyedError("cooperative_load", "missing", "a table [cooperative_load], which a formation needs")
+            raise ConfigError("cooperative_load", "missing", "a table [cooperative_load], which a formation needs")
         n = len(scene[CooperativeLoad].link_length)
         if len(self.link_direction) != n or not all(any(d) for d in self.link_direction):
             expected = f"{n} directions that are not zero, one for each link"
-            raise KeyedError("formation.link_direction", f"got {list(self.link_direction)}", expected)
+            raise ConfigError("formation.link_direction", f"got {list(self.link_direction)}", expected)

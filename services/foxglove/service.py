@@ -2,15 +2,15 @@
 
 from typing import Any
 
-from lapwing.cosim.executors.participant import POLL, Process
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.executors.participant import POLL, Participant
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import unpack_batch
 from lapwing.messages.topics import EVENTS
 from lapwing.services.foxglove.server import Server
 
 
-def run(process: Process, given: Any) -> None:
+def run(process: Participant, given: Any) -> None:
     """Serve until the flight has ended, or until asked to stop.
 
     Raises:
@@ -19,7 +19,7 @@ def run(process: Process, given: Any) -> None:
     setup = process.setup
     with Server(given.foxglove, given.insecure) as server:
         events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
-        watcher = dict.fromkeys(events, process.participants.mark(WATCHER))
+        watcher = dict.fromkeys(events, process.participants.mark(MONITOR))
         arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
         for topic in events.values():
             server.declare(topic, EVENTS.message.type_name)

@@ -18,7 +18,7 @@ from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.session import Session
 from lapwing.services.mavlink.telemetry.system_status import heartbeat
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 SECOND = 1_000_000_000
@@ -50,7 +50,7 @@ class Adapter:
             insecure: commands are taken from other machines without a key.
             log: of the run, which endpoints may download.
         """
-        self.vehicle = VehicleView(description)
+        self.vehicle = VehicleCache(description)
         self.clock = Clock()
         self.counts: Counter[str] = Counter()
         self.commands = CommandQueue(self.clock, operate)

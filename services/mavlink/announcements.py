@@ -8,7 +8,7 @@ from lapwing.services.mavlink.dialect import id_of, mavlink
 from lapwing.services.mavlink.events import Definition, watches
 from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.telemetry import streams
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 
@@ -16,7 +16,7 @@ NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 class Announcements:
     """Compares each status with the one before."""
 
-    def __init__(self, vehicle: VehicleView, broadcast: Callable[[Any], None]):
+    def __init__(self, vehicle: VehicleCache, broadcast: Callable[[Any], None]):
         """`broadcast` sends a message to every endpoint."""
         self._vehicle, self._broadcast = vehicle, broadcast
         self._mode: tuple = ()

@@ -18,7 +18,7 @@ from lapwing.services.mavlink.vehicle_description import VehicleDescription
 WAIT = 0.05  # [s] at most until something else is looked at
 
 
-class Hub:
+class LinkServer:
     """Links of one vehicle; a context manager. Those of several vehicles wait together.
 
     Attributes:
@@ -30,7 +30,7 @@ class Hub:
         description: VehicleDescription,
         options: Options,
         operate: Callable[[bytes], None] | None,
-        beside: "Hub | None" = None,
+        beside: "LinkServer | None" = None,
     ):
         """Open every link.
 
@@ -111,7 +111,7 @@ class Hub:
             self.selector.close()
         os.close(self._woken)
 
-    def __enter__(self) -> "Hub":
+    def __enter__(self) -> "LinkServer":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -7,7 +7,7 @@ from lapwing.dynamics.effects.battery_thevenin import BatteryThevenin
 from lapwing.dynamics.effects.payload import Payload
 from lapwing.kernels import uncompiled
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import Vehicle, active, airframe, start_height
 from lapwing.services.mavlink.schema import Mavlink
@@ -42,7 +42,7 @@ def describe(scene: Scene) -> VehicleDescription:
         parameters=tuple(table(scene).values()),
         gripper=any(isinstance(effect, Payload) for effect in active(scene)),
         accepts_commands=scene.lookup("autopilot.operator"),
-        tick_ns=scene[Exchange].interval_ns,
+        tick_ns=scene[Communication].interval_ns,
     )
 
 

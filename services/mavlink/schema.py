@@ -4,10 +4,10 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Section
+from lapwing.cosim.scene import SceneTable
 
 
-class Mavlink(Section):
+class Mavlink(SceneTable):
     """How the vehicle presents itself to ground stations."""
 
     TABLE: ClassVar[str] = "mavlink"

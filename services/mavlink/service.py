@@ -11,20 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from lapwing.cosim.diagram.multi_vehicle import members
-from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import unpack_batch
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, of_all
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.mavlink.channel import read_key
 from lapwing.services.mavlink.link_options import Options
-from lapwing.services.mavlink.link_server import Hub
+from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.links import numbered
 
 ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # of which no message is left out
 
 
-def run(process: Process, given: Any) -> None:
+def run(process: Participant, given: Any) -> None:
     """Serve the links until the flight has ended, or until asked to stop; then say how it went.
 
     Raises:
@@ -40,12 +40,12 @@ def run(process: Process, given: Any) -> None:
     at_once = process.speed is not None
     put = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with ExitStack() as stack:
-        hubs: dict[str, Hub] = {}
+        hubs: dict[str, LinkServer] = {}
         for i, member in enumerate(flown):
             urls = tuple(numbered(url, i) for url in given.mavlink)
             options = Options(urls, key, given.insecure, log, process.speed)
             first = next(iter(hubs.values()), None)
-            hub = Hub(member.beside["mavlink"], options, lambda payload: put(payload, 0), first)
+            hub = LinkServer(member.beside["mavlink"], options, lambda payload: put(payload, 0), first)
             hubs[member.vehicle] = stack.enter_context(hub)
             for command in member.services["autopilot"].parameters.plan:  # the autopilot begins with it
                 hub.adapter.missions.hold(command)
@@ -80,7 +80,7 @@ def run(process: Process, given: Any) -> None:
                 print(f"{name}: {line}" if others else line, flush=True)
 
 
-def _take_batch(hubs: Mapping[str, Hub], payload: bytes, at_once: bool, interval_ns: int) -> None:
+def _take_batch(hubs: Mapping[str, LinkServer], payload: bytes, at_once: bool, interval_ns: int) -> None:
     """Every command, acknowledgement and status, estimates where they do not come at once, of all else the newest."""
     *_, pages = unpack_batch(payload)
     for page in pages:

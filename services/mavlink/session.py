@@ -16,7 +16,7 @@ from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.stream_rates import Schedule
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 SAY_EVERY, MAX_SAID = 5.0, 64  # [s] between two times of the same text; texts that are remembered
 
@@ -27,7 +27,7 @@ class Session:
     def __init__(
         self,
         endpoint: Endpoint,
-        vehicle: VehicleView,
+        vehicle: VehicleCache,
         clock: Clock,
         commands: CommandQueue,
         parameters: ParameterStore,

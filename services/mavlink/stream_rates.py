@@ -3,7 +3,7 @@
 from typing import Any
 
 from lapwing.services.mavlink.telemetry import streams
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 SECOND = 1_000_000_000
 MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] that MESSAGE_INTERVAL can hold
@@ -12,7 +12,7 @@ MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] that MESSAGE_INTERVAL can hold
 class Schedule:
     """Intervals of the streams to one endpoint: of the telemetry's table, unless it has asked for others."""
 
-    def __init__(self, vehicle: VehicleView):
+    def __init__(self, vehicle: VehicleCache):
         """The intervals of a ground station, all due now."""
         self._vehicle = vehicle
         self._asked: dict[int, int] = {}  # interval [ns] by message that the endpoint has asked for; 0: never

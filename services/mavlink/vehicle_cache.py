@@ -47,7 +47,7 @@ class NedMotion:
         return enu_to_geodetic(self._home, self.position_world)
 
 
-class VehicleView:
+class VehicleCache:
     """A vehicle as its links see it: its description, simulation time, and the newest message of each topic."""
 
     def __init__(self, description: VehicleDescription):

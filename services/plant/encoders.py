@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import lapwing.messages
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.dynamics.atmosphere import FREEZING
 from lapwing.dynamics.lie.quaternion import conjugate, rotate
 from lapwing.kernels import uncompiled
@@ -28,7 +28,7 @@ from lapwing.messages import (
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.common import ports
-from lapwing.services.common.ports import BatteryGauge, BodyMotions, ContactForces, TrueState
+from lapwing.services.common.ports import BatteryReading, BodyMotions, ContactForces, TrueState
 
 WORLD = "world"
 AMPERE_HOUR = 3600.0  # [A s]
@@ -44,28 +44,34 @@ class PlantWiring(NamedTuple):
     bodies: tuple[str, ...]  # names, in the order of the port
 
 
-def wires(setup: Setup, wiring: PlantWiring) -> list[Wire]:
+def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
     """The plant's topics."""
     truth, given, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
     found = [
-        Wire(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
-        Wire(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
-        Wire(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
-        Wire(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
+        TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
+        TopicEncoder(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
+        TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
+        TopicEncoder(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
     ]
     if wiring.odometry:
         sample = Odometry(header(0, WORLD), setup.vehicle)
-        found.append(Wire(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
+        found.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
     if ports.BATTERY in given:
         battery = _battery_sample(setup.vehicle, wiring)
-        found.append(Wire(topic.BATTERY, ports.BATTERY, given[ports.BATTERY].period, _battery(wiring), lambda: battery))
+        found.append(
+            TopicEncoder(topic.BATTERY, ports.BATTERY, given[ports.BATTERY].period, _battery(wiring), lambda: battery)
+        )
     if ports.BODIES in given:
         sample_bodies = _bodies_sample(wiring.bodies)
-        found.append(Wire(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies))
+        found.append(
+            TopicEncoder(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies)
+        )
     if ports.CONTACT in given:
         n = len(given[ports.CONTACT].like.force_world)
         sample_contact = lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
-        found.append(Wire(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact))
+        found.append(
+            TopicEncoder(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact)
+        )
     return found
 
 
@@ -151,7 +157,7 @@ def _battery_sample(vehicle: str, wiring: PlantWiring) -> Any:
 def _battery(wiring: PlantWiring) -> Any:
     capacity, cells = wiring.capacity / AMPERE_HOUR, wiring.cells
 
-    def fields(x: BatteryGauge, time_ns: np.ndarray) -> Fields:
+    def fields(x: BatteryReading, time_ns: np.ndarray) -> Fields:
         """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it."""
         voltage = np.asarray(x.voltage)
         found: dict[str, Any] = {

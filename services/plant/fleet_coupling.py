@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
-from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.multi_vehicle import of_other
 from lapwing.dynamics import integrators
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._vehicle_interaction import interacts, presence
 from lapwing.dynamics.effects.carried_load import CarriedLoad
@@ -19,13 +19,13 @@ from lapwing.dynamics.vehicles.multirotor_slung import Sling, frequency
 from lapwing.services.common import ports
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
-from lapwing.services.plant.service_config import Others, PlantSetup
+from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
 PRESENCE, LOAD = "presence", "load"  # ports that plants of a fleet read of one another
 FASTEST = 0.5  # frequency of a cable times the exchange interval: up to here a load looks ahead to within 2 %
 
 
-def told(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
+def told(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
     """The plants of a run's vehicles, by their names: whose effects know of others are told who else has such.
 
     Raises:
@@ -46,20 +46,20 @@ def told(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[st
             load = _load(shares, carriers, keys)
         if read:
             plant: PlantSetup = shares[name].parameters
-            others = Others(tuple(read), presence(effects_of(shares[name])), **load)
+            others = FleetCoupling(tuple(read), presence(effects_of(shares[name])), **load)
             found[name] = shares[name]._replace(parameters=plant._replace(others=others))
         if name in carriers and name != owner:
             found[name] = _without_bodies(found[name])
     return found
 
 
-def effects_of(given: ServiceSetup) -> tuple:
+def effects_of(given: ServiceConfig) -> tuple:
     """The effects of a multirotor's plant; () of any other."""
     core = given.parameters.core
     return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
 
 
-def _check_apart(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> None:
+def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> None:
     """Refuse vehicles that would be in one another's collision sphere from the beginning."""
     spheres = {
         name: (e.radius, given.parameters.start.vehicle.motion.position_world)
@@ -71,21 +71,23 @@ def _check_apart(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) ->
         away = norm(subtract(position, other_position))
         if away < r + other_r:
             message = f"got a place {away:.3g} m from {one}: their collision spheres touch"
-            raise KeyedError(f"{keys[other]}start", message, f"at least {r + other_r:.3g} m between them")
+            raise ConfigError(f"{keys[other]}start", message, f"at least {r + other_r:.3g} m between them")
 
 
-def _sling(given: ServiceSetup) -> Sling | None:
+def _sling(given: ServiceConfig) -> Sling | None:
     return next((e.sling for e in effects_of(given) if isinstance(e, CarriedLoad)), None)
 
 
-def _without_bodies(given: ServiceSetup) -> ServiceSetup:
+def _without_bodies(given: ServiceConfig) -> ServiceConfig:
     """The plant of one that does not tell of the load: another one does."""
     plant: PlantSetup = given.parameters
     parameters = plant._replace(wiring=plant.wiring._replace(bodies=()))
-    return ServiceSetup(parameters, given.inputs, tuple(port for port in given.ports if port.name != ports.BODIES))
+    return ServiceConfig(parameters, given.inputs, tuple(port for port in given.ports if port.name != ports.BODIES))
 
 
-def _load(shares: Mapping[str, ServiceSetup], carriers: Mapping[str, Sling], keys: Mapping[str, str]) -> dict[str, Any]:
+def _load(
+    shares: Mapping[str, ServiceConfig], carriers: Mapping[str, Sling], keys: Mapping[str, str]
+) -> dict[str, Any]:
     """What the plant of the first carrier is told of the load: it stands in the middle below all hooks."""
     owner, *others = carriers
     first, core = carriers[owner], shares[owner].parameters.core
@@ -94,7 +96,7 @@ def _load(shares: Mapping[str, ServiceSetup], carriers: Mapping[str, Sling], key
                                   ("drag_area", first.drag_area, carriers[name].drag_area)):  # fmt: skip
             if ours != theirs:
                 message = f"got {theirs:g}, and {owner} has {ours:g}: they carry the same load"
-                raise KeyedError(f"{keys[name]}effects.carried_load.{key}", message, f"{ours:g}")
+                raise ConfigError(f"{keys[name]}effects.carried_load.{key}", message, f"{ours:g}")
     hooks_world = {name: _hook(shares[name], sling) for name, sling in carriers.items()}
     x, y = (sum(hook[i] for hook in hooks_world.values()) / len(carriers) for i in (0, 1))
     start = LoadMotion((x, y, surface(first.terrain, x, y)[0]), ZERO)
@@ -102,11 +104,11 @@ def _load(shares: Mapping[str, ServiceSetup], carriers: Mapping[str, Sling], key
         key, away = f"{keys[name]}effects.carried_load", norm(subtract(hooks_world[name], start.load_position))
         if away > sling.length:
             message = f"got {sling.length:g} m, and the load stands {away:.2f} m away, in the middle of its carriers"
-            raise KeyedError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles that stand nearer")
+            raise ConfigError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles that stand nearer")
         turn = frequency(sling, shares[name].parameters.core.vehicle.body.mass) * core.interval
         if turn > FASTEST:
             message = f"the load swings along the cable by {turn:.2g} rad in an exchange interval"
-            raise KeyedError(f"{key}.stiffness", message, f"at most {FASTEST:g} rad: a softer cable, or a higher rate")
+            raise ConfigError(f"{key}.stiffness", message, f"at most {FASTEST:g} rad: a softer cable, or a higher rate")
     field = hooks.all_fields(core.vehicle.effects, shares[owner].parameters.start.vehicle.memory, ZERO)
     method = integrators.get("rk4").Method()
     plant = LoadPlant(tuple(carriers.values()), field, method, core.step, core.steps, core.interval)
@@ -114,7 +116,7 @@ def _load(shares: Mapping[str, ServiceSetup], carriers: Mapping[str, Sling], key
     return {"load": plant, "load_start": start, "load_inputs": inputs}
 
 
-def _hook(given: ServiceSetup, sling: Sling) -> Vec3:
+def _hook(given: ServiceConfig, sling: Sling) -> Vec3:
     """Where the cable is fastened at the start [m], world."""
     motion = given.parameters.start.vehicle.motion
     return add(motion.position_world, rotate(motion.attitude, sling.hook_body))

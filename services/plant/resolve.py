@@ -3,10 +3,10 @@
 import importlib
 from collections.abc import Mapping
 
-from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
 from lapwing.dynamics.effects.carried_load import CarriedLoad
 from lapwing.dynamics.vector import ZERO
@@ -20,7 +20,7 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.models._common import bodies_port, noise_key, rate_ticks
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the scene: every scene has one."""
     model = scene[Vehicle].model
     found = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
@@ -28,32 +28,32 @@ def resolve(scene: Scene) -> ServiceSetup:
         found = _with_contact(scene, found)
     if any(isinstance(e, CarriedLoad) for e in fleet_coupling.effects_of(found)):
         if any(port.name == ports.BODIES for port in found.ports):
-            raise KeyedError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
+            raise ConfigError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
         plant = found.parameters
         parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
-        return ServiceSetup(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))
+        return ServiceConfig(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))
     return found
 
 
-def _with_contact(scene: Scene, found: ServiceSetup) -> ServiceSetup:
+def _with_contact(scene: Scene, found: ServiceConfig) -> ServiceConfig:
     """The same plant, which also tells of the forces on its feet."""
     effect = next(
         (e for e in fleet_coupling.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
     )
     if effect is None:
         message = "no effect of the scene tells of forces on feet"
-        raise KeyedError("rates.contact", message, "a multirotor with [effects.ground_contact], or to leave it out")
+        raise ConfigError("rates.contact", message, "a multirotor with [effects.ground_contact], or to leave it out")
     plant, zero = found.parameters, (ZERO,) * len(effect.feet)
     port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact"))
-    return ServiceSetup(plant._replace(contact=ContactView(plant.core.vehicle)), found.inputs, (*found.ports, port))
+    return ServiceConfig(plant._replace(contact=ContactView(plant.core.vehicle)), found.inputs, (*found.ports, port))
 
 
-def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
+def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
     """The plants of a run's vehicles, by their names, once they know of one another; as of `interactions.told`."""
     return fleet_coupling.told(shares, keys)
 
 
-def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:
+def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """The same plant with another seed; only a multirotor has random effects."""
     plant = given.parameters
     if not isinstance(plant.core, MultirotorPlant):

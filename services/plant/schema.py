@@ -4,16 +4,16 @@ from typing import Any, ClassVar
 
 from pydantic import Field, field_validator
 
-from lapwing.cosim.scene import Scene, SceneError, Section, Source
+from lapwing.cosim.scene import KeyOrigin, Scene, SceneError, SceneTable
 from lapwing.dynamics import integrators
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 
 CONTACT_SHARE = 0.1  # of solver.accuracy, for one part of a step in contact: errors of many parts add up
 
 
-class Solver(Section):
+class Solver(SceneTable):
     """How the plant is integrated between two exchanges."""
 
     TABLE: ClassVar[str] = "solver"
@@ -25,7 +25,7 @@ class Solver(Section):
     @classmethod
     def _known(cls, name: str) -> str:
         if name not in integrators.names():
-            raise KeyedError.unknown("", "integrator", name, integrators.names())
+            raise ConfigError.unknown("", "integrator", name, integrators.names())
         return name
 
     def resolved(self) -> dict[str, Any]:
@@ -42,7 +42,7 @@ class Solver(Section):
         """Error of a part of a step in contact that leaves the accuracy to a whole flight; the usual one without."""
         return CONTACT_TOLERANCE if self.accuracy is None else CONTACT_SHARE * self.accuracy
 
-    def steps(self, exchange: Exchange) -> int:
+    def steps(self, exchange: Communication) -> int:
         """Steps in one exchange interval."""
         return round(exchange.interval / self.step)
 
@@ -50,11 +50,11 @@ class Solver(Section):
         """The step divides the exchange interval."""
         if self.undecided:
             return
-        interval = scene[Exchange].interval
-        n = self.steps(scene[Exchange])
+        interval = scene[Communication].interval
+        n = self.steps(scene[Communication])
         if n < 1 or abs(n * self.step - interval) > 1e-9 * interval:
             expected = f"a step that divides the exchange interval of {interval:g} s"
-            raise KeyedError("solver.step", f"got {self.step:g} s", expected)
+            raise ConfigError("solver.step", f"got {self.step:g} s", expected)
 
 
 def method(scene: Scene) -> tuple[tuple, int, float]:
@@ -63,10 +63,10 @@ def method(scene: Scene) -> tuple[tuple, int, float]:
     Raises:
         SceneError: the scene says an accuracy, and nobody has chosen for it.
     """
-    solver, exchange = scene[Solver], scene[Exchange]
+    solver, exchange = scene[Solver], scene[Communication]
     if solver.undecided:
         chosen = "what `lapwing run` chooses for it is to be handed to every service"
         message = f"{chosen}: --set solver.integrator=... --set solver.step=..."
-        raise SceneError("solver.accuracy", message, source=Source(scene.path))
+        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path))
     steps = solver.steps(exchange)
     return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

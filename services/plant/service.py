@@ -5,13 +5,13 @@ from typing import Any
 
 from numba import types
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
-from lapwing.cosim.diagram.compiled_block import Code, Part
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
+from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.dynamics.effects import _hooks as hooks
-from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.integrators import not_finite
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
@@ -28,12 +28,12 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.plant.blocks.neighbour_state import PresenceView
 from lapwing.services.plant.encoders import wires
 from lapwing.services.plant.fleet_coupling import LOAD, PRESENCE
-from lapwing.services.plant.service_config import Others, PlantEvent, PlantSetup
+from lapwing.services.plant.service_config import FleetCoupling, PlantEvent, PlantSetup
 
 NAME = "plant"
 
 
-def create(setup: Setup) -> Service:
+def create(setup: RunConfig) -> Service:
     """The plant of a run."""
     given = setup.services[NAME]
     plant: PlantSetup = given.parameters
@@ -42,44 +42,46 @@ def create(setup: Setup) -> Service:
     feet = tuple(port for port in given.ports if port.name == ports.CONTACT)
     told = tuple(port for port in given.ports if port not in bodies and port not in feet)
     own = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
-    part = Part(
+    part = Block(
         NAME, plant.core, state, given.inputs, given.ports if own else told, failure=_diverged(setup, plant, state)
     )
     parts: list[Any] = [part]
     if plant.events:
-        parts.insert(0, Breakages(plant, part))
+        parts.insert(0, PropellerFailures(plant, part))
     if plant.others:
         parts = _among_others(plant, plant.others, parts, state, bodies)
     if bodies and plant.bodies and not own:
         inputs = given.inputs[:1]
-        parts.append(Part(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
+        parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
-        parts.append(Part(f"{NAME}.contact", plant.contact, state, (Input(ports.TRUTH),), feet, feet[0].period))
+        parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
     return Service(NAME, parts, wires(setup, plant.wiring))
 
 
-def _among_others(plant: PlantSetup, others: Others, parts: list[Any], state: Cell, bodies: list[Port]) -> list[Any]:
+def _among_others(
+    plant: PlantSetup, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
+) -> list[Any]:
     """The plant's parts, what the others do to the vehicle before them, and after them what they may know of it."""
     vehicle, interval = plant.core.vehicle, plant.core.interval
     interaction = Interaction(vehicle.effects, interval)
     view = PresenceView(vehicle, others.presence, interval)
     found = [
-        Part(f"{NAME}.interaction", interaction, state, _a_tick_ago(PRESENCE, *others.ports)),
+        Block(f"{NAME}.interaction", interaction, state, _a_tick_ago(PRESENCE, *others.ports)),
         *parts,
-        Part(f"{NAME}.{PRESENCE}", view, state, (Input(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
+        Block(f"{NAME}.{PRESENCE}", view, state, (InputPort(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
     ]
     if others.load:
-        told = (Port(LOAD, Presence()), *bodies)
+        told = (Port(LOAD, NeighbourState()), *bodies)
         carriers = _a_tick_ago(*others.load_inputs)
-        found.append(Part(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
+        found.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
     return found
 
 
-def _a_tick_ago(*names: str) -> tuple[Input, ...]:
-    return tuple(Input(name, 1) for name in names)
+def _a_tick_ago(*names: str) -> tuple[InputPort, ...]:
+    return tuple(InputPort(name, 1) for name in names)
 
 
-def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:
+def _diverged(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
     def error(tick: int) -> DivergedError:
         x, t = read(state), tick * setup.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
@@ -95,19 +97,19 @@ def _diverged(setup: Setup, plant: PlantSetup, state: Cell) -> Any:
     return error
 
 
-class Breakages:
+class PropellerFailures:
     """Propellers that are locked, let go or torn off in flight: from then on another plant goes on with the state."""
 
     name = f"{NAME}.breakages"
     outputs = ()
 
-    def __init__(self, plant: PlantSetup, part: Part):
+    def __init__(self, plant: PlantSetup, part: Block):
         self._events, self._form = list(plant.events), multirotor_euler if plant.euler else multirotor_multibody
         self._part, self._core = part, plant.core
         self._bodies = plant.bodies
-        self._broken: list[tuple[Any, list[tuple[Part, Code]]]] = []  # of each event: the vehicle, its parts
+        self._broken: list[tuple[Any, list[tuple[Block, BoundBlock]]]] = []  # of each event: the vehicle, its parts
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Before the first tick everything is compiled that may come in flight."""
         self._graph = graph
         p, s = self._core.vehicle, read(self._part.state)
@@ -127,7 +129,7 @@ class Breakages:
             self._break(tick, self._events.pop(0), *self._broken.pop(0))
         return self._events[0].tick + 1 if self._events else NEVER
 
-    def _break(self, tick: int, event: PlantEvent, p: Any, parts: list[tuple[Part, Code]]) -> None:
+    def _break(self, tick: int, event: PlantEvent, p: Any, parts: list[tuple[Block, BoundBlock]]) -> None:
         if event.becomes == "locked":
             stamp = tick - self._part.inputs[0].delay
             command = self._core.off if stamp < 0 else self._graph.latest(ports.ACTUATORS, stamp).motor_voltage

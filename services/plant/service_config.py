@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.services.plant.encoders import PlantWiring
 
 
@@ -14,11 +14,11 @@ class PlantEvent(NamedTuple):
     becomes: str  # "locked", "free" or "torn_off"
 
 
-class Others(NamedTuple):
+class FleetCoupling(NamedTuple):
     """What a plant's effects know of the fleet."""
 
     ports: tuple[str, ...]  # of the others' presence, as this vehicle calls them; that of a load among them
-    presence: Presence  # what these may know of its vehicle, with the numbers that do not change
+    presence: NeighbourState  # what these may know of its vehicle, with the numbers that do not change
     load: Any = None  # parameters of the load that this plant moves beside its vehicle, None without it
     load_start: Any = None  # its state at tick 0
     load_inputs: tuple[str, ...] = ()  # ports of its carriers' presence
@@ -34,5 +34,5 @@ class PlantSetup(NamedTuple):
     bodies: Any = None  # parameters of the part that tells of single bodies, None without it
     events: tuple[PlantEvent, ...] = ()
     euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
-    others: Others | None = None
+    others: FleetCoupling | None = None
     contact: Any = None  # parameters of the part that tells of forces on feet, None without it

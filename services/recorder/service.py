@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from lapwing.cosim.config.provenance import RESTARTS, WAITED, attachments, failure, metadata
-from lapwing.cosim.diagram.topic_encoder import Page, later
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, later
 from lapwing.cosim.executors.deadlines import Lateness, entries, lateness
-from lapwing.cosim.executors.log_backpressure import Teller
-from lapwing.cosim.executors.participant import Process, Stopped
+from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
+from lapwing.cosim.executors.participant import Participant, Stopped
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.bus_keys import (
     BATCH_KEY,
@@ -23,13 +23,13 @@ from lapwing.cosim.transport.bus_keys import (
     LOGGED_KEY,
     RESTARTED_KEY,
 )
-from lapwing.cosim.transport.input_journal import Progress
+from lapwing.cosim.transport.input_journal import LogProgress
 from lapwing.cosim.transport.packets import unpack_batch
 
 TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
 
 
-def run(process: Process, given: Any) -> None:
+def run(process: Participant, given: Any) -> None:
     """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
     setup = process.setup
     senders: dict[str, bytes | None] = {}
@@ -38,11 +38,11 @@ def run(process: Process, given: Any) -> None:
         senders |= process.participants.senders(key, setup.services)
     pending = Pending(setup.services)
     if process.restarts:
-        senders |= process.participants.senders(RESTARTED_KEY, [WATCHER])
+        senders |= process.participants.senders(RESTARTED_KEY, [MONITOR])
         process.bus.answer(f"{process.key_prefix}/{HANDED_KEY}/{process.name}", pending.progress)
     news = process.bus.receive(senders)
     about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
-    progress = Teller(process.bus, process.key_prefix, process.name)
+    progress = LogProgressPublisher(process.bus, process.key_prefix, process.name)
     with LogWriter(Path(given.log), about, attachments(setup, given.sources or {}), progress.waiting) as writer:
         recording = Recording(writer, setup)
         try:
@@ -79,7 +79,7 @@ def run(process: Process, given: Any) -> None:
             if writer.waited >= TOLD:
                 writer.metadata[WAITED] = f"{writer.waited:.1f} s"
     progress.end()
-    process.leave(progress.end, LOGGED_KEY, [WATCHER])
+    process.leave(progress.end, LOGGED_KEY, [MONITOR])
 
 
 class Pending:
@@ -89,7 +89,7 @@ class Pending:
         """Of a run of these services."""
         self._stop = dict.fromkeys(services, 0)  # tick before which each has handed over all
         self._left = set(services)  # those that have not ended
-        self._pages: list[Page] = []
+        self._pages: list[RecordBatch] = []
         self.written = 0  # tick before which all is complete
 
     @property
@@ -119,9 +119,9 @@ class Pending:
 
     def progress(self, name: str) -> bytes:
         """How far a service is, as it asks after it was started again."""
-        return Progress(self._stop[name], self.written).pack()
+        return LogProgress(self._stop[name], self.written).pack()
 
-    def complete(self) -> list[Page]:
+    def complete(self) -> list[RecordBatch]:
         """The pages of the ticks that are complete now."""
         stop = min(self._stop.values())
         if stop <= self.written:
@@ -131,9 +131,9 @@ class Pending:
         for page in self._pages:
             k = int(np.searchsorted(page.ticks, stop))
             if k > 0:
-                done.append(Page(page.topic, page.ticks[:k], page.payloads[:k]))
+                done.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
             if k < len(page.ticks):
-                left.append(Page(page.topic, page.ticks[k:], page.payloads[k:]))
+                left.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
         self._pages = left
         return done
 

@@ -32,7 +32,7 @@ def parse_router(text: str, insecure: bool) -> tuple[str, bool]:
     return f"tcp/{written}:{port}", local
 
 
-class Asked:
+class CommandSubscription:
     """What other nodes have published and was not taken yet."""
 
     def __init__(self, arrived: Subscription, topics: dict[str, str]):
@@ -80,11 +80,11 @@ class Node:
         if topic in self._puts:
             self._puts[topic](payload, time_ns)
 
-    def subscribe(self, messages: dict[str, Any]) -> "Asked":
+    def subscribe(self, messages: dict[str, Any]) -> "CommandSubscription":
         """Receive what other nodes publish; message class by topic."""
         endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]
         topics = {endpoint.key(self._domain): endpoint.topic for endpoint in endpoints}
-        asked = Asked(self._bus.subscribe(*topics), topics)
+        asked = CommandSubscription(self._bus.subscribe(*topics), topics)
         for endpoint in endpoints:
             self._bus.declare_alive(self._token(endpoint, SUBSCRIPTION))
         return asked

@@ -4,10 +4,10 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Section
+from lapwing.cosim.scene import SceneTable
 
 
-class Bus(Section):
+class Bus(SceneTable):
     """Whether a run in processes is a node of a ROS 2 graph, too."""
 
     TABLE: ClassVar[str] = "bus"

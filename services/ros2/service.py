@@ -5,10 +5,10 @@ It takes no part in the lock step: nobody waits for it, and when it ends the fli
 
 from typing import Any
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import members
-from lapwing.cosim.executors.participant import POLL, Process
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.executors.participant import POLL, Participant
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
@@ -17,7 +17,7 @@ from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
 
 
-def run(process: Process, given: Any) -> None:
+def run(process: Participant, given: Any) -> None:
     """Publish until the flight has ended, or until asked to stop; then say what came in.
 
     Raises:
@@ -38,7 +38,7 @@ def run(process: Process, given: Any) -> None:
         for topic in events.values():
             node.declare(topic.key(), topic.message.type_name)
         asked = node.subscribe({topic: commands.messages[topic] for topic, commands in given_to.items()})
-        watcher = dict.fromkeys(events, process.participants.mark(WATCHER))  # who watches the run tells of events
+        watcher = dict.fromkeys(events, process.participants.mark(MONITOR))  # who watches the run tells of events
         published = process.bus.receive(authors | watcher)
         process.join()
         flying = set(topics)  # topics that have not come to their end
@@ -62,7 +62,7 @@ def run(process: Process, given: Any) -> None:
             print(report if setup.vehicle else f"{commands.vehicle}: {report}", flush=True)
 
 
-def _commands(setup: Setup) -> list[Commands]:
+def _commands(setup: RunConfig) -> list[Commands]:
     """Of each vehicle that the scene lets others command: `autopilot.operator`."""
     steered = [member for member in members(setup) if "autopilot" in member.services]
     return [Commands(member.vehicle) for member in steered if member.services["autopilot"].parameters.operator]

@@ -6,11 +6,11 @@ It is no part of the lock step: the services are joined pairwise, and the router
 import time
 from typing import Any
 
-from lapwing.cosim.executors.participant import POLL, Process
+from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.services.process_table import RECORDER
 
 
-def run(process: Process, given: Any) -> None:
+def run(process: Participant, given: Any) -> None:
     """Listen until the recorder has the whole run, or until asked to stop."""
     process.join()
     process.confirm()  # it takes no messages, but passes them on

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Gt, Lt
 
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.kernels import kernel, leaf
@@ -75,7 +75,7 @@ def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> 
     return AirspeedState(s.scale, s.turn_on, line), AirspeedReading(arrived[0], variance, valid)
 
 
-def wires(frame: str, port: Port, p: Airspeed) -> list[Wire]:
+def wires(frame: str, port: Port, p: Airspeed) -> list[TopicEncoder]:
     """Its topic."""
     return [airspeed_wire(topic.AIRSPEED, frame, port)]
 

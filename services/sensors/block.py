@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
@@ -45,7 +45,7 @@ def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Any:
 
 
 @leaf
-def step(p: Instrument, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
+def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """The reading at `tick`; the instrument is switched on at tick 0."""
     x, around = inputs[0].value, p.around
     ground, _ = surface(around.terrain, x.position_world[0], x.position_world[1])
@@ -80,4 +80,4 @@ def step(p: Instrument, s: Any, tick: int, inputs: tuple[Received, ...]) -> tupl
     if tick == 0:
         s = _initial(p.sensor, p.key, truth)
     s, reading = _sample(p.sensor, s, p.key, tick, truth)
-    return s, (reading,), GO_ON
+    return s, (reading,), CONTINUE

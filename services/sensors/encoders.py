@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.kernels.row_packing import width
 from lapwing.messages import (
     FluidPressure,
@@ -41,7 +41,7 @@ class SonarWiring(NamedTuple):
     range_max: float  # [m]
 
 
-def wires(setup: Setup, sonar: SonarWiring | None, fix: int) -> list[Wire]:
+def wires(setup: RunConfig, sonar: SonarWiring | None, fix: int) -> list[TopicEncoder]:
     """The topics of the sensors of `PORTS` that the vehicle carries; `fix` is the NavSatStatus of what GPS finds."""
     frame, given = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
@@ -53,15 +53,15 @@ def wires(setup: Setup, sonar: SonarWiring | None, fix: int) -> list[Wire]:
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
     return [
-        Wire(which, port, given[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
+        TopicEncoder(which, port, given[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
         for which, port, fields, sample in known
         if port in given
     ]
 
 
-def own_wire(frame: str, port: Port) -> Wire:
+def own_wire(frame: str, port: Port) -> TopicEncoder:
     """The topic of a sensor of the user's own."""
-    return Wire(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
+    return TopicEncoder(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Le, Len
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.sensors.delay_line import ALL_CHANNELS, DEPTH, DRIFT, KINDS, Fault
 
@@ -47,7 +47,7 @@ def compile_faults(
         KeyedError: of the key `faults.0.kind`, for example.
     """
     if not isinstance(tables, Sequence) or len(tables) > SLOTS:
-        raise KeyedError("faults", f"got {tables!r}", f"a list of at most {SLOTS} tables")
+        raise ConfigError("faults", f"got {tables!r}", f"a list of at most {SLOTS} tables")
     faults = [_fault(i, table, channels, tick) for i, table in enumerate(tables)]
     return tuple(faults + [Fault()] * (SLOTS - len(faults))) if faults else None
 
@@ -58,9 +58,9 @@ def _fault(number: int, table: Mapping[str, Any], channels: Sequence[str], tick:
     except ValidationError as error:
         raise fault(error, FaultTable).under(f"faults.{number}") from None
     if t.channel not in ("all", *channels):
-        raise KeyedError.unknown(f"faults.{number}.channel", "channel", t.channel, ("all", *channels))
+        raise ConfigError.unknown(f"faults.{number}.channel", "channel", t.channel, ("all", *channels))
     if not t.stop > t.start:
-        raise KeyedError(f"faults.{number}.stop", f"got {t.stop:g} s", f"later than start = {t.start:g} s")
+        raise ConfigError(f"faults.{number}.stop", f"got {t.stop:g} s", f"later than start = {t.start:g} s")
     kind = KINDS.index(t.kind)
     size = t.size if isinstance(t.size, list) else [t.size] * 3
     x, y, z = (tick * component if kind == DRIFT else component for component in size)

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
@@ -116,7 +116,7 @@ def check(p: Gps) -> None:
     dilution = math.sqrt(sum(x * x for x in uncompiled(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
     if not dilution < WORST:
         said = f"got {len(p.sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
-        raise KeyedError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
+        raise ConfigError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
 
 
 @leaf

@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Lt
 
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.dynamics.lie.quaternion import rotate, rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import Vec3
@@ -104,9 +104,11 @@ def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def wires(frame: str, port: Port, p: OpticalFlow) -> list[Wire]:
+def wires(frame: str, port: Port, p: OpticalFlow) -> list[TopicEncoder]:
     """Its topic."""
-    return [Wire(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))]
+    return [
+        TopicEncoder(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))
+    ]
 
 
 # PixArt PMW3901MB data sheet, as PX4's driver cites it (src/drivers/optical_flow/pmw3901): 7.4 rad/s at the most, from

@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from numba import types
 
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Fields, Wire
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray
@@ -97,7 +97,7 @@ def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:
     return {**stamp_columns(time_ns), "range": distance, "variance": r.variance}
 
 
-def wires(frame: str, port: Port, p: Rangefinder) -> list[Wire]:
+def wires(frame: str, port: Port, p: Rangefinder) -> list[TopicEncoder]:
     """Its topic."""
 
     def message() -> Any:
@@ -109,7 +109,7 @@ def wires(frame: str, port: Port, p: Rangefinder) -> list[Wire]:
             max_range=p.range_max,
         )
 
-    return [Wire(topic.RANGEFINDER, port.name, port.period, _fields, message)]
+    return [TopicEncoder(topic.RANGEFINDER, port.name, port.period, _fields, message)]
 
 
 # Garmin, LIDAR-Lite v3 Operation Manual and Technical Specifications, as others quote it (the manual itself was not at

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 import lapwing.services.sensors
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.sensors import fault_schedule
 
@@ -34,13 +34,13 @@ def module_of(sensor: str, table: Mapping[str, Any]) -> ModuleType:
     """
     if "module" not in table:
         if sensor not in sensors():
-            raise KeyedError.unknown(sensor, "sensor", sensor, sensors())
+            raise ConfigError.unknown(sensor, "sensor", sensor, sensors())
         return sensors()[sensor]
     if sensor in sensors():
-        raise KeyedError(f"{sensor}.module", f"{sensor} is the name of a sensor that ships", "another name")
+        raise ConfigError(f"{sensor}.module", f"{sensor} is the name of a sensor that ships", "another name")
     found = importlib.import_module(table["module"])
     if missing := [name for name in ("PRESETS", "READING", "blank", "initial", "sample") if not hasattr(found, name)]:
-        raise KeyedError(f"{sensor}.module", f"{table['module']} has no {', '.join(missing)}")
+        raise ConfigError(f"{sensor}.module", f"{table['module']} has no {', '.join(missing)}")
     return found
 
 
@@ -60,7 +60,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
     values.pop("module", None)
     name = values.pop("preset", next(iter(module.PRESETS)))
     if name not in module.PRESETS:
-        raise KeyedError.unknown(f"{sensor}.preset", "preset", name, module.PRESETS)
+        raise ConfigError.unknown(f"{sensor}.preset", "preset", name, module.PRESETS)
     preset = module.PRESETS[name]
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())
     kind: Any = type(preset)
@@ -71,12 +71,12 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
             module.check(p)
         if not hasattr(p, "faults"):
             if faults:
-                raise KeyedError("faults", f"{sensor} knows none; leave them out")
+                raise ConfigError("faults", f"{sensor} knows none; leave them out")
             return p
         return p._replace(faults=fault_schedule.compile_faults(faults, module.CHANNELS, tick))
     except ValidationError as error:
         raise fault(error, type(preset)).under(sensor) from None
-    except KeyedError as error:
+    except ConfigError as error:
         raise error.under(sensor) from None
 
 
@@ -91,13 +91,13 @@ def _check_limits(p: Any) -> None:
         if hasattr(value, "_asdict"):
             try:
                 _check_limits(value)
-            except KeyedError as error:
+            except ConfigError as error:
                 raise error.under(key) from None
         elif value == math.inf and p._field_defaults.get(key) != math.inf:
-            raise KeyedError(key, "got inf", "a finite number")
+            raise ConfigError(key, "got inf", "a finite number")
     least, most = getattr(p, "range_min", 0.0), getattr(p, "range_max", math.inf)
     if least >= most:
-        raise KeyedError("range_min", f"got {least:g}", f"less than range_max = {most:g} m")
+        raise ConfigError("range_min", f"got {least:g}", f"less than range_max = {most:g} m")
 
 
 def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:

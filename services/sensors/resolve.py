@@ -6,14 +6,14 @@ from typing import Any
 
 import numba
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.noise import stream_key
 from lapwing.messages import NavSatStatus
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Exchange, ticks
+from lapwing.services.common.communication_schema import Communication, ticks
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, gravity
@@ -33,7 +33,7 @@ READINGS = {
 }
 
 
-def resolve(scene: Scene) -> ServiceSetup | None:
+def resolve(scene: Scene) -> ServiceConfig | None:
     """The sensors that the scene names; None where it names none."""
     tables = scene[Sensors].tables
     if not tables:
@@ -41,7 +41,7 @@ def resolve(scene: Scene) -> ServiceSetup | None:
     instruments, given = [], []
     sonar, fix = None, NavSatStatus.STATUS_FIX
     for name, table in sorted(tables.items()):
-        p = parameters(name, table, scene[Exchange].interval)
+        p = parameters(name, table, scene[Communication].interval)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
         reading = READINGS[name] if name in READINGS else _reading(name, table, p)
@@ -50,10 +50,10 @@ def resolve(scene: Scene) -> ServiceSetup | None:
             sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
         elif name == ports.GPS:
             fix = p.fix_status
-    return ServiceSetup(SensorsSetup(tuple(instruments), sonar, fix), (Input(ports.TRUTH),), tuple(given))
+    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, fix), (InputPort(ports.TRUTH),), tuple(given))
 
 
-def reseed(given: ServiceSetup, seed: int, vehicle: str) -> ServiceSetup:
+def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """The same instruments with another seed."""
     setup: SensorsSetup = given.parameters
     instruments = tuple(
@@ -85,12 +85,12 @@ def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
         after, reading = module.sample(p, state, key, 0, Truth())
     except Exception as error:
         said = str(error).strip().partition("\n")[0]
-        raise KeyedError(where, f"{type(error).__name__}: {said}") from error
+        raise ConfigError(where, f"{type(error).__name__}: {said}") from error
     for what, found, declared in (
         ("initial", state, module.blank()),
         ("sample's state", after, module.blank()),
         ("sample's reading", reading, module.READING),
     ):
         if numba.typeof(found) != numba.typeof(declared):
-            raise KeyedError(where, f"{what} is of another type than `blank` or `READING` declares")
+            raise ConfigError(where, f"{what} is of another type than `blank` or `READING` declares")
     return module.READING

@@ -3,8 +3,8 @@
 from typing import Any, ClassVar
 
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
-from lapwing.services.common.communication_schema import Exchange, ticks
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common.communication_schema import Communication, ticks
 from lapwing.services.common.named_tables import NamedTables
 from lapwing.services.sensors.registry import parameters
 
@@ -24,11 +24,13 @@ class Sensors(NamedTables):
         super().check(scene)
         for name, table in self.tables.items():
             if "module" in table and not name.isidentifier():
-                raise KeyedError(f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _")
+                raise ConfigError(
+                    f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _"
+                )
         self.load(scene)
         for name, table in self.tables.items():
             try:
-                rate = parameters(name, table, scene[Exchange].interval).rate
-            except KeyedError as error:
+                rate = parameters(name, table, scene[Communication].interval).rate
+            except ConfigError as error:
                 raise error.under("sensors") from None
             ticks(scene, rate, f"sensors.{name}.rate")

@@ -3,10 +3,10 @@
 import sys
 from typing import NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.kernels.cell import Cell
 from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import PORTS, SonarWiring, own_wire, wires
@@ -22,20 +22,20 @@ class SensorsSetup(NamedTuple):
     fix: int  # NavSatStatus of a satellite receiver's fixes
 
 
-def create(setup: Setup) -> Service:
+def create(setup: RunConfig) -> Service:
     """The sensors of a run."""
     given = setup.services[NAME]
     s: SensorsSetup = given.parameters
     parts = [
-        Part(f"{NAME}.{port.name}", p, Cell(_blank(p)), given.inputs, (port,), port.period)
+        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), given.inputs, (port,), port.period)
         for p, port in zip(s.instruments, given.ports, strict=True)
     ]
     return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.fix))
 
 
-def _other_wires(setup: Setup, s: SensorsSetup) -> list[Wire]:
+def _other_wires(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
     """The topics of sensors whose modules make them, and of the user's own."""
-    found: list[Wire] = []
+    found: list[TopicEncoder] = []
     for p, port in zip(s.instruments, setup.services[NAME].ports, strict=True):
         module = sys.modules[type(p.sensor).__module__]
         if port.name in PORTS:

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf
 from lapwing.services.common.ports import Reference
 from lapwing.services.trajectory import polynomial_piece
@@ -17,7 +17,7 @@ class TrajectoryPath(NamedTuple):
 
 
 @leaf
-def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Reference], int]:
+def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
     """The reference at `tick`; it has no state."""
     r = polynomial_piece.evaluate(p.path, tick * p.interval)
     return s, (
@@ -25,4 +25,4 @@ def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> 
             r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate, r.phase, r.phase >= p.final,
             p.path.phase_release[r.phase] > 0.0,
         ),
-    ), GO_ON  # fmt: skip
+    ), CONTINUE  # fmt: skip

@@ -3,7 +3,7 @@
 import math
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, add
 from lapwing.kernels import leaf
 from lapwing.services.common.ports import Reference
@@ -39,7 +39,7 @@ def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, 
 
 
 @leaf
-def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Reference], int]:
+def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
     """The reference at `tick`, with the phases of the vehicle's own way (theory.md, eq. (4.1a)); it has no state."""
     t = tick * p.relative.interval
     leader, way = polynomial_piece.evaluate(p.leader.path, t), polynomial_piece.evaluate(p.relative.path, t)
@@ -59,5 +59,5 @@ def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[Received, ...]) -> tu
                 p.relative.path.phase_release[way.phase] > 0.0,
             ),
         ),
-        GO_ON,
+        CONTINUE,
     )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.trajectory.segments import choose
 from lapwing.services.trajectory.segments.segment import Positive, Segment
 
@@ -16,7 +16,7 @@ def _segments(value: object) -> tuple[Segment, ...]:
     for number, table in enumerate(value):
         try:
             segments.append(choose(table))
-        except KeyedError as error:
+        except ConfigError as error:
             raise error.under(str(number)) from None
     return tuple(segments)
 
@@ -50,5 +50,5 @@ class Phases(BaseModel):
         names = [phase.name for phase in self.phase]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise KeyedError("phase", f"two phases are named {twice[0]!r}; a name is used once")
+            raise ConfigError("phase", f"two phases are named {twice[0]!r}; a name is used once")
         return self

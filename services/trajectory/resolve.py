@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import subtract
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.ports import Reference
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import start_place
@@ -23,18 +23,18 @@ from lapwing.services.trajectory.service import TrajectorySetup
 LEAD = 0.2  # [s] the references are ahead of the plant at the most
 
 
-def resolve(scene: Scene) -> ServiceSetup | None:
+def resolve(scene: Scene) -> ServiceConfig | None:
     """The trajectory of a scene; None where nobody flies along one."""
     if not follows_trajectory(scene):
         return None
-    exchange = scene[Exchange]
+    exchange = scene[Communication]
     trajectory, found = scene[Trajectory], compiled(scene)
     path = found.parameters._replace(origin_world=start_place(scene))
     core = TrajectoryPath(path, found.final, exchange.interval)
     ahead = max(1, round(LEAD * exchange.rate))
-    return ServiceSetup(
+    return ServiceConfig(
         TrajectorySetup(core, found.phases, *_leader(trajectory)),
-        (Input(ports.TRUTH, ahead),),
+        (InputPort(ports.TRUTH, ahead),),
         (Port(ports.TRAJECTORY, Reference()),),
     )
 
@@ -44,7 +44,7 @@ def _leader(trajectory: Trajectory) -> tuple[str, bool]:
     return (trajectory.follow, trajectory.frame != "world") if trajectory.follow else ("", False)
 
 
-def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[str, ServiceSetup]:
+def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
     """The trajectories of a run's vehicles, by their names: those that follow another one are given its path.
 
     Raises:
@@ -54,16 +54,16 @@ def fleet(shares: Mapping[str, ServiceSetup], keys: Mapping[str, str]) -> dict[s
             for name, share in shares.items()}  # fmt: skip
 
 
-def _following(name: str, shares: Mapping[str, ServiceSetup], key: str) -> ServiceSetup:
+def _following(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
     own = shares[name].parameters
     others = [other for other, share in shares.items() if other != name and not share.parameters.follow]
     if own.follow not in others:
         expected = f"one that flies along a trajectory of its own: {', '.join(others) or 'there is none'}"
-        raise KeyedError(f"{key}trajectory.follow", f"got {own.follow}", expected)
+        raise ConfigError(f"{key}trajectory.follow", f"got {own.follow}", expected)
     leader, core = shares[own.follow].parameters.core, own.core
     if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(leader.path), strict=True)):
         message = f"the phases are those of {own.follow}, which it would fly twice as far"
-        raise KeyedError(f"{key}trajectory.phase", message, "phases of its own, relative to the leader")
+        raise ConfigError(f"{key}trajectory.phase", message, "phases of its own, relative to the leader")
     origin = subtract(core.path.origin_world, leader.path.origin_world)
     relative = core._replace(path=core.path._replace(origin_world=origin))
     return shares[name]._replace(parameters=own._replace(core=FollowedPath(leader, relative, own.heading)))

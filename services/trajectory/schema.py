@@ -18,15 +18,15 @@ A channel that a phase does not name holds. A channel may have a list of segment
 
 from typing import Any, ClassVar, Literal
 
-from lapwing.cosim.scene import Files, Scene, Section
+from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import named
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.table_file import parse
-from lapwing.services.trajectory.trajectory_compiler import CHANNELS, Compiled, compile
+from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTrajectory, compile
 
 
-class Trajectory(Phases, Section):
+class Trajectory(Phases, SceneTable):
     """What the vehicle is asked to fly."""
 
     TABLE: ClassVar[str] = "trajectory"
@@ -52,13 +52,13 @@ class Trajectory(Phases, Section):
         """The segments join, phases are long enough; a frame is that of a leader."""
         compiled(scene)
         if self.frame and not self.follow:
-            raise KeyedError("trajectory.frame", "there is no leader whose it could be", "trajectory.follow, or none")
+            raise ConfigError("trajectory.frame", "there is no leader whose it could be", "trajectory.follow, or none")
 
 
-def compiled(scene: Scene) -> Compiled:
-    """The scene's trajectory about the origin; KeyedError as of `compile`."""
+def compiled(scene: Scene) -> CompiledTrajectory:
+    """The scene's trajectory about the origin; ConfigError as of `compile`."""
     return scene.once(_compiled)
 
 
-def _compiled(scene: Scene) -> Compiled:
+def _compiled(scene: Scene) -> CompiledTrajectory:
     return compile(scene[Trajectory])

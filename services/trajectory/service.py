@@ -2,9 +2,9 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.kernels.cell import Cell
 from lapwing.messages.topics import TRAJECTORY
 from lapwing.services.common import ports
@@ -24,8 +24,8 @@ class TrajectorySetup(NamedTuple):
     heading: bool = False  # whether its axes turn with that one
 
 
-def create(setup: Setup) -> Service:
+def create(setup: RunConfig) -> Service:
     """The signal builder of a run."""
     given: Any = setup.services[NAME]
-    part = Part(NAME, given.parameters.core, Cell(0.0), given.inputs, given.ports)
+    part = Block(NAME, given.parameters.core, Cell(0.0), given.inputs, given.ports)
     return Service(NAME, [part], [reference_wire(TRAJECTORY, ports.TRAJECTORY, given.parameters.phases)])

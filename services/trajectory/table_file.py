@@ -4,7 +4,7 @@ import csv
 import math
 from pathlib import Path
 
-from lapwing.cosim.scene import SceneError, Source
+from lapwing.cosim.scene import KeyOrigin, SceneError
 
 HEADER = ["time", "value"]
 
@@ -36,4 +36,4 @@ def parse(text: str, path: Path) -> list[list[float]]:
 
 
 def _wrong(path: Path, line: int, got: str, expected: str) -> SceneError:
-    return SceneError("", f"got {got!r}", expected, Source(path, line))
+    return SceneError("", f"got {got!r}", expected, KeyOrigin(path, line))

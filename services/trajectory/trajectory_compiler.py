@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.services.trajectory.phases import Phase, Phases
 from lapwing.services.trajectory.polynomial_piece import Channel, Parameters, Piece
@@ -14,7 +14,7 @@ GROUNDED = 1e-6  # [m] a phase that ends lower ends on the ground
 SLACK = 1e-9  # [s] rounding allowed between a phase's duration and the sum of its segments
 
 
-class Compiled(NamedTuple):
+class CompiledTrajectory(NamedTuple):
     """What `compile` gives."""
 
     parameters: Parameters  # for piece.evaluate
@@ -23,7 +23,7 @@ class Compiled(NamedTuple):
     final: int  # index of the first phase after which none ends in the air
 
 
-def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0.0) -> Compiled:
+def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0.0) -> CompiledTrajectory:
     """Compile a trajectory about an origin (position in world [m], yaw [rad]).
 
     Raises:
@@ -53,7 +53,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
         origin_world=origin_world,
         origin_yaw=float(origin_yaw),
     )
-    return Compiled(parameters, tuple(phase.name for phase in trajectory.phase), now, final)
+    return CompiledTrajectory(parameters, tuple(phase.name for phase in trajectory.phase), now, final)
 
 
 def _pieces(phase: Phase, key: str, channel: str, value: dict[str, float]) -> list[Piece]:
@@ -62,7 +62,7 @@ def _pieces(phase: Phase, key: str, channel: str, value: dict[str, float]) -> li
     for segment in getattr(phase, channel):
         try:
             pieces += segment.pieces(value[channel])
-        except KeyedError as error:
+        except ConfigError as error:
             raise error.under(f"{key}.{channel}") from None
         value[channel] = segment.end(value[channel])
     return pieces
@@ -73,7 +73,7 @@ def _phase_duration(phase: Phase, key: str, longest: float) -> float:
         return longest
     if longest > phase.duration + SLACK:
         message = f"got {phase.duration:g} s in phase {phase.name!r}"
-        raise KeyedError(f"{key}.duration", message, f"not less than its segments last, {longest:g} s")
+        raise ConfigError(f"{key}.duration", message, f"not less than its segments last, {longest:g} s")
     return phase.duration
 
 

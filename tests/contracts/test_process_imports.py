@@ -6,7 +6,7 @@ from io import BytesIO
 
 import pytest
 
-from lapwing.services.process_main import Participation, hand_over
+from lapwing.services.process_main import ProcessSpec, hand_over
 from lapwing.services.scene_resolver import load, resolve
 
 pytestmark = pytest.mark.long
@@ -48,7 +48,7 @@ def setup():
 @pytest.mark.parametrize("name", ["plant", "sensors", "autopilot", "trajectory"])
 def test_a_process_imports_what_it_needs_to_fly(setup, name):
     given = BytesIO()
-    hand_over(Participation(name, setup, {}, "lapwing"), given)
+    hand_over(ProcessSpec(name, setup, {}, "lapwing"), given)
     ended = subprocess.run([sys.executable, "-P", "-c", CHILD], input=given.getvalue(), capture_output=True, check=True)
     modules = ended.stdout.decode().split()
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names

@@ -9,7 +9,7 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 import lapwing.cosim.diagram.execution_groups
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.compiled_block import run
 from lapwing.cosim.log import LogReader
 from lapwing.services.common.operator_inbox import nobody
@@ -52,7 +52,7 @@ def test_no_part_makes_arrays(scene, monkeypatch):
     monkeypatch.setattr(lapwing.cosim.diagram.execution_groups, "run", watched)
     setup = resolve(load(scene))
     _nrt_python.memsys_enable_stats()
-    Graph(setup, create_all(setup, nobody), 1).advance(250)
+    BlockDiagram(setup, create_all(setup, nobody), 1).advance(250)
     _nrt_python.memsys_disable_stats()
     assert made == 0
 

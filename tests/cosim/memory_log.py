@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.block_diagram import Graph
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.scene import Scene
 from lapwing.messages.digest import Digest
@@ -22,13 +22,13 @@ from lapwing.studies.topic_view import TopicView
 class MemoryLog:
     """What a flight would record; messages are decoded when asked for, topics named without their vehicle."""
 
-    def __init__(self, setup: Setup):
+    def __init__(self, setup: RunConfig):
         self.setup = setup
-        self._pages: dict[str, list[Page]] = {}
+        self._pages: dict[str, list[RecordBatch]] = {}
         self._topics: dict[str, Topic] = {}
         self._decoded: dict[str, list[Any]] = {}
 
-    def write(self, pages: Iterable[Page], last: int) -> None:
+    def write(self, pages: Iterable[RecordBatch], last: int) -> None:
         """Take the pages of some ticks; called as `lapwing.cosim.log.log_sequencer.Recording.write`."""
         for page in pages:
             name = page.topic.name.removeprefix("{vehicle}/")
@@ -89,10 +89,10 @@ class MemoryLog:
 
 
 def fly(
-    scene: Scene | Setup, operator: Callable[[int], Iterable[Any]] | None = None, last: int | None = None
+    scene: Scene | RunConfig, operator: Callable[[int], Iterable[Any]] | None = None, last: int | None = None
 ) -> MemoryLog:
     """Fly a scene in this process, to the tick `last` or to its end; `operator` gives the commands until a tick."""
-    setup = scene if isinstance(scene, Setup) else resolve(scene)
+    setup = scene if isinstance(scene, RunConfig) else resolve(scene)
     log = MemoryLog(setup)
-    run_single(Graph(setup, create_all(setup, operator), PAGE), log, last=last)  # type: ignore[arg-type]
+    run_single(BlockDiagram(setup, create_all(setup, operator), PAGE), log, last=last)  # type: ignore[arg-type]
     return log

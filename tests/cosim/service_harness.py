@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import Topic
 from lapwing.services.process_table import create
@@ -16,7 +16,7 @@ class Alone:
 
     def __init__(self, scene: Scene, name: str):
         self.setup = resolve(scene)
-        self.graph = Graph(self.setup, [create(self.setup, name)], KEPT_TICKS)
+        self.graph = BlockDiagram(self.setup, [create(self.setup, name)], KEPT_TICKS)
         self._delays = {taken.port: taken.delay for taken in self.setup.services[name].inputs}
 
     def step(self, **given: Any) -> None:

@@ -1,18 +1,18 @@
 """Graphs of a few parts, without a scene."""
 
-from lapwing.cosim.config.run_config import ServiceSetup, Setup
-from lapwing.cosim.diagram.block_diagram import Graph, Service
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 
 NAME = "test"
 
 
 def setup_of(ports=(), last=10_000):
     """A run of one service that gives these ports."""
-    return Setup(
-        NAME, "", 1, last, 100, 10_000_000, "sequential", "drone1", {NAME: ServiceSetup(None, (), ports)}, {}, {}
+    return RunConfig(
+        NAME, "", 1, last, 100, 10_000_000, "sequential", "drone1", {NAME: ServiceConfig(None, (), ports)}, {}, {}
     )
 
 
 def graph_of(*parts, ports=(), wires=(), page=8):
     """The graph of these parts; `ports` are those that they take from elsewhere."""
-    return Graph(setup_of(ports), [Service(NAME, list(parts), list(wires))], page)
+    return BlockDiagram(setup_of(ports), [Service(NAME, list(parts), list(wires))], page)

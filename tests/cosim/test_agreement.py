@@ -4,9 +4,9 @@ record the same bytes."""
 import pytest
 from flights import OPERATED, command, scripted
 
-from lapwing.cosim.diagram.block_diagram import Graph
-from lapwing.cosim.transport.packets import Bundles, pack_batch, unpack_batch
-from lapwing.services.process_table import TIME_OWNER, create_all
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.transport.packets import StepPacketCodec, pack_batch, unpack_batch
+from lapwing.services.process_table import CLOCK_OWNER, create_all
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import MemoryLog, fly
 
@@ -44,8 +44,8 @@ CASES = {
 def fly_apart(setup, operator):
     """Every service with a graph of its own; what it records comes through batches of uneven lengths."""
     services = create_all(setup, operator)
-    graphs = {service.name: Graph(setup, [service], 64) for service in services}
-    bundles = {name: Bundles(service.ports) for name, service in setup.services.items()}
+    graphs = {service.name: BlockDiagram(setup, [service], 64) for service in services}
+    bundles = {name: StepPacketCodec(service.ports) for name, service in setup.services.items()}
     log, handed = MemoryLog(setup), dict.fromkeys(graphs, 0)
     ended = False
     while not ended:
@@ -57,7 +57,7 @@ def fly_apart(setup, operator):
                 for other in graphs.values():
                     if other is not graph:
                         bundles[name].unpack(payload, other, tick)
-        ended = graphs[TIME_OWNER].ended
+        ended = graphs[CLOCK_OWNER].ended
         for i, (name, graph) in enumerate(graphs.items()):
             if ended or graph.tick - handed[name] >= 11 + 6 * i:
                 pages = graph.pages(handed[name], graph.tick)

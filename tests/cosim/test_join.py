@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from lapwing.cosim.access.certificates import make, tls
-from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.access.zenoh_access import VIEWER, by_certificate
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.run_errors import BusError
@@ -83,7 +83,7 @@ def test_who_has_no_certificate_starts_only_where_that_is_asked_for(tmp_path):
 
 def test_a_participant_speaks_for_itself_alone(tmp_path):
     """Also where it knows the marks of the others: access control refuses it on both ends of a link."""
-    keys, run = tmp_path / "keys", Participants("test-access")
+    keys, run = tmp_path / "keys", PublisherIds("test-access")
     make(keys, ["plant", "sensors"], 1)
     setup = resolve(load("delivery_mission"))
     rules = by_certificate("test-access", says(setup, "test-access"))
@@ -116,7 +116,7 @@ def test_a_participant_speaks_for_itself_alone(tmp_path):
 
 
 def test_a_viewer_of_a_run_on_several_hosts_reads_and_is_not_heard_and_who_has_no_certificate_reads_nothing(tmp_path):
-    keys, run = tmp_path / "keys", Participants("test-viewer")
+    keys, run = tmp_path / "keys", PublisherIds("test-viewer")
     make(keys, ["autopilot", VIEWER], 1)
     rules = by_certificate("test-viewer", says(resolve(load("groundstation")), "test-viewer"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["autopilot"]).values())

@@ -4,9 +4,8 @@ import threading
 from collections import Counter
 from contextlib import contextmanager
 
-import pytest
-
 import cosim.process
+import pytest
 from cosim.bus import ZenohBus
 from cosim.errors import LockStepError
 from cosim.keys import ALIVE_KEY, HEARD_KEY

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-from lapwing.cosim.diagram.compiled_block import Part, advance
+from lapwing.cosim.diagram.compiled_block import Block, advance
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.kernels.cell import Cell, read
 from tests.cosim.parts.arrays import Last, Mean, Sum, weighted
@@ -43,7 +43,7 @@ def living():
 def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
-    part = Part("mean", Mean(weights), Cell(Last(ticks, 0)), (), (SUM,))
+    part = Block("mean", Mean(weights), Cell(Last(ticks, 0)), (), (SUM,))
     graph = graph_of(part)
     graph.advance(TICKS)
     last = np.array([TICKS - 5 + (i - TICKS) % 5 for i in range(5)], float)
@@ -58,7 +58,7 @@ def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(liv
 def test_a_function_that_python_calls_counts_also_where_a_part_has_it():
     """Code has it by its name: that of a part, which does not count, must not be taken for it."""
     p, s = Mean(np.linspace(-1.0, 2.0, 5)), Last(np.arange(5.0), 0)
-    graph = graph_of(Part("mean", p, Cell(s), (), (SUM,)))
+    graph = graph_of(Block("mean", p, Cell(s), (), (SUM,)))
     graph.advance(TICKS)
     before = sys.getrefcount(s.ticks)
     for _ in range(10):
@@ -70,7 +70,7 @@ def test_a_function_that_python_calls_counts_also_where_a_part_has_it():
 
 def test_a_part_that_makes_arrays_counts_and_frees_them(living):
     owners = living()
-    part = Part("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
+    part = Block("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
     graph = graph_of(part)
     graph.advance(10)
     held = living()
@@ -86,7 +86,7 @@ def test_a_part_that_makes_arrays_counts_and_frees_them(living):
 def test_a_part_that_is_not_trusted_may_put_an_array_in_anothers_place(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
-    part = Part("exchange", Exchange(weights), Cell(Last(ticks, 0)), (), (SUM,), trusted=False)
+    part = Block("exchange", Exchange(weights), Cell(Last(ticks, 0)), (), (SUM,), trusted=False)
     graph = graph_of(part)
     graph.advance(1)
     assert graph.latest("sum", 0).number == 0.0

@@ -11,7 +11,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.flight import Flight
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.simulate import fly
 from tests.cosim.test_run import SCENE, STARTED, arguments, single, started  # noqa: F401 (a fixture)
@@ -96,7 +96,7 @@ def test_whoever_is_killed_after_the_last_tick_holds_nobody_up(tmp_path):
             os.kill(*children(os.getpid(), "recorder"), steps.pop(0))
 
     log = tmp_path / "struck.mcap"
-    fly_processes(Participation("mission", setup, {}, "test-late", log=str(log), speed=1.0), Silent(), live=strike)
+    fly_processes(ProcessSpec("mission", setup, {}, "test-late", log=str(log), speed=1.0), Silent(), live=strike)
     assert not steps
     with LogReader(log) as read:
         assert read.digest() == fly(load("hover", ["run.duration=1", "success.require=[]"])).digest
@@ -114,7 +114,7 @@ def struck(scene, tmp_path, kills, *overrides):
                 os.kill(pid, signal.SIGKILL)
 
     log = tmp_path / "struck.mcap"
-    given = Participation("mission", setup, {}, "test-struck", log=str(log), speed=1.0)
+    given = ProcessSpec("mission", setup, {}, "test-struck", log=str(log), speed=1.0)
     fly_processes(given, Silent(), live=strike)
     told = [event.text for event in Flight.read(log).events if event.kind == "restart"]
     assert told == [f"{name} was killed (signal 9), and is started again" for _, name in sorted(kills.items())]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.access.private_sockets import private_endpoints
-from lapwing.cosim.access.publisher_ids import Participants, new_secret
+from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
 from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.transport.bus import ZenohBus, mesh
@@ -28,8 +28,8 @@ PREFIX = "test-strangers"
 
 
 def test_marks_are_of_the_run_and_of_the_participant():
-    run, other = Participants(PREFIX, new_secret(), ["autopilot"]), Participants(PREFIX, new_secret())
-    assert len({run.mark("plant"), run.mark("sensors"), other.mark("plant"), Participants("x").mark("plant")}) == 4
+    run, other = PublisherIds(PREFIX, new_secret(), ["autopilot"]), PublisherIds(PREFIX, new_secret())
+    assert len({run.mark("plant"), run.mark("sensors"), other.mark("plant"), PublisherIds("x").mark("plant")}) == 4
     assert len(run.mark("plant")) == 16
     assert run.senders(STEP_KEY, ["autopilot", "plant"]) == {
         f"{PREFIX}/_step/autopilot": None,
@@ -47,7 +47,7 @@ def arrivals(subscription):
 
 
 def test_only_the_sender_is_received():
-    mine, key = Participants(PREFIX, new_secret()), f"{PREFIX}/_step/plant"
+    mine, key = PublisherIds(PREFIX, new_secret()), f"{PREFIX}/_step/plant"
     with private_endpoints(["a", "b", "c"]) as ends, ZenohBus(*mesh("a", ends)) as bus:
         received = bus.receive(mine.senders(STEP_KEY, ["plant"]))
         first_comer = bus.receive({f"{PREFIX}/free": None})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.distributed_run import parse_peers
 from lapwing.services import process_table
 from lapwing.services.scene_resolver import load, resolve
@@ -42,13 +42,13 @@ def test_two_hosts_have_every_service_once_and_one_table():
     assert set(tables[0]) == {*plant, *others}
     assert not {*plant} & {*others}
     for scene in (ROOT / "lapwing/scenes").glob("*.toml"):
-        assert {WATCHER, *process_table.needed(resolve(load(scene)))} <= set(tables[0])
+        assert {MONITOR, *process_table.needed(resolve(load(scene)))} <= set(tables[0])
 
 
 def test_each_service_of_two_hosts_listens_at_its_host_with_its_own_certificate():
     for address, services in (("10.0.0.1", composed("dynamics.yml")), ("10.0.0.2", composed("flight.yml"))):
         for name, service in services.items():
-            assert service["command"][2] == name or name == WATCHER
+            assert service["command"][2] == name or name == MONITOR
             assert peers_of(service["command"])[name].startswith(f"tls/{address}:")
             assert f"../../keys/{name}:/app/keys/{name}:ro" in service["volumes"]
             assert service["read_only"]
@@ -65,7 +65,7 @@ def test_kubernetes_takes_the_manifests():
 
 
 def test_kubernetes_has_a_pod_and_a_name_for_each_process_that_a_scene_needs():
-    needed = {WATCHER, *process_table.needed(resolve(load("cooperative_load")))}
+    needed = {MONITOR, *process_table.needed(resolve(load("cooperative_load")))}
     found = {(each["kind"], each["metadata"]["name"]): each for each in manifests("cooperative_load")}
     for name in needed:
         spec = found["Pod", name]["spec"]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.terrain import LEVEL, over_plane, ray, relief, summit, surface, touch
 
 GRID = {"grid": 0.2 * np.random.default_rng(1).normal(size=(9, 11)), "corner": (-4.0, -5.0), "spacing": 1.0}
@@ -135,6 +135,6 @@ def test_nothing_makes_level_ground():
     ],
 )
 def test_refused(table, said):
-    with pytest.raises(KeyedError) as error:
+    with pytest.raises(ConfigError) as error:
         relief(**table)
     assert said in str(error.value)

@@ -6,7 +6,7 @@ import pytest
 from annotated_types import Ge, Gt, Le
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 
 
@@ -31,7 +31,7 @@ class Outer(BaseModel):
     @classmethod
     def _even(cls, value):
         if value % 2:
-            raise KeyedError("", f"got {value}", "an even number")
+            raise ConfigError("", f"got {value}", "an even number")
         return value
 
 

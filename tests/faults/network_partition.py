@@ -5,11 +5,11 @@ from pathlib import Path
 
 from lapwing.cosim.access.certificates import make
 from lapwing.cosim.log import LogReader
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from tests.hosts.network import Network
 from tests.hosts.run import Run
 
-HOSTS = ("plant", "sensors", "autopilot", "trajectory", "recorder", WATCHER)  # each on a host of its own
+HOSTS = ("plant", "sensors", "autopilot", "trajectory", "recorder", MONITOR)  # each on a host of its own
 KINDS = ("cut", "cut off")  # for a while, for good
 WHILE = 2.0  # [s] that a run gets over
 RECOVERED = 0.5  # [s] before the cut up to which a log must be whole
@@ -39,14 +39,14 @@ def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, f
             network.cut_off = set()
         ends = run.ends()
     seconds = time.monotonic() - struck
-    code, said = ends[WATCHER]
+    code, said = ends[MONITOR]
     wrong = [f"{name}: a traceback: {words}" for name, (_, words) in ends.items() if "Traceback" in words]
     wrong += [f"{name} was left: {words}" for name, (c, words) in ends.items() if c < 0]
     if over or not ever:
         wrong += [f"{name} ended with exit code {c}: {words}" for name, (c, words) in ends.items() if c]
     elif code == 1:
         named = said.partition(": ")[2].partition(": ")[0].split(", ")
-        if named != ([victim] if victim != WATCHER else sorted(set(HOSTS) - {WATCHER})):
+        if named != ([victim] if victim != MONITOR else sorted(set(HOSTS) - {MONITOR})):
             wrong.append(f"names the wrong: {said}")
     elif code:
         wrong.append(f"exit code {code}: {said}")

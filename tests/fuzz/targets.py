@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lapwing.cosim.config.serialise import from_json, to_json
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.transport.packets import pack_batch, unpack_batch
 from lapwing.messages import PoseStamped, attachment
@@ -74,7 +74,7 @@ def cdr() -> Target:
 
 def batches() -> Target:
     poses = np.frombuffer(2 * PoseStamped().encode(), np.uint8).reshape(2, -1)
-    return Target(unpack_batch, (pack_batch([Page(POSE, np.array([0, 5]), poses)], 0, 7), pack_batch([], 0, 3)))
+    return Target(unpack_batch, (pack_batch([RecordBatch(POSE, np.array([0, 5]), poses)], 0, 7), pack_batch([], 0, 3)))
 
 
 def attachments() -> Target:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.services.process_table import create_all
 from tests.cosim.memory_log import MemoryLog
@@ -15,7 +15,7 @@ from tests.golden.digests import BEGINNING, Golden
 def fly(name: str) -> tuple[MemoryLog, str]:
     """The whole flight of a case, and the digest of its beginning."""
     setup = CASES[name].resolve()
-    log, graph, beginning = MemoryLog(setup), Graph(setup, create_all(setup), PAGE), ""
+    log, graph, beginning = MemoryLog(setup), BlockDiagram(setup, create_all(setup), PAGE), ""
     stops = [round(BEGINNING * setup.rate) + 1, *range(PAGE, setup.last_tick + 1 + PAGE, PAGE)]
     for stop in sorted(stops):
         first = graph.tick

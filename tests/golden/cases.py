@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.services.common import flight_plan_file as plan
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import start_height
@@ -19,7 +19,7 @@ class Case(NamedTuple):
     overrides: tuple[str, ...] = ()
     plan: Path | None = None
 
-    def resolve(self) -> Setup:
+    def resolve(self) -> RunConfig:
         """The set-up of the flight."""
         scene = load(self.scene, list(self.overrides))
         if self.plan is None:

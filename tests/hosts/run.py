@@ -4,7 +4,7 @@ import subprocess
 import sys
 import time
 
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 
 SLOWEST = 120.0  # [s] for a run to begin, and to end
 _GROWN = 8  # sizes of a log that is being written, some of which are of its head
@@ -26,9 +26,9 @@ class Run:
         self.log = folder / "log.mcap"
         self.participants = {}
         for name, host in places.items():
-            command = ["run"] if name == WATCHER else ["service", name]
+            command = ["run"] if name == MONITOR else ["service", name]
             more = ["--speed", "1"] if name == "plant" else []
-            if name in (WATCHER, "recorder"):
+            if name in (MONITOR, "recorder"):
                 more = ["--log", str(self.log)]
             words = [*command, "delivery_mission", *sets, "--peers", table, "--keys", str(keys), *more]
             self.participants[name] = subprocess.Popen(

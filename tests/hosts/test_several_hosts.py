@@ -6,7 +6,7 @@ import pytest
 
 from lapwing.cosim.access.certificates import make
 from lapwing.cosim.log import LogReader
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 from tests.hosts.network import Network, why_not
@@ -18,7 +18,7 @@ HOSTS = {
     "autopilot": "flight",
     "trajectory": "flight",
     "recorder": "log",
-    WATCHER: "log",
+    MONITOR: "log",
 }
 
 pytestmark = pytest.mark.long
@@ -60,7 +60,7 @@ def test_a_host_that_is_lost_is_named_and_everybody_ends(keys, tmp_path):
         ends = run.ends()
     said = {name: words for name, (_, words) in ends.items()}
     assert {name: code for name, (code, _) in ends.items()} == dict.fromkeys(ends, 1), said
-    assert said.pop(WATCHER).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
-    assert said == {name: f"lapwing: {name}: {WATCHER} is gone before the run has ended\n" for name in said}
+    assert said.pop(MONITOR).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
+    assert said == {name: f"lapwing: {name}: {MONITOR} is gone before the run has ended\n" for name in said}
     with LogReader(run.log) as read:
         assert list(read.messages())

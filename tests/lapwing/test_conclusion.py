@@ -8,7 +8,7 @@ import pytest
 
 import lapwing as package
 from lapwing.runs import single_process_run
-from lapwing.studies.flight_data import SHOWN, Flight
+from lapwing.studies.flight_data import SHOWN, FlightData
 from lapwing.studies.metrics import figures
 from lapwing.studies.report.page import flight_page
 
@@ -61,7 +61,7 @@ def test_a_divergence_has_its_verdict_in_both_modes(lapwing, mode):
     )
     assert (code, err) == (4, "lapwing: the flight has failed: diverged; success.require: verdict != 'diverged'\n")
     assert "Diverged at 0.00 s: gyrostat: not finite at t = 1 s" in out
-    assert Flight.read("a.mcap").verdict.kind == "diverged"
+    assert FlightData.read("a.mcap").verdict.kind == "diverged"
 
 
 def test_ctrl_c_has_its_verdict_too(lapwing, monkeypatch):
@@ -74,7 +74,7 @@ def test_ctrl_c_has_its_verdict_too(lapwing, monkeypatch):
     code, out, err = lapwing(*HOVER)
     assert (code, err) == (130, "lapwing: ended by SIGINT\n")
     assert "Broken off at 2.00 s: ended by SIGINT" in out
-    assert Flight.read("a.mcap").verdict.kind == "broken off"
+    assert FlightData.read("a.mcap").verdict.kind == "broken off"
     assert Path("a.html").exists()
 
 
@@ -88,8 +88,8 @@ def test_a_run_that_is_refused_says_nothing_of_the_log_that_was_there(lapwing, m
 def test_what_the_end_of_a_run_reads_is_all_that_it_shows(tmp_path, scene):
     """Of a log with every sensor only the topics that page, figures and events are made of."""
     log = package.fly(package.load(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
-    (part,), whole = Flight.read_all(log, SHOWN), Flight.read(log)
+    (part,), whole = FlightData.read_all(log, SHOWN), FlightData.read(log)
     assert set(part.topics) < set(whole.topics)
-    assert flight_page([part]) == flight_page([whole]) == flight_page([Flight.read(log, only=SHOWN)])
+    assert flight_page([part]) == flight_page([whole]) == flight_page([FlightData.read(log, only=SHOWN)])
     assert part.events == whole.events
     assert str(figures(part)) == str(figures(whole))  # as texts: some are NaN

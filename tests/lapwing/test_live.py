@@ -12,10 +12,10 @@ import urllib.request
 import numpy as np
 import pytest
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.messages import Log
-from lapwing.runs.live_feed import Following
+from lapwing.runs.live_feed import LiveFeed
 from lapwing.runs.live_page import LivePage
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
@@ -48,7 +48,7 @@ class Run:
 
     def __init__(self, scene="hover", overrides=()):
         self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
-        self._graph = Graph(self.setup, create_all(self.setup), PAGE)
+        self._graph = BlockDiagram(self.setup, create_all(self.setup), PAGE)
         self.spoken, self.listen, self.time_ns = set(self.setup.services), None, 0
         self.published = []
 
@@ -74,7 +74,7 @@ def test_only_who_has_the_address_sees_it_and_only_while_it_flies():
             with pytest.raises(urllib.error.HTTPError) as refused:
                 get(f"http://127.0.0.1:{port}/{path}")
             assert refused.value.code == 404
-        follow = Following(run.setup, [page.show])
+        follow = LiveFeed(run.setup, [page.show])
         follow.observe(run)
         early = get(page.address + "steps")
         for _ in range(4):
@@ -94,7 +94,7 @@ def test_only_who_has_the_address_sees_it_and_only_while_it_flies():
 def test_of_a_fleet_every_vehicle_is_shown_and_its_events_are_its_own():
     run, shown = Run("fleet"), []
     names = ["left", "right", "scout"]
-    follow = Following(run.setup, [lambda steps, events: shown.append(json.loads(steps_to_json(steps, events, True)))])
+    follow = LiveFeed(run.setup, [lambda steps, events: shown.append(json.loads(steps_to_json(steps, events, True)))])
     follow.observe(run)
     for _ in range(2):
         run.step()
@@ -114,7 +114,7 @@ def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
     until += 'await until(() => document.readyState === "complete");'
     until += 'const section = document.getElementById("motion"), state = document.getElementById("state");'
     with LivePage(run.setup) as page:
-        follow = Following(run.setup, [page.show])
+        follow = LiveFeed(run.setup, [page.show])
         follow.observe(run)
         with chromium.Browser(page.address, tmp_path / "profile") as browser:
             browser.run(until + 'await until(() => state && state.textContent.startsWith("waiting"));')

@@ -8,11 +8,11 @@ import pytest
 
 from lapwing.cli.new_command import write_effect
 from lapwing.cosim.log import LogReader
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
 from lapwing.runs.resimulate import refly
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.simulate import fly
 
@@ -55,7 +55,7 @@ def test_other_names_are_refused(tmp_path, name):
 def test_it_flies_to_the_same_bits_in_processes_and_from_the_log_alone(scene, tmp_path):
     own, log = scene(f"effects.{NAME}.coefficient=3.0"), tmp_path / "log.mcap"
     without = fly(scene(f"effects.{NAME}.coefficient=0.0")).digest
-    given = Participation("mission", resolve(own), {}, "test-own-effect", log=str(log))
+    given = ProcessSpec("mission", resolve(own), {}, "test-own-effect", log=str(log))
     (tmp_path / f"{NAME}.py").unlink()
     fly_processes(given, Silent())
     with LogReader(log) as read:
@@ -68,14 +68,14 @@ def test_it_flies_to_the_same_bits_in_processes_and_from_the_log_alone(scene, tm
 
 
 def test_what_is_wrong_is_one_line(scene, tmp_path):
-    with pytest.raises(KeyedError, match=r"effects.tether_drag.coefficient: expected a number at least 0"):
+    with pytest.raises(ConfigError, match=r"effects.tether_drag.coefficient: expected a number at least 0"):
         scene(f"effects.{NAME}.coefficient=-1.0")
-    with pytest.raises(KeyedError, match=r"effects.other.module: tether_drag has no class Other"):
+    with pytest.raises(ConfigError, match=r"effects.other.module: tether_drag has no class Other"):
         scene(f"effects.other.module={NAME}")
-    with pytest.raises(KeyedError, match=r"effects.other.module: no module nobody_has_this"):
+    with pytest.raises(ConfigError, match=r"effects.other.module: no module nobody_has_this"):
         scene("effects.other.module=nobody_has_this")
-    with pytest.raises(KeyedError, match=r"effects.gravity.module: gravity is the name of an effect that ships"):
+    with pytest.raises(ConfigError, match=r"effects.gravity.module: gravity is the name of an effect that ships"):
         scene(f"effects.gravity.module={NAME}")
     (tmp_path / f"{NAME}.py").write_text("1 +")
-    with pytest.raises(KeyedError, match=r"effects.tether_drag.module: tether_drag.py, line 1: invalid syntax"):
+    with pytest.raises(ConfigError, match=r"effects.tether_drag.module: tether_drag.py, line 1: invalid syntax"):
         scene()

@@ -10,7 +10,7 @@ from samples import flat, sample, value, varied
 
 from lapwing.messages import TYPES, BatteryState, Estimate, Imu, LiftCommand, Status, Vector3, header, stamp_ns
 from lapwing.messages import topic_columns as module
-from lapwing.messages.topic_columns import Gathered, history, history_of_pages
+from lapwing.messages.topic_columns import ColumnBuilder, history, history_of_pages
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -110,7 +110,7 @@ def test_messages_as_they_come_are_the_same_as_all_at_once(monkeypatch, count):
     """Of pages of eight, with two shapes and texts."""
     monkeypatch.setattr(module, "PAGE", 8)
     said = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
-    payloads, gathered = [message.encode() for message in said], Gathered(Status)
+    payloads, gathered = [message.encode() for message in said], ColumnBuilder(Status)
     for k, payload in enumerate(payloads):
         gathered.add(1000 * k, payload)
     times, found = gathered.history()
@@ -126,7 +126,7 @@ def test_messages_as_they_come_are_the_same_as_all_at_once(monkeypatch, count):
 
 def test_messages_as_they_come_are_in_memory_once():
     payload, count = Imu(header(0, "body")).encode(), 20_000
-    gathered = Gathered(Imu)
+    gathered = ColumnBuilder(Imu)
     tracemalloc.start()
     try:
         for k in range(count):

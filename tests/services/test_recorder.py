@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.packets import pack_batch
 from lapwing.messages.topics import ACTUATORS, POSE, TRUTH
@@ -12,7 +12,7 @@ from lapwing.services.recorder.service import Pending
 
 def batch(topic, ticks, stop, start=0):
     ticks = np.array(ticks)
-    pages = [Page(topic, ticks, ticks.astype("<i8").view(np.uint8).reshape(-1, 8))] if len(ticks) else []
+    pages = [RecordBatch(topic, ticks, ticks.astype("<i8").view(np.uint8).reshape(-1, 8))] if len(ticks) else []
     return pack_batch(pages, start, stop)
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.studies.flight_data import Flight
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.topic_view import TopicView
 
@@ -11,7 +11,7 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 
 
 def setup(ticks, rate=100, **resolved):
-    return Setup("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "sequential", "drone1", {}, {}, resolved)
+    return RunConfig("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "sequential", "drone1", {}, {}, resolved)
 
 
 def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
@@ -23,7 +23,7 @@ def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
             column = np.asarray(value)
             rows[field] = column if column.shape[:1] == (ticks,) else np.broadcast_to(column, (ticks, *column.shape))
         views[name] = TopicView(np.arange(ticks) * (10**9 // rate), rows)
-    return Flight(views, Origin.of_setup(setup(ticks, rate, **(scene or {}))), failure, diverged)
+    return FlightData(views, Origin.of_setup(setup(ticks, rate, **(scene or {}))), failure, diverged)
 
 
 def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):

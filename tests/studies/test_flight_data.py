@@ -8,14 +8,14 @@ import synthetic_flights
 
 from lapwing.cosim.config.provenance import attachments, metadata
 from lapwing.cosim.config.serialise import digest
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.messages.topics import SETPOINT, TRUTH
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
 SCENE = "hover"
@@ -37,8 +37,8 @@ def in_memory(run):
 def recorded(run, tmp_path_factory):
     path = tmp_path_factory.mktemp("flight") / "hover.mcap"
     with LogWriter(path, metadata(run, "single"), attachments(run, {})) as writer:
-        run_single(Graph(run, create_all(run), PAGE), Recording(writer, run))
-    return Flight.read(path)
+        run_single(BlockDiagram(run, create_all(run), PAGE), Recording(writer, run))
+    return FlightData.read(path)
 
 
 def test_a_log_and_memory_say_the_same(recorded, in_memory):
@@ -60,7 +60,7 @@ def test_only_what_is_wanted_is_kept(run):
 
 
 def test_only_the_ports_that_are_asked_for_are_deep(run):
-    graph = Graph(run, create_all(run), 64, {"truth"})
+    graph = BlockDiagram(run, create_all(run), 64, {"truth"})
     graph.advance(run.last_tick + 1)
     deep, shallow = graph.all_rows("truth", 1), graph.rows("setpoint", np.arange(64))
     assert len(deep) == TICKS + 1

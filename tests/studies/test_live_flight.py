@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lapwing
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.services.process_table import create_all
@@ -20,7 +20,7 @@ STEP = 50_000_000  # [ns]
 def steps():
     """Of the first seconds of a mission, whose services hand over at different times."""
     setup = resolve(load("hover", {"run.duration": 4.0}))
-    graph = Graph(setup, create_all(setup), PAGE)
+    graph = BlockDiagram(setup, create_all(setup), PAGE)
     live, found, held = LiveFlight(setup), [], []
     while not graph.ended:
         before = graph.tick

@@ -13,7 +13,7 @@ import synthetic_flights
 from lapwing.services.common.mesh_file import Mesh
 from lapwing.services.common.mesh_schema import pack
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.report import motion_3d, shapes, write
 from lapwing.studies.report.motion_3d import FRAMES
@@ -79,7 +79,7 @@ def fleet():
     first = flight()
     truth = {name: first.truth[name] for name in first.truth.fields}
     truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
-    second = Flight({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
+    second = FlightData({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
     second.vehicle = "second"
     first.others = (second,)
     first.fleet = {"second": second.truth, first.vehicle: first.truth}
@@ -177,7 +177,7 @@ def test_a_body_that_tells_less_often_moves_evenly_in_between():
         np.arange(0, TICKS, 10) * 10**7, {k: whole.topic("bodies")[k][::10] for k in ("name", "pose", "force")}
     )
     views = {name: whole.topic(name) for name in whole.topics} | {"bodies": seldom}
-    (table,) = json.loads(motion_3d.to_json([Flight(views, whole.origin)]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([FlightData(views, whole.origin)]))["flights"]
     heights = numbers(table["bodies"][1]["p"]).reshape(-1, 3)[:, 2]
     assert heights[: TICKS - 10] == pytest.approx(T[: TICKS - 10] - 1.8, abs=1e-5)
 
@@ -278,7 +278,7 @@ def standing():
     place[:, 0, 0], place[:, 1, 0], force[:, :, 2] = 0.2, -0.2, 50.0
     whole = flight()
     contact = TopicView(np.arange(0, TICKS, 2) * 10**7, {"position": place, "force": force})
-    return Flight({**{name: whole.topic(name) for name in whole.topics}, "contact": contact}, whole.origin)
+    return FlightData({**{name: whole.topic(name) for name in whole.topics}, "contact": contact}, whole.origin)
 
 
 def test_the_page_is_given_the_forces_on_every_foot_where_they_are_told():
@@ -331,7 +331,7 @@ def test_a_browser_draws_the_mesh_where_the_vehicle_is_and_as_it_is_turned(tmp_p
     plain = flight(scene=WITH_MESH)
     truth = {name: plain.truth[name] for name in plain.truth.fields}
     truth["pose.orientation"] = np.tile([0.0, 0.0, 0.5**0.5, 0.5**0.5], (TICKS, 1))  # x of the body points north
-    given = Flight({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, plain.origin)
+    given = FlightData({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, plain.origin)
     given.digest = "0" * 32
     with chromium.Browser(write(given, tmp_path / "flight.html"), tmp_path / "profile") as browser:
         x, y, z, face = browser.run(
@@ -373,9 +373,9 @@ def test_a_flight_that_goes_on_tells_its_mesh_once():
     ],
 )
 def test_every_kind_of_scene_is_drawn_in_its_own_shape(scene, bodies, rotors, links):
-    recorded = Flight.read(sample_file(scene))  # the samples carry no set-up
+    recorded = FlightData.read(sample_file(scene))  # the samples carry no set-up
     views = {name: recorded.topic(name) for name in recorded.topics}
-    found = motion_3d.motion(Flight(views, Origin.of_setup(resolve(load(scene)))))
+    found = motion_3d.motion(FlightData(views, Origin.of_setup(resolve(load(scene)))))
     assert (len(found.bodies), sum(len(body.rotors) for body in found.bodies), len(found.links)) == (
         bodies,
         rotors,

@@ -28,7 +28,7 @@ from lapwing.messages import (
     VehicleState,
     header,
 )
-from lapwing.studies.flight_data import AXES, Flight
+from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report import overview_image, plotly_figure, plots, write
 from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_header import MANY, differences
@@ -149,7 +149,7 @@ class Page(HTMLParser):
 
 def report(log):
     """The report of a log, written beside it."""
-    return write(Flight.read(log), log.with_suffix(".html"))
+    return write(FlightData.read(log), log.with_suffix(".html"))
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +173,7 @@ def test_every_plot_is_on_the_page_in_its_order(page):
 
 def test_a_plot_carries_what_was_flown(log, page):
     x = page.plots["position"]["data"][0]
-    flown = Flight.read(log)
+    flown = FlightData.read(log)
     assert x["name"] == "flown"
     assert values(x["x"]) == pytest.approx(flown.truth.times)
     assert values(x["y"]) == pytest.approx(flown.truth.position[:, 0], abs=1e-6)
@@ -211,7 +211,7 @@ def test_the_timeline_says_who_did_what_when(page):
 
 
 def test_motors_at_a_limit_are_marked(log):
-    flown = Flight.read(log)
+    flown = FlightData.read(log)
     flown.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
     marks, said = motors.limits(flown)
     assert "limit of its voltage (0 or 34 V) in the air, in all for " in said
@@ -240,7 +240,7 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
 
 @pytest.mark.long
 def test_the_same_plots_on_paper(log, page, tmp_path):
-    pdf = write(Flight.read(log), tmp_path / "circle.pdf").read_bytes()
+    pdf = write(FlightData.read(log), tmp_path / "circle.pdf").read_bytes()
     assert pdf.startswith(b"%PDF")
     assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots) - 1  # all but the motion
 
@@ -258,12 +258,12 @@ def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monke
 
 def test_another_ending_is_refused(log, tmp_path):
     with pytest.raises(ValueError, match=r"circle\.txt: expected a name that ends in \.html, \.pdf or \.png"):
-        write(Flight.read(log), tmp_path / "circle.txt")
+        write(FlightData.read(log), tmp_path / "circle.txt")
 
 
 def test_two_flights_lie_over_each_other(log, tmp_path):
     other = record(tmp_path / "weak.mcap", messages(rotors=0))
-    page = Page(write([Flight.read(log), Flight.read(other)], tmp_path / "both.html"))
+    page = Page(write([FlightData.read(log), FlightData.read(other)], tmp_path / "both.html"))
     names = [trace["name"] for trace in page.plots["position"]["data"]]
     assert names == ["flown", "reference", "", "± RMSE", "± RMSE"] * 3  # the same flight: nothing to tell apart
     assert any("Of circle alone (weak: the vehicle has no motors)." in text for text in page.texts)
@@ -272,7 +272,7 @@ def test_two_flights_lie_over_each_other(log, tmp_path):
 
 def test_what_differs_in_two_flights_has_their_names(log, tmp_path):
     other = record(tmp_path / "moved.mcap", messages(east=1.0))  # it followed the same reference
-    one, two = (position.draw(Flight.read(path)) for path in (log, other))
+    one, two = (position.draw(FlightData.read(path)) for path in (log, other))
     both = overlay(one, two, ("a", "b"))
     assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
     assert both.panels[1].title == "a: RMSE 0.1000 m; b: RMSE 0.9000 m"
@@ -310,14 +310,14 @@ def test_errors_are_the_offsets_that_were_flown(log, page):
     for index, (axis, offset) in enumerate(zip(AXES, OFFSET, strict=True)):
         unit, scale = ("m", 1.0) if index < 3 else ("°", 180.0 / math.pi)
         assert page.after(f"{axis} [{unit}]") == f"{scale * abs(offset):.4f}"
-        assert Flight.read(log).rmse[axis] == pytest.approx(abs(offset), rel=1e-9)
-        assert Flight.read(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
+        assert FlightData.read(log).rmse[axis] == pytest.approx(abs(offset), rel=1e-9)
+        assert FlightData.read(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
     assert page.after(page.after("x [m]")) == "0.2373"
     assert page.after(page.after("y [m]")) != "0.2700"  # nothing published for y in this scene
 
 
 def test_summary_says_what_the_log_says(log, page):
-    flown = Flight.read(log)
+    flown = FlightData.read(log)
     assert page.after("digest") == flown.digest
     assert page.after("duration") == "6.00 s"
     assert page.after("landed") == "yes"
@@ -327,27 +327,27 @@ def test_summary_says_what_the_log_says(log, page):
 
 
 def test_armed_samples_alone_count(log):
-    assert Flight.read(log).armed.sum() == RATE * (SECONDS - 1.0) + 1
-    assert all(len(e) == Flight.read(log).armed.sum() for e in Flight.read(log).errors.values())
+    assert FlightData.read(log).armed.sum() == RATE * (SECONDS - 1.0) + 1
+    assert all(len(e) == FlightData.read(log).armed.sum() for e in FlightData.read(log).errors.values())
 
 
 def test_phases_follow_one_another(log):
-    assert phases(Flight.read(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
+    assert phases(FlightData.read(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
 
 
 def test_coefficients_are_those_of_the_propeller(log):
-    flown = Flight.read(log)
+    flown = FlightData.read(log)
     speed = flown.truth.rotor_speed[:, 0]
     assert propulsion.coefficient(speed, flown.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
     assert propulsion.coefficient(speed, flown.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
 
 
 def test_estimate_errors_and_refusals(log):
-    error = estimator.errors(Flight.read(log))
+    error = estimator.errors(FlightData.read(log))
     expected = np.zeros(9)
     expected[0] = ESTIMATE_ERROR
     assert error == pytest.approx(np.broadcast_to(expected, error.shape), abs=1e-9)
-    assert estimator.refusals(Flight.read(log)) == "Measurements refused: gps 2, sonar 1."
+    assert estimator.refusals(FlightData.read(log)) == "Measurements refused: gps 2, sonar 1."
 
 
 def test_attitude_error_is_in_the_body_frame(tmp_path):
@@ -361,7 +361,7 @@ def test_attitude_error_is_in_the_body_frame(tmp_path):
         ("estimate", Estimate(stamp, Pose(Point(), estimated))),
     ]
     later = [(topic, m._replace(header=header(10**9, "world"))) for topic, m in both]
-    error = estimator.errors(Flight.read(record(tmp_path / "yawed.mcap", both + later)))
+    error = estimator.errors(FlightData.read(record(tmp_path / "yawed.mcap", both + later)))
     assert error[:, 6:] == pytest.approx(np.array([[0.1, 0.0, 0.0]] * 2), abs=1e-12)
 
 
@@ -428,7 +428,7 @@ def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
 
 
 def test_the_picture_of_a_mission_is_a_png(log, tmp_path):
-    overview_image.draw(Flight.read(log), tmp_path / "mission.png")
+    overview_image.draw(FlightData.read(log), tmp_path / "mission.png")
     assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 

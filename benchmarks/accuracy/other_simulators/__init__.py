@@ -11,7 +11,7 @@ import numpy as np
 
 from lapwing.dynamics import discovery
 from lapwing.studies.accuracy.coordinates import matrices
-from lapwing.studies.accuracy.problem import Outcome
+from lapwing.studies.accuracy.problem import SolverRun
 
 
 def installed() -> list[ModuleType]:
@@ -27,10 +27,10 @@ def installed() -> list[ModuleType]:
 
 def outcome(
     duration: float, R_world_body: np.ndarray, omega_body: np.ndarray, evaluations: int | None = None
-) -> Outcome:
+) -> SolverRun:
     """The outcome of a run of which only the end is known."""
     end = np.concatenate([np.ravel(R_world_body), omega_body])
-    return Outcome(np.array([0.0, duration]), np.array([end, end]), 0.0, evaluations)
+    return SolverRun(np.array([0.0, duration]), np.array([end, end]), 0.0, evaluations)
 
 
 def matrix(quaternion: np.ndarray) -> np.ndarray:

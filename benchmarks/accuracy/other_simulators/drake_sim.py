@@ -18,7 +18,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
 from benchmarks.accuracy.other_simulators.mujoco_sim import ACROSS, AXIAL, rotor_speeds
-from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 NAME, MODULE = "Drake", "drake"
@@ -56,12 +56,12 @@ def plant_of(case: str) -> tuple[MultibodyPlant, Any, list[Any]]:
     return plant, body, rotors
 
 
-def ways(case: str) -> list[Way]:
+def ways(case: str) -> list[SolverMethod]:
     module = MODULES[case]
     R_start = matrix(np.array(module.START.attitude))
     omega_start = np.array(module.START.omega_body)
 
-    def way(scheme: str) -> Way:
+    def way(scheme: str) -> SolverMethod:
         plant, body, rotors = plant_of(case)
         simulator = Simulator(plant)
         context = simulator.get_mutable_context()
@@ -102,6 +102,6 @@ def ways(case: str) -> list[Way]:
         def read(tolerance: float, end: Any) -> Any:
             return outcome(module.DURATION, *end)
 
-        return Way(f"Drake {scheme}", SCHEMES[scheme], "tol", TOLERANCES, prepare, read, lambda: None)
+        return SolverMethod(f"Drake {scheme}", SCHEMES[scheme], "tol", TOLERANCES, prepare, read, lambda: None)
 
     return [way(scheme) for scheme in SCHEMES]

@@ -8,7 +8,7 @@ import numpy as np
 from exudyn import utilities as build
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, heavy_top
 
 NAME, MODULE = "Exudyn", "exudyn"
@@ -39,12 +39,12 @@ def system(case: str) -> tuple[Any, int]:
     return system, made["bodyNumber"]
 
 
-def ways(case: str) -> list[Way]:
+def ways(case: str) -> list[SolverMethod]:
     if case not in CASES:
         return []
     module, coarsest = CASES[case]
 
-    def way(name: str, order: int, unit: str, values: list[float], adapt: Callable[[Any, float], None]) -> Way:
+    def way(name: str, order: int, unit: str, values: list[float], adapt: Callable[[Any, float], None]) -> SolverMethod:
         main, body = system(case)
 
         def prepare(value: float) -> Callable[[], Any]:
@@ -64,7 +64,7 @@ def ways(case: str) -> list[Way]:
 
             return run
 
-        return Way(
+        return SolverMethod(
             f"Exudyn {name}", order, unit, values, prepare, lambda _, end: outcome(module.DURATION, *end), lambda: None
         )
 

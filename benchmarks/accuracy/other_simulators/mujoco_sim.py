@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 mujoco.set_mju_user_warning(lambda message: None)  # of steps too large to be stable, which are measured as such
@@ -60,10 +60,10 @@ CASES: dict[str, tuple[Callable[[str], str], Any, slice, slice, float]] = {
 }
 
 
-def ways(case: str) -> list[Way]:
+def ways(case: str) -> list[SolverMethod]:
     describe, module, turn, omega, coarsest = CASES[case]
 
-    def way(integrator: str) -> Way:
+    def way(integrator: str) -> SolverMethod:
         model = mujoco.MjModel.from_xml_string(describe(integrator))
         data = mujoco.MjData(model)
 
@@ -85,6 +85,6 @@ def ways(case: str) -> list[Way]:
             return outcome(module.DURATION, matrix(end[0]), end[1])
 
         steps = [coarsest / 2**k for k in range(HALVINGS)]
-        return Way(f"MuJoCo {integrator}", INTEGRATORS[integrator], "s", steps, prepare, read, lambda: None)
+        return SolverMethod(f"MuJoCo {integrator}", INTEGRATORS[integrator], "s", steps, prepare, read, lambda: None)
 
     return [way(integrator) for integrator in INTEGRATORS]

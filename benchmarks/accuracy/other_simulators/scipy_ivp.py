@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.accuracy.other_simulators import matrix, outcome
-from lapwing.studies.accuracy.problem import Way
+from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
 NAME, MODULE = "SciPy", "scipy"
@@ -37,12 +37,12 @@ def rate(t, s, inertia, h, moment):
     ])  # fmt: skip
 
 
-def ways(case: str) -> list[Way]:
+def ways(case: str) -> list[SolverMethod]:
     inertia, h, moment, module = CASES[case]
     start = np.array([*module.START.attitude, *module.START.omega_body])
     numbers = (np.array(inertia), np.array(h), moment)
 
-    def way(method: str) -> Way:
+    def way(method: str) -> SolverMethod:
         def prepare(tolerance: float) -> Callable[[], Any]:
             keys = {"method": method, "rtol": max(tolerance, 3e-14), "atol": tolerance, "args": numbers}
             return lambda: solve_ivp(rate, (0.0, module.DURATION), start, **keys)
@@ -51,7 +51,7 @@ def ways(case: str) -> list[Way]:
             end = found.y[:, -1]
             return outcome(module.DURATION, matrix(end[:4]), end[4:], found.nfev) if found.success else None
 
-        return Way(f"SciPy {method}", METHODS[method], "tol", TOLERANCES, prepare, read, lambda: None)
+        return SolverMethod(f"SciPy {method}", METHODS[method], "tol", TOLERANCES, prepare, read, lambda: None)
 
     rate(0.0, start, *numbers)
     return [way(method) for method in METHODS]

@@ -18,7 +18,7 @@ def new_secret() -> str:
     return secrets.token_hex(32)
 
 
-class Participants(NamedTuple):
+class PublisherIds(NamedTuple):
     """The participants of one run: the marks by which their messages are known."""
 
     key_prefix: str

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import digest, to_json
 
 SETUP_FILE = "setup.json"
@@ -16,7 +16,7 @@ WAITED = "waited_for_disk"  # key of a run that the disk has held up: for how lo
 RESTARTS = "restarts"  # key of a run some of whose services were started again (lapwing.cosim.processes.launcher)
 
 
-def metadata(setup: Setup, mode: str) -> dict[str, str]:
+def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
     """The entries of the log's "lapwing" metadata record, all text."""
     solver = setup.resolved.get("solver", {})
     return {
@@ -43,7 +43,7 @@ def failure(text: str, diverged: bool = False) -> dict[str, str]:
     return {FAILURE: text, **({DIVERGED: "yes"} if diverged else {})}
 
 
-def attachments(setup: Setup, sources: Mapping[str, str]) -> dict[str, bytes]:
+def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes]:
     """Files that travel inside the log: the set-up, from which the run can be flown again, and its sources."""
     return {SETUP_FILE: to_json(setup).encode(), **{name: text.encode() for name, text in sources.items()}}
 

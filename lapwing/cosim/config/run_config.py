@@ -5,30 +5,30 @@ The set-up is made by whoever starts a run, handed to every process as it is, re
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.tick_schedule import Input, Port, execution_order
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port, execution_order
 from lapwing.cosim.run_errors import LockStepError
 
 
-class ServiceSetup(NamedTuple):
+class ServiceConfig(NamedTuple):
     """What a service of the lock step is given, takes and gives."""
 
     parameters: Any  # NamedTuples of numbers; their classes are the service's own
-    inputs: tuple[Input, ...]  # ports of other services
+    inputs: tuple[InputPort, ...]  # ports of other services
     ports: tuple[Port, ...]  # that it gives
 
 
-class Each(NamedTuple):
+class PerVehicle(NamedTuple):
     """What the vehicles of a fleet are each given: their parameters of a service, or of a process beside."""
 
     vehicles: tuple[str, ...]  # names; those that have it
     given: tuple[Any, ...]
 
 
-class Setup(NamedTuple):
+class RunConfig(NamedTuple):
     """One run, resolved.
 
-    In that of a fleet (`lapwing.cosim.diagram.multi_vehicle.joined`) the parameters of a service are `Each`
-    vehicle's `ServiceSetup`, and a
+    In that of a fleet (`lapwing.cosim.diagram.multi_vehicle.joined`) the parameters of a service are `PerVehicle`
+    vehicle's `ServiceConfig`, and a
     port has the vehicle's name in front: "left/truth".
     """
 
@@ -40,7 +40,7 @@ class Setup(NamedTuple):
     interval_ns: int  # length of a tick
     coupling: str  # "sequential" or "parallel"
     vehicle: str  # name, first part of its topics' names; "" of a fleet, whose topics have it already
-    services: dict[str, ServiceSetup]  # those of the lock step, by name
+    services: dict[str, ServiceConfig]  # those of the lock step, by name
     beside: dict[str, Any]  # what processes outside of the lock step are given, by name
     resolved: dict[str, Any]  # the scene's tables with all that its files say
 

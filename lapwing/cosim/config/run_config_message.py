@@ -2,13 +2,13 @@
 
 import zlib
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import to_json
 
 LARGEST = 1 << 26  # [bytes] of its text; the largest have some millions
 
 
-def pack(setup: Setup) -> bytes:
+def pack(setup: RunConfig) -> bytes:
     """A message that needs no fragments."""
     return zlib.compress(to_json(setup).encode())
 

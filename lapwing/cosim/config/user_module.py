@@ -25,7 +25,7 @@ from pathlib import Path
 from types import ModuleType
 
 from lapwing.cosim.access.private_sockets import only_ours
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, forget_sources
 
 
@@ -44,15 +44,15 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
         KeyedError: there is none, it has no source, or its name is taken.
     """
     if not all(part.isidentifier() for part in name.split(".")):
-        raise KeyedError(key, f"got module {name!r}", "a name that Python can import")
+        raise ConfigError(key, f"got module {name!r}", "a name that Python can import")
     file, installed = (folder / f"{name}.py").resolve(), installed_module(name)
     if file.is_file():
         if _taken(name, file):
-            raise KeyedError(key, f"{file}: another module has this name", "a name of its own")
+            raise ConfigError(key, f"{file}: another module has this name", "a name of its own")
     elif installed is None:
-        raise KeyedError(key, f"no module {name}", f"{file}, or a module on Python's path")
+        raise ConfigError(key, f"no module {name}", f"{file}, or a module on Python's path")
     elif not (installed.origin or "").endswith(".py"):
-        raise KeyedError(key, f"module {name} has no source", "one written in Python")
+        raise ConfigError(key, f"module {name} has no source", "one written in Python")
     else:
         file = Path(str(installed.origin)).resolve()
     found = {name: file}

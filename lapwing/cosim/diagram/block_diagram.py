@@ -10,11 +10,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.compiled_block import Code, Part, bind
-from lapwing.cosim.diagram.execution_groups import Turn, advance_all, groups
-from lapwing.cosim.diagram.tick_schedule import KEPT, Port
-from lapwing.cosim.diagram.topic_encoder import Page, Wire, due_ticks, encode
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.compiled_block import Block, BoundBlock, bind
+from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_all, groups
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.kernels.row_packing import reader, to_row, width
 from lapwing.messages.topics import Topic
@@ -23,13 +23,13 @@ NEVER = 2**62  # [tick]
 SPARE = 8  # rows of a port beyond those of a page
 
 
-class PythonPart(Protocol):
+class PythonBlock(Protocol):
     """A part that stays in Python: it acts at the ticks that it names, or when a part before it calls for it."""
 
     name: str
     outputs: tuple[Port, ...]
 
-    def bind(self, graph: "Graph") -> None:
+    def bind(self, graph: "BlockDiagram") -> None:
         """Get the graph whose rows it reads and writes, before the first tick."""
         ...
 
@@ -44,7 +44,7 @@ class Service:
 
     name: str
     parts: Sequence[Any]  # Part or PythonPart
-    wires: Sequence[Wire]
+    wires: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
     spoken: Sequence[Topic] = ()  # the topics of `messages`
 
@@ -54,7 +54,7 @@ class Service:
         return [*(wire.topic for wire in self.wires), *self.spoken]
 
 
-class Graph:
+class BlockDiagram:
     """Bound parts.
 
     Attributes:
@@ -65,7 +65,7 @@ class Graph:
 
     def __init__(
         self,
-        setup: Setup,
+        setup: RunConfig,
         services: Sequence[Service],
         page: int,
         whole: Collection[str] = (),
@@ -101,23 +101,23 @@ class Graph:
             self._rows[name] = _ring(self.ports[name], kept[name], delays.get(name, 0), self._rows.get(name))
         self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # of the ports that somebody has asked for
         self._parts = parts
-        self._codes: list[Code | None] = []
+        self._codes: list[BoundBlock | None] = []
         for part in parts:
-            self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Part) else None)
-        self._turns = [Turn(numbers, parts, self._codes) for numbers in groups(parts)]
+            self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Block) else None)
+        self._turns = [ExecutionGroup(numbers, parts, self._codes) for numbers in groups(parts)]
         for part in parts:
-            if not isinstance(part, Part):
+            if not isinstance(part, Block):
                 part.bind(self)
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> Block:
         """The compiled part of this name."""
         return next(part for part in self._parts if part.name == name)
 
-    def prepare(self, part: Part) -> Code:
+    def prepare(self, part: Block) -> BoundBlock:
         """Compile or load a part that is to take another's place later."""
         return bind(part, self.ports, self._rows)
 
-    def replace(self, part: Part, code: Code) -> None:
+    def replace(self, part: Block, code: BoundBlock) -> None:
         """Put a prepared part in the place of the one of its name; it takes over the state that it was given."""
         k = self._parts.index(self.part(part.name))
         self._parts[k], self._codes[k] = part, code
@@ -192,7 +192,9 @@ class Graph:
         period = self.ports[port].period
         return self._rows[port][: -(-self.tick // period)][:: every // period]
 
-    def pages(self, first: int, stop: int, only: Iterable[Topic] | None = None, keep: bool = False) -> list[Page]:
+    def pages(
+        self, first: int, stop: int, only: Iterable[Topic] | None = None, keep: bool = False
+    ) -> list[RecordBatch]:
         """The messages of the ticks [first, stop).
 
         Args:
@@ -202,7 +204,7 @@ class Graph:
             keep: whether single messages are to be given again by a later call.
         """
         wanted = None if only is None else set(only)
-        found: list[Page] = []
+        found: list[RecordBatch] = []
         for service in self.services:
             for wire in service.wires:
                 ticks = due_ticks(first, stop, wire.period)
@@ -216,10 +218,10 @@ class Graph:
 
     def _index(self, port: str, ticks: Any) -> Any:
         period = self.ports[port].period
-        return 0 if period == KEPT else (ticks // period) & (len(self._rows[port]) - 1)
+        return 0 if period == LATCHED else (ticks // period) & (len(self._rows[port]) - 1)
 
 
-def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[Page]:
+def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
     """Single messages (topic, tick, payload) as pages of messages of one length."""
     groups: dict[tuple[Topic, int], list[tuple[int, bytes]]] = {}
     for topic, tick, payload in messages:
@@ -227,13 +229,13 @@ def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[Page]:
     found = []
     for (topic, size), group in groups.items():
         payloads = np.frombuffer(b"".join(payload for _, payload in group), np.uint8).reshape(-1, size)
-        found.append(Page(topic, np.array([tick for tick, _ in group], np.int64), payloads))
+        found.append(RecordBatch(topic, np.array([tick for tick, _ in group], np.int64), payloads))
     return found
 
 
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
     """Rows for so many ticks, in the memory of the former ones where these are as many."""
-    rows = 1 if port.period == KEPT else -(-ticks // port.period) + SPARE
+    rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
     shape = 1 << (rows - 1).bit_length(), max(1, width(port.like))
     if former is None or former.shape != shape:
         return np.zeros(shape)

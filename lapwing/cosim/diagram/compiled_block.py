@@ -4,7 +4,8 @@ A part is described by its parameters, a NamedTuple. The module of their class h
 
     step(parameters, state, tick, inputs) -> (state, outputs, signal)
 
-`inputs` is a tuple of `Received`, `outputs` a tuple of trees, one for each port; the state lives in a cell, which parts
+`inputs` is a tuple of `InputSample`, `outputs` a tuple of trees, one for each port; the state lives in a cell,
+which parts
 of one service may share. Every part is compiled once, to a function of (its memory, tick), and every executor calls
 that same machine code by its address: whatever the executor, the bits are the same.
 """
@@ -21,24 +22,24 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port, due
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, due
 from lapwing.kernels import kernel, leaf, uncounted
 from lapwing.kernels.cell import Cell
 from lapwing.kernels.codegen import define, implements
 from lapwing.kernels.row_packing import load, store
 
-GO_ON, LOOK, END, FAILED = range(4)
+CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
 """Signals of a step: nothing; Python parts are to act at this tick; the tick is the last; the state is unsound."""
 
 
-class Received(NamedTuple):
+class InputSample(NamedTuple):
     """What an input has at a tick; without a message that is due the value means nothing."""
 
     due: bool
     value: Any
 
 
-class InputRows(NamedTuple):
+class InputRing(NamedTuple):
     """Where an input is read: a ring of rows."""
 
     like: Any
@@ -47,14 +48,14 @@ class InputRows(NamedTuple):
     delay: int
 
 
-class OutputRows(NamedTuple):
+class OutputRing(NamedTuple):
     """Where an output is written: a ring of rows."""
 
     rows: np.ndarray  # (depth, width)
     period: int
 
 
-class Core(NamedTuple):
+class BlockData(NamedTuple):
     """All that a compiled part is given at a tick."""
 
     parameters: Any
@@ -64,7 +65,7 @@ class Core(NamedTuple):
 
 
 @dataclass
-class Part:
+class Block:
     """A compiled part, as its service declares it.
 
     Attributes:
@@ -82,7 +83,7 @@ class Part:
     name: str
     parameters: Any
     state: Any
-    inputs: tuple[Input, ...] = ()
+    inputs: tuple[InputPort, ...] = ()
     outputs: tuple[Port, ...] = ()
     every: int = 1
     failure: Callable[[int], Exception] | None = None
@@ -90,7 +91,7 @@ class Part:
     trusted: bool = True
 
 
-class Code(NamedTuple):
+class BoundBlock(NamedTuple):
     """The machine code of a bound part."""
 
     function: int  # address
@@ -98,17 +99,17 @@ class Code(NamedTuple):
     cell: Any  # what is at that address; it must live as long as the code is called
 
 
-def bind(part: Part, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Code:
+def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
     """Compile a part or load it, on the rows of its ports."""
-    inputs = tuple(InputRows(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
-    outputs = tuple(OutputRows(rows[port.name], port.period) for port in part.outputs)
-    cell = Cell(Core(part.parameters, part.state, inputs, outputs))
-    return Code(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
+    inputs = tuple(InputRing(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
+    outputs = tuple(OutputRing(rows[port.name], port.period) for port in part.outputs)
+    cell = Cell(BlockData(part.parameters, part.state, inputs, outputs))
+    return BoundBlock(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
 
 
 @cache
 def _address(cell: types.Type, trusted: bool) -> int:
-    """The machine code that advances a part whose `Core` is in a cell of this type."""
+    """The machine code that advances a part whose `BlockData` is in a cell of this type."""
     signature, function = (cell, types.int64), advance if trusted else advance_counted
     function.compile(signature)  # type: ignore[attr-defined]
     compiled: Any = function.overloads[signature]  # type: ignore[attr-defined]
@@ -130,22 +131,22 @@ def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
     """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
     if period == 1:
         return stamp & (rows.shape[0] - 1)
-    return 0 if period == KEPT else (stamp // period) & (rows.shape[0] - 1)
+    return 0 if period == LATCHED else (stamp // period) & (rows.shape[0] - 1)
 
 
 @leaf
-def _take(given: InputRows, tick: int) -> Received:
+def _take(given: InputRing, tick: int) -> InputSample:
     stamp = due(tick, given.period, given.delay)
-    return Received(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
+    return InputSample(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
 
 
 @leaf
-def _give(value: Any, taken: OutputRows, tick: int) -> None:
+def _give(value: Any, taken: OutputRing, tick: int) -> None:
     if due(tick, taken.period, 0) >= 0:
         store(value, taken.rows, row_of(tick, taken.period, taken.rows))
 
 
-def _take_all(inputs: tuple[InputRows, ...], tick: int) -> tuple[Received, ...]:
+def _take_all(inputs: tuple[InputRing, ...], tick: int) -> tuple[InputSample, ...]:
     raise NotImplementedError("compiled code only")
 
 
@@ -155,7 +156,7 @@ def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
     return define("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
-def _give_all(values: tuple, outputs: tuple[OutputRows, ...], tick: int) -> None:
+def _give_all(values: tuple, outputs: tuple[OutputRing, ...], tick: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
@@ -167,7 +168,7 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
 
 @uncounted
 def advance(memory: Any, tick: int) -> int:
-    """One step of the part whose `Core` is in the cell `memory`; its signal."""
+    """One step of the part whose `BlockData` is in the cell `memory`; its signal."""
     core = memory.value
     s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
@@ -205,7 +206,7 @@ class Schedule(NamedTuple):
     ended: np.ndarray  # (1,) int64: 1 once all vehicles have
 
 
-def schedule(codes: Sequence[Code | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
+def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
     """The schedule of these parts, with the vehicle of each; None stands for a part in Python, which looks first at
     tick 0."""
     names = list(dict.fromkeys(vehicles)) or [""]
@@ -234,21 +235,21 @@ def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]
             if plan.next[k] > tick:
                 continue
             if plan.function[k] == 0:
-                return tick, k, LOOK
+                return tick, k, WAKE_PYTHON
             plan.next[k] = tick + plan.every[k]
             signal = _invoke(plan.function[k], plan.memory[k], tick)
-            if signal != GO_ON:
-                if signal == FAILED:
-                    return tick, k, FAILED
-                if signal == END:
+            if signal != CONTINUE:
+                if signal == NON_FINITE:
+                    return tick, k, NON_FINITE
+                if signal == FINISHED:
                     plan.done[plan.vehicle[k]] = 1
                     plan.ended[0] = plan.done.min()
-                elif signal == LOOK:
+                elif signal == WAKE_PYTHON:
                     for j in range(k + 1, len(plan.function)):
                         if plan.function[j] == 0 and plan.vehicle[j] == plan.vehicle[k]:
                             plan.next[j] = tick
         first = 0
         tick += 1
         if plan.ended[0] == 1:
-            return tick, 0, END
-    return tick, 0, GO_ON
+            return tick, 0, FINISHED
+    return tick, 0, CONTINUE

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_block import END, FAILED, GO_ON, LOOK, Code, run, schedule
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON, BoundBlock, run, schedule
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 
@@ -25,7 +25,7 @@ def groups(parts: Sequence[Any]) -> list[list[int]]:
     return [[k for k, other in enumerate(vehicles) if other == vehicle] for vehicle in dict.fromkeys(vehicles)]
 
 
-class Turn:
+class ExecutionGroup:
     """Parts that step together.
 
     Attributes:
@@ -34,7 +34,7 @@ class Turn:
         over: whether they have said that the tick before was the last.
     """
 
-    def __init__(self, numbers: Sequence[int], parts: Sequence[Any], codes: Sequence[Code | None]):
+    def __init__(self, numbers: Sequence[int], parts: Sequence[Any], codes: Sequence[BoundBlock | None]):
         """Parts `numbers` of all parts of a graph, and their code, None of a part in Python."""
         self.parts, self.tick, self.over = list(numbers), 0, False
         own = [parts[k] for k in numbers]
@@ -54,14 +54,14 @@ class Turn:
         k = 0
         while not self.over:
             self.tick, k, signal = run(self._cell, self.tick, k, stop)
-            if signal == LOOK:
+            if signal == WAKE_PYTHON:
                 self._plan.next[k] = max(act(self.parts[k], self.tick), self.tick + 1)
                 k += 1
-            elif signal == FAILED:
+            elif signal == NON_FINITE:
                 raise failure(self.parts[k], self.tick)
             else:
-                self.over = signal == END
-                if signal == GO_ON:
+                self.over = signal == FINISHED
+                if signal == CONTINUE:
                     return
 
     def follow(self, stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]) -> None:
@@ -75,16 +75,17 @@ class Turn:
         """Let the present tick be the last."""
         self._plan.ended[0] = 1
 
-    def replace(self, part: int, code: Code) -> None:
+    def replace(self, part: int, code: BoundBlock) -> None:
         """Let other code step a part from now on."""
         k = self.parts.index(part)
         self._plan.function[k], self._plan.memory[k] = code.function, code.memory
 
 
 def advance_all(
-    turns: Sequence[Turn], stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]
+    turns: Sequence[ExecutionGroup], stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]
 ) -> tuple[int, bool, LockStepError | None]:
-    """Run all up to before the tick `stop`, or until the last of them is over; arguments as of `Turn.advance`.
+    """Run all up to before the tick `stop`, or until the last of them is over; arguments as of
+    `ExecutionGroup.advance`.
 
     Returns:
         The tick that all have come to, those that were over before the last one, too; whether the run is over; the

@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from lapwing.cosim.config.run_config import Each, ServiceSetup, Setup
-from lapwing.cosim.diagram.block_diagram import Graph, Service
-from lapwing.cosim.diagram.compiled_block import Code, Part
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.messages.topics import CLOCK, Topic, of_vehicle
 
 
@@ -29,7 +29,7 @@ def of_other(vehicle: str, name: str) -> str:
     return f"/{within(vehicle, name)}"
 
 
-def joined(members: Sequence[Setup], resolved: Mapping[str, Any]) -> Setup:
+def joined(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> RunConfig:
     """The set-up of a fleet.
 
     Args:
@@ -41,19 +41,19 @@ def joined(members: Sequence[Setup], resolved: Mapping[str, Any]) -> Setup:
         having = [member for member in members if name in member.services]
         shares = tuple(member.services[name] for member in having)
         pairs = [(member.vehicle, share) for member, share in zip(having, shares, strict=True)]
-        services[name] = ServiceSetup(
-            Each(tuple(member.vehicle for member in having), shares),
+        services[name] = ServiceConfig(
+            PerVehicle(tuple(member.vehicle for member in having), shares),
             tuple(_input(vehicle, i) for vehicle, share in pairs for i in share.inputs),
             tuple(_port(vehicle, port) for vehicle, share in pairs for port in share.ports),
         )
     beside = {}
     for name in dict.fromkeys(name for member in members for name in member.beside):
         having = [member for member in members if name in member.beside]
-        beside[name] = Each(tuple(m.vehicle for m in having), tuple(m.beside[name] for m in having))
+        beside[name] = PerVehicle(tuple(m.vehicle for m in having), tuple(m.beside[name] for m in having))
     return members[0]._replace(vehicle="", services=services, beside=beside, resolved=dict(resolved))
 
 
-def members(setup: Setup) -> tuple[Setup, ...]:
+def members(setup: RunConfig) -> tuple[RunConfig, ...]:
     """The set-up of each vehicle of a run, as if it flew alone; of a run of one vehicle that run itself."""
     if setup.vehicle:
         return (setup,)
@@ -69,23 +69,23 @@ def members(setup: Setup) -> tuple[Setup, ...]:
     )
 
 
-def member(setup: Setup, vehicle: str) -> Setup:
+def member(setup: RunConfig, vehicle: str) -> RunConfig:
     """The set-up of one of the vehicles, as if it flew alone."""
     return members(setup)[setup.vehicles.index(vehicle)]
 
 
-def _of(vehicle: str, each: Mapping[str, Each]) -> dict[str, Any]:
+def _of(vehicle: str, each: Mapping[str, PerVehicle]) -> dict[str, Any]:
     return {
         name: given.given[given.vehicles.index(vehicle)] for name, given in each.items() if vehicle in given.vehicles
     }
 
 
-def leading(setup: Setup, topic: Topic) -> Topic:
+def leading(setup: RunConfig, topic: Topic) -> Topic:
     """The topic of the vehicle that stands for all, where there is room for one."""
     return topic if setup.vehicle else of_vehicle(topic, setup.vehicles[0])
 
 
-def joined_service(name: str, services: Sequence[tuple[Setup, Service]]) -> Service:
+def joined_service(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
     """A service of a fleet, of those of its vehicles with the set-up of each."""
     whole = Service(name, [], [])
     parts, wires, spoken = [], [], []
@@ -116,7 +116,7 @@ class _Outbox(list[tuple[Topic, int, bytes]]):
         self._whole.messages.append((of_vehicle(topic, self._vehicle), tick, payload))
 
 
-def _input(vehicle: str, i: Input) -> Input:
+def _input(vehicle: str, i: InputPort) -> InputPort:
     return i._replace(port=within(vehicle, i.port))
 
 
@@ -124,10 +124,10 @@ def _port(vehicle: str, port: Port) -> Port:
     return port._replace(name=within(vehicle, port.name))
 
 
-def _part(member: Setup, part: Any) -> Any:
+def _part(member: RunConfig, part: Any) -> Any:
     vehicle = member.vehicle
-    if not isinstance(part, Part):
-        return MemberPart(member, part)
+    if not isinstance(part, Block):
+        return VehicleBlock(member, part)
     return replace(
         part,
         name=within(vehicle, part.name),
@@ -143,10 +143,10 @@ def _failure(vehicle: str, of_part: Callable[[int], Exception], tick: int) -> Ex
     return type(error)(f"{vehicle}: {error}")
 
 
-class MemberPart:
+class VehicleBlock:
     """A part of a vehicle that stays in Python."""
 
-    def __init__(self, member: Setup, part: Any):
+    def __init__(self, member: RunConfig, part: Any):
         """`member`: the set-up of the vehicle."""
         self._member, self._part = member, part
         self.vehicle = member.vehicle
@@ -154,42 +154,42 @@ class MemberPart:
         self.outputs = tuple(_port(self.vehicle, port) for port in part.outputs)
         self.inputs = tuple(_input(self.vehicle, i) for i in getattr(part, "inputs", ()))
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Get the vehicle's own part of the graph."""
-        self._part.bind(MemberGraph(graph, self._member))
+        self._part.bind(VehicleDiagram(graph, self._member))
 
     def act(self, tick: int) -> int:
         """Do what is to be done at `tick`."""
         return self._part.act(tick)
 
 
-class MemberGraph:
+class VehicleDiagram:
     """What a Python part of a vehicle sees of the graph of its fleet: the ports and parts of that vehicle, by the names
     that they have where it flies alone."""
 
-    def __init__(self, graph: Graph, member: Setup):
+    def __init__(self, graph: BlockDiagram, member: RunConfig):
         self._graph, self.setup = graph, member
 
-    def part(self, name: str) -> Part:
-        """As of `Graph`."""
+    def part(self, name: str) -> Block:
+        """As of `BlockDiagram`."""
         return self._graph.part(within(self.setup.vehicle, name))
 
-    def prepare(self, part: Part) -> Code:
-        """As of `Graph`."""
+    def prepare(self, part: Block) -> BoundBlock:
+        """As of `BlockDiagram`."""
         return self._graph.prepare(part)
 
-    def replace(self, part: Part, code: Code) -> None:
-        """As of `Graph`."""
+    def replace(self, part: Block, code: BoundBlock) -> None:
+        """As of `BlockDiagram`."""
         self._graph.replace(part, code)
 
     def has(self, port: str) -> bool:
-        """As of `Graph`."""
+        """As of `BlockDiagram`."""
         return self._graph.has(within(self.setup.vehicle, port))
 
     def latest(self, port: str, tick: int) -> Any:
-        """As of `Graph`."""
+        """As of `BlockDiagram`."""
         return self._graph.latest(within(self.setup.vehicle, port), tick)
 
     def put(self, port: str, tick: int, value: Any) -> None:
-        """As of `Graph`."""
+        """As of `BlockDiagram`."""
         self._graph.put(within(self.setup.vehicle, port), tick, value)

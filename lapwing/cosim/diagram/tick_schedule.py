@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import leaf
 
-KEPT = 0  # period of a port whose value is due at every tick, and stays until another is given
+LATCHED = 0  # period of a port whose value is due at every tick, and stays until another is given
 
 
 class Port(NamedTuple):
@@ -22,7 +22,7 @@ class Port(NamedTuple):
     period: int = 1  # [ticks]
 
 
-class Input(NamedTuple):
+class InputPort(NamedTuple):
     """A port that a part takes, `delay` ticks after it was stamped (at least 1 where it closes a loop)."""
 
     port: str
@@ -36,7 +36,7 @@ def due(tick: int, period: int, delay: int) -> int:
     return stamp if stamp >= 0 and (period <= 1 or stamp % period == 0) else -1
 
 
-def execution_order(needs: Mapping[str, Iterable[Input]], gives: Mapping[str, Iterable[str]]) -> list[str]:
+def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str, Iterable[str]]) -> list[str]:
     """An order in which, within one tick, everybody comes after those whose undelayed messages it needs.
 
     Args:

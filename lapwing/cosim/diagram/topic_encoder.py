@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.kernels.row_packing import columns
 from lapwing.messages.cdr_arrays import Record
@@ -21,7 +21,7 @@ Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a
 
 
 @dataclass(frozen=True)
-class Wire:
+class TopicEncoder:
     """How a topic is made of a port.
 
     Attributes:
@@ -41,7 +41,7 @@ class Wire:
     texts: Callable[[Any], Sequence[np.ndarray]] | None = None
 
 
-class Page(NamedTuple):
+class RecordBatch(NamedTuple):
     """Messages of one topic and of one shape."""
 
     topic: Topic
@@ -49,17 +49,19 @@ class Page(NamedTuple):
     payloads: np.ndarray  # (n,) records of the message
 
 
-def later(pages: Iterable[Page], first: int) -> list[Page]:
+def later(pages: Iterable[RecordBatch], first: int) -> list[RecordBatch]:
     """What pages hold of the ticks from `first` on."""
     found = []
     for page in pages:
         k = int(np.searchsorted(page.ticks, first))
         if k < len(page.ticks):
-            found.append(Page(page.topic, page.ticks[k:], page.payloads[k:]) if k else page)
+            found.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]) if k else page)
     return found
 
 
-def encode(wire: Wire, port: Port, setup: Setup, ticks: np.ndarray, rows: np.ndarray) -> Iterator[Page]:
+def encode(
+    wire: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
+) -> Iterator[RecordBatch]:
     """The messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
     tree = columns(port.like, rows)
     if wire.texts is None:
@@ -72,9 +74,9 @@ def encode(wire: Wire, port: Port, setup: Setup, ticks: np.ndarray, rows: np.nda
         yield _page(wire, wire.sample(*key.tolist()), part, ticks[chosen], setup)
 
 
-def _page(wire: Wire, sample: Any, tree: Any, ticks: np.ndarray, setup: Setup) -> Page:
+def _page(wire: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
     fields = wire.fields(tree, ticks * setup.interval_ns)
-    return Page(wire.topic, ticks, Record.of(sample).encode(len(ticks), fields))
+    return RecordBatch(wire.topic, ticks, Record.of(sample).encode(len(ticks), fields))
 
 
 def due_ticks(first: int, stop: int, period: int) -> np.ndarray:

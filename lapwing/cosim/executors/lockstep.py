@@ -4,19 +4,19 @@ import os
 import time
 from contextlib import suppress
 
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.executors import realtime
 from lapwing.cosim.executors.deadlines import Deadlines
-from lapwing.cosim.executors.log_backpressure import Backlog
-from lapwing.cosim.executors.participant import Process, Stopped
+from lapwing.cosim.executors.log_backpressure import LogBackpressure
+from lapwing.cosim.executors.participant import Participant, Stopped
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
-from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, Outlets, Source, sources
+from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, PacketReceiver, PacketSender, sources
 from lapwing.cosim.transport.packet_schedule import ticks_at_once
 
 
-def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: str) -> None:
+def run_lockstep(process: Participant, service: Service, owns_time: bool, recorder: str) -> None:
     """Step `service` from tick 0 to the last tick of the run.
 
     Args:
@@ -33,11 +33,11 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
         LockStepError: a message did not come, not the one that was due, or a state is not sound.
     """
     setup = process.setup
-    graph = Graph(setup, [service], 2 * PAGE)
+    graph = BlockDiagram(setup, [service], 2 * PAGE)
     graph.advance(0)  # nothing is stepped, but the loop over the parts is compiled before the clock begins
     givers = sources(process, graph)
-    outlets = Outlets(process, service, graph)
-    backlog = Backlog(process, recorder) if owns_time else None
+    outlets = PacketSender(process, service, graph)
+    backlog = LogBackpressure(process, recorder) if owns_time else None
     linger = process.linger_with(recorder) if process.restarts else None
     if backlog and process.restarts:
         backlog.resume(0)  # nobody may be left behind by more than what is held for him
@@ -86,7 +86,7 @@ def run_lockstep(process: Process, service: Service, owns_time: bool, recorder: 
         linger()
 
 
-def _leave(process: Process, outlets: Outlets, stop: int) -> None:
+def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
     """Hand over what is left of the ticks before `stop`, and wait until everybody has received it."""
     outlets.end(stop)
     process.confirm()
@@ -94,7 +94,12 @@ def _leave(process: Process, outlets: Outlets, stop: int) -> None:
 
 
 def _catch_up(
-    process: Process, graph: Graph, givers: list[Source], outlets: Outlets, backlog: Backlog | None, recorder: str
+    process: Participant,
+    graph: BlockDiagram,
+    givers: list[PacketReceiver],
+    outlets: PacketSender,
+    backlog: LogBackpressure | None,
+    recorder: str,
 ) -> None:
     """Step once more through what the service had been given before it was killed; errors as of `run_lockstep`."""
     assert process.journal
@@ -118,7 +123,7 @@ class _Rows:
     def __init__(self, service: str, ports: tuple[Port, ...]):
         self.name, self.outputs = service, ports
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Nothing to be known."""
 
     def act(self, tick: int) -> int:
@@ -126,7 +131,7 @@ class _Rows:
         return NEVER
 
 
-def run_encoder(process: Process, service: Service) -> None:
+def run_encoder(process: Participant, service: Service) -> None:
     """Make the messages of a service that is somebody else's program, and gives rows only.
 
     Args:
@@ -139,9 +144,9 @@ def run_encoder(process: Process, service: Service) -> None:
     """
     ports = process.setup.services[service.name].ports
     elsewhere = Service(service.name, [_Rows(service.name, ports)], service.wires)
-    graph = Graph(process.setup, [elsewhere], 2 * PAGE)
-    giver = Source(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
-    outlets = Outlets(process, elsewhere, graph, hands_over=False)
+    graph = BlockDiagram(process.setup, [elsewhere], 2 * PAGE)
+    giver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
+    outlets = PacketSender(process, elsewhere, graph, hands_over=False)
     process.join()
     outlets.look()
     try:

@@ -2,7 +2,7 @@
 
 import struct
 
-from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import RECORDED_KEY
 
@@ -12,7 +12,7 @@ LOOK = 256  # ticks between two looks
 _PROGRESS = struct.Struct("<q?")  # tick before which all is recorded, whether the disk is waited for
 
 
-class Teller:
+class LogProgressPublisher:
     """Publishes, for the recorder of a run, how far its log is."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str, name: str):
@@ -35,14 +35,14 @@ class Teller:
 
 
 def waits_for_disk(payload: bytes) -> bool:
-    """Whether the recorder waits for the disk, by a payload that a `Teller` has published."""
+    """Whether the recorder waits for the disk, by a payload that a `LogProgressPublisher` has published."""
     return bool(payload) and _PROGRESS.unpack(payload)[1]
 
 
-class Backlog:
+class LogBackpressure:
     """Holds the run while it is too far ahead of a log; a run that nobody records is never held."""
 
-    def __init__(self, process: Process, recorder: str):
+    def __init__(self, process: Participant, recorder: str):
         """Listen to the recorder of the run that `process` owns the time of."""
         self._process = process
         self._get = process.bus.receive(process.participants.senders(RECORDED_KEY, [recorder])).get

@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from typing import TypeVar
 
 from lapwing.cosim.access.private_sockets import remove
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.run_config_message import pack, unpack
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.run_errors import LockStepError
@@ -49,15 +49,15 @@ class Stopped(Exception):
     """The process was asked to end."""
 
 
-class Process:
+class Participant:
     """A participant of a run: its bus, its set-up, and whether it was asked to stop."""
 
     def __init__(
         self,
         name: str,
-        setup: Setup,
+        setup: RunConfig,
         bus: ZenohBus,
-        participants: Participants,
+        participants: PublisherIds,
         others: list[str],
         speed: float | None = None,
         core: int | None = None,

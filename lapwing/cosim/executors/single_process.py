@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.log.log_sequencer import Recording
 
 PAGE = 1000  # ticks
@@ -12,10 +12,10 @@ LOOK = 0.2  # [s] of wall time between two looks at the run
 
 
 def run_single(
-    graph: Graph,
+    graph: BlockDiagram,
     recording: Recording | None,
     speed: float | None = None,
-    observe: Callable[[Graph], bool] = lambda graph: False,
+    observe: Callable[[BlockDiagram], bool] = lambda graph: False,
     last: int | None = None,
 ) -> None:
     """Fly a scene to its end.

@@ -13,7 +13,7 @@ from lapwing.cosim.log.mcap_contents import Contents
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
-from lapwing.messages.topic_columns import Gathered, History
+from lapwing.messages.topic_columns import ColumnBuilder, TopicColumns
 from lapwing.messages.type_compatibility import otherwise
 
 _FOREVER = 1 << 64
@@ -120,7 +120,7 @@ class LogReader:
                 yield *labels[channel], time_ns, payload
             del waiting[:ready]
 
-    def history(self, topic: str) -> tuple[np.ndarray, History]:
+    def history(self, topic: str) -> tuple[np.ndarray, TopicColumns]:
         """A whole topic as columns.
 
         Returns:
@@ -132,7 +132,7 @@ class LogReader:
         """
         return self.histories([topic])[topic]
 
-    def histories(self, topics: Iterable[str] | None = None) -> dict[str, tuple[np.ndarray, History]]:
+    def histories(self, topics: Iterable[str] | None = None) -> dict[str, tuple[np.ndarray, TopicColumns]]:
         """The same of several topics (None: all), reading the file only once.
 
         Raises:
@@ -141,7 +141,7 @@ class LogReader:
         labels = self._labels(topics)
         self.check_versions(topics)
         classes = {topic: message_class(type_name) for topic, type_name in labels.values()}
-        gathered = {topic: Gathered(message) for topic, message in classes.items()}
+        gathered = {topic: ColumnBuilder(message) for topic, message in classes.items()}
         for topic, _, time_ns, payload in self.messages(list(classes)):
             gathered[topic].add(time_ns, payload)
         return {topic: messages.history() for topic, messages in gathered.items()}

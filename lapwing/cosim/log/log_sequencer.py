@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.log import LogWriter
 from lapwing.messages import WallTime, header
 from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, place
@@ -19,7 +19,7 @@ FLUSH_PERIOD = (
 SPARED = 10.0  # times as long as bringing it there has taken, where that is longer: a chunk's beginning is written anew
 
 
-def chunk(setup: Setup) -> int:
+def chunk(setup: RunConfig) -> int:
     """Ticks of a chunk: chunks begin at multiples of it, so that a run gives the same file whenever its pages come."""
     return max(SHORTEST, CHUNK // len(setup.vehicles))
 
@@ -27,20 +27,20 @@ def chunk(setup: Setup) -> int:
 class Recording:
     """Writes pages, and with every chunk the wall time. Call `finish` after the last page."""
 
-    def __init__(self, writer: LogWriter, setup: Setup):
+    def __init__(self, writer: LogWriter, setup: RunConfig):
         """Into `writer`, the messages of the run `setup`."""
         self._writer, self._setup = writer, setup
         self._started = time.monotonic()
         self._flushed = self._started
         self._tail_took = 0.0  # [s] of this thread for the newest tail
-        self._waiting: list[Page] = []  # of the chunk that is not yet complete
+        self._waiting: list[RecordBatch] = []  # of the chunk that is not yet complete
         self._chunk = chunk(setup)
         self._cut = self._chunk  # the tick at which it ends
         self.newest: dict[Topic, bytes] = {}
         self.time_ns = 0
         self._write_wall_time(0)
 
-    def write(self, pages: Iterable[Page], last: int) -> None:
+    def write(self, pages: Iterable[RecordBatch], last: int) -> None:
         """Write all messages of some ticks, up to the tick `last`."""
         for page in pages:
             self._waiting.append(page)
@@ -64,9 +64,9 @@ class Recording:
         for page in self._waiting:
             k = int(np.searchsorted(page.ticks, self._cut))
             if k > 0:
-                complete.append(Page(page.topic, page.ticks[:k], page.payloads[:k]))
+                complete.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
             if k < len(page.ticks):
-                left.append(Page(page.topic, page.ticks[k:], page.payloads[k:]))
+                left.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
         if complete:
             self._writer.write_page(self._parts(complete))
             self._flushed = time.monotonic()
@@ -74,7 +74,7 @@ class Recording:
         self._waiting = left
         self._cut += self._chunk
 
-    def _parts(self, pages: list[Page]) -> list[tuple]:
+    def _parts(self, pages: list[RecordBatch]) -> list[tuple]:
         interval, vehicles = self._setup.interval_ns, self._setup.vehicles
         parts = []
         for page in sorted(pages, key=lambda page: place(page.topic)):  # whoever's pages come first

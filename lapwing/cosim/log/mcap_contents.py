@@ -33,7 +33,7 @@ ROS2 = "ros2msg"  # encoding of schemas
 LARGEST = 1 << 28  # [bytes] of a chunk; those of the usual writers have some millions
 
 
-class ChunkPlace(NamedTuple):
+class ChunkInfo(NamedTuple):
     """Where a chunk is, the times of its first and last message, and whose messages it holds."""
 
     offset: int  # [bytes]
@@ -69,7 +69,7 @@ class Contents:
         self.schemas: dict[int, str] = {}
         self.definitions: dict[int, str] = {}
         self.channels: dict[int, records.Channel] = {}
-        self.chunks: list[ChunkPlace] = []
+        self.chunks: list[ChunkInfo] = []
         self.complete = False
         self.damaged: tuple[str, ...] = ()
         self._path, self._file = path, file
@@ -128,7 +128,7 @@ class Contents:
                 break
             if opcode == Opcode.CHUNK:
                 start_ns, end_ns = _TIMES.unpack(file.read(_TIMES.size))
-                self.chunks.append(ChunkPlace(offset, start_ns, end_ns, set()))
+                self.chunks.append(ChunkInfo(offset, start_ns, end_ns, set()))
             elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
                 self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
             elif opcode == Opcode.MESSAGE:

@@ -9,7 +9,7 @@ from lapwing.cosim.log.log_writer import LogWriter
 RECOVERED = "recovered"  # key in the metadata: from which file, and what it lacked
 
 
-class Recovered(NamedTuple):
+class RecoveryResult(NamedTuple):
     """What `recover` has saved of a damaged log."""
 
     messages: int
@@ -18,7 +18,7 @@ class Recovered(NamedTuple):
     digest: str  # of what was found
 
 
-def recover(path: Path, out: Path) -> Recovered:
+def recover(path: Path, out: Path) -> RecoveryResult:
     """Write all whole chunks of a log into a new one, in their order, with index, digest and end.
 
     Raises:
@@ -39,4 +39,4 @@ def recover(path: Path, out: Path) -> Recovered:
         except ValueError:
             out.unlink(missing_ok=True)
             raise
-        return Recovered(count, end_ns, log.damaged, writer.metadata["digest"])
+        return RecoveryResult(count, end_ns, log.damaged, writer.metadata["digest"])

@@ -9,19 +9,19 @@ from types import MappingProxyType
 from typing import IO
 
 from lapwing.cosim.access.private_sockets import private_endpoints
-from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, dismiss, start
 from lapwing.cosim.processes.cpu_starvation import Starvation, waited
 from lapwing.cosim.processes.forked_process import Forked
 from lapwing.cosim.processes.restart_policy import Restarts
-from lapwing.cosim.processes.run_monitor import LONGEST, STALL, WATCHER, Watch
+from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, STALL, RunMonitor
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY
 
-GRACE = 1.5  # [s] a process gets to end after SIGTERM
-LAST_NEWS = 0.05  # [s] for what the processes said at their end
-FAREWELL = 10.0  # [s] the processes get to end by themselves after the last tick, or the last news after it
+TERM_TIMEOUT = 1.5  # [s] a process gets to end after SIGTERM
+FINAL_POLL_TIME = 0.05  # [s] for what the processes said at their end
+SHUTDOWN_TIMEOUT = 10.0  # [s] the processes get to end by themselves after the last tick, or the last news after it
 BRIEF = 0.005  # [s] between two looks at whether all have ended
 REFUSED = 2  # exit code of a service whose user can mend what is wrong
 
@@ -29,8 +29,8 @@ REFUSED = 2  # exit code of a service whose user can mend what is wrong
 def launch(
     names: list[str],
     give: Callable[[str, dict[str, str], IO[bytes]], None],
-    participants: Participants,
-    observe: Callable[[Watch], bool],
+    participants: PublisherIds,
+    observe: Callable[[RunMonitor], bool],
     beside: Iterable[str] = (),
     external: Mapping[str, str] = MappingProxyType({}),
     restarts: Restarts | None = None,
@@ -59,7 +59,7 @@ def launch(
     children: dict[str, subprocess.Popen | Forked] = {}
     restarts = restarts or Restarts({}, lambda line: None)
     errors: dict[str, IO[bytes]] = {}
-    with private_endpoints([WATCHER, *everybody]) as own, ExitStack() as stack:
+    with private_endpoints([MONITOR, *everybody]) as own, ExitStack() as stack:
         stack.callback(_close, children, errors)
         endpoints = {**external, **own}
 
@@ -75,17 +75,17 @@ def launch(
                 with suppress(BrokenPipeError):  # it has ended already, and has said why
                     give(name, endpoints, stream)
 
-        listen, connect = mesh(WATCHER, endpoints)
-        with ZenohBus(listen, connect, mark=participants.mark(WATCHER), awaits=False) as bus:
+        listen, connect = mesh(MONITOR, endpoints)
+        with ZenohBus(listen, connect, mark=participants.mark(MONITOR), awaits=False) as bus:
             try:
-                watch = Watch(bus, participants, [*names, *beside, *external], services=services)
-                bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{WATCHER}")  # they wait for it
+                watch = RunMonitor(bus, participants, [*names, *beside, *external], services=services)
+                bus.declare_alive(f"{participants.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # they wait for it
                 ready = [name for name in everybody if name in (started or ())]
                 begin(ready)
                 begin([name for name in everybody if name not in ready])
                 dismiss(started or {})
                 _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
-                _await({name: children[name] for name in beside if name in watch.confirmed}, FAREWELL)
+                _await({name: children[name] for name in beside if name in watch.confirmed}, SHUTDOWN_TIMEOUT)
             finally:
                 early = {
                     name: code for name in beside if name in children and (code := children[name].poll()) is not None
@@ -102,11 +102,11 @@ def _close(children: dict[str, subprocess.Popen | Forked], errors: dict[str, IO[
 
 
 def _follow(
-    watch: Watch,
+    watch: RunMonitor,
     everybody: dict,
     needed: set[str],
     external: set[str],
-    observe: Callable[[Watch], bool],
+    observe: Callable[[RunMonitor], bool],
     errors: dict[str, IO[bytes]],
     restarts: Restarts,
     begin: Callable[[list[str]], None],
@@ -116,7 +116,7 @@ def _follow(
     starvation = Starvation()
     while any(everybody[name].poll() is None for name in needed - external):
         children = {name: child for name, child in everybody.items() if name in needed}
-        watch.poll(LAST_NEWS if watch.ended else 0.2)
+        watch.poll(FINAL_POLL_TIME if watch.ended else 0.2)
         for name, child in everybody.items():
             if child.poll() == REFUSED:
                 raise ValueError(f"{name}{_last_words(errors[name])}")
@@ -156,13 +156,13 @@ def _follow(
             if time.monotonic() - ended_at > STALL:
                 _let_go(everybody, needed)  # a session cannot close while a frozen one has not heard all
             silence = time.monotonic() - max(ended_at, watch.last_news)
-            if silence > LONGEST or silence - starvation.of(children) > FAREWELL:
+            if silence > LONGEST or silence - starvation.of(children) > SHUTDOWN_TIMEOUT:
                 if early := watch.broken_off():  # the first fault is told
                     raise RunFailed(early)
                 left = [name for name, child in children.items() if child.poll() is None]
                 silent = [name for name in left if name not in watch.confirmed] or left
-                raise RunFailed(f"{', '.join(silent)}: did not end within {FAREWELL:g} s of the last news")
-    watch.poll(LAST_NEWS)
+                raise RunFailed(f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last news")
+    watch.poll(FINAL_POLL_TIME)
     observe(watch)
     if early := watch.broken_off():
         raise RunFailed(early)
@@ -194,19 +194,19 @@ def _let_go(everybody: dict, needed: set[str]) -> bool:
     return bool(beside)
 
 
-def _grace(watch: Watch) -> bool:
+def _grace(watch: RunMonitor) -> bool:
     """Whether the news of the end arrives now, just after a process that knew of it has ended."""
     watch.poll(0.5)
     return watch.ended
 
 
-def _diverges(watch: Watch) -> bool:
+def _diverges(watch: RunMonitor) -> bool:
     """Whether the news arrives now that a state is no longer sound."""
     watch.poll(0.5)
     return watch.diverged
 
 
-def _at(watch: Watch) -> str:
+def _at(watch: RunMonitor) -> str:
     return f"at t = {watch.time_ns * 1e-9:.3f} s"
 
 
@@ -248,7 +248,7 @@ def _await(children: Mapping[str, subprocess.Popen | Forked], seconds: float) ->
 def _end(children: dict[str, subprocess.Popen | Forked]) -> None:
     """End what still runs: first asked, then forced."""
     _ask_to_end(children)
-    _await(children, GRACE)
+    _await(children, TERM_TIMEOUT)
     for child in children.values():
         if child.poll() is None:
             child.kill()

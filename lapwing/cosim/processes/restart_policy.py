@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Callable, Iterable, Mapping
 
 from lapwing.cosim.processes.forked_process import Forked
-from lapwing.cosim.processes.run_monitor import STALL, WATCHER, Watch
+from lapwing.cosim.processes.run_monitor import MONITOR, STALL, RunMonitor
 from lapwing.cosim.transport.bus_keys import RESTARTED_KEY
 
 MOST = 3  # of one service in a run: what is killed again and again has a reason that a restart does not mend
@@ -45,7 +45,7 @@ class Restarts:
         child.kill()
         child.wait()
 
-    def begin(self, name: str, code: int, watch: Watch) -> bool:
+    def begin(self, name: str, code: int, watch: RunMonitor) -> bool:
         """Whether a service that has ended with this code is to be started again; tells everybody if it is."""
         if code >= 0 or watch.diverged or not self.may([name]):
             return False
@@ -53,7 +53,7 @@ class Restarts:
         reason, time = self._reasons.pop(name, f"killed (signal {-code})"), watch.time_ns * 1e-9
         self._say(f"{name} was {reason} at t = {time:.3f} s, and is started again")
         self._told.append((time, f"{name} was {reason}, and is started again"))
-        watch.publish(f"{RESTARTED_KEY}/{WATCHER}", watch.time_ns, json.dumps(self._told).encode())
+        watch.publish(f"{RESTARTED_KEY}/{MONITOR}", watch.time_ns, json.dumps(self._told).encode())
         watch.forget(name)
         self.begun.add(name)
         return True

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable, Iterable
 
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.diagram.topic_encoder import Page, later
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, later
 from lapwing.cosim.executors.log_backpressure import waits_for_disk
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
@@ -24,17 +24,17 @@ from lapwing.messages.topics import Topic
 
 STALL = 2.5  # [s] without any message after which somebody is held to be frozen
 LONGEST = 60.0  # [s] the same where processes wait for a processor
-WATCHER = "mission"  # whoever watches, among the participants
+MONITOR = "mission"  # whoever watches, among the participants
 HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
 
 
-class Watch:
+class RunMonitor:
     """What a launcher sees of a run: who is there, how far it is, what it waits for."""
 
     def __init__(
         self,
         bus: ZenohBus,
-        participants: Participants,
+        participants: PublisherIds,
         names: Iterable[str],
         patience: float = STALL,
         services: Iterable[str] = (),
@@ -54,7 +54,7 @@ class Watch:
         self._patience = patience
         self._bus, self._key_prefix, names = bus, participants.key_prefix, list(names)
         self.newest: dict[Topic, bytes] = {}
-        self.listen: Callable[[list[Page]], None] | None = None  # is given all messages
+        self.listen: Callable[[list[RecordBatch]], None] | None = None  # is given all messages
         self.waiting: dict[str, str] = {}
         self.compiling = False  # somebody compiles kernels
         self.diverged = False  # a state is no longer sound: the run ends, and its log says why
@@ -146,7 +146,7 @@ class Watch:
 
     def _declare(self, key: str) -> None:
         """Confirm last messages, to whoever waits for that before it leaves."""
-        self._bus.declare_alive(f"{self._key_prefix}/{key}/{WATCHER}")
+        self._bus.declare_alive(f"{self._key_prefix}/{key}/{MONITOR}")
 
     def forget(self, name: str) -> None:
         """A participant is being started again: it is not there until it says so."""

@@ -6,8 +6,8 @@ from os.path import isfile  # false, and no error, of a name that no file can ha
 from pathlib import Path
 from typing import Any
 
-from lapwing.cosim.scene.scene_error import SceneError, Source
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
+from lapwing.dynamics.config_error import ConfigError
 
 
 class Files:
@@ -34,7 +34,7 @@ class Files:
         """
         if name.endswith(".toml"):
             if not isfile(self.folder / name):
-                raise KeyedError(
+                raise ConfigError(
                     key, f"no file {self.folder / name}", "the path of a .toml file beside the scene, or a name"
                 )
             return self.folder / name
@@ -43,8 +43,8 @@ class Files:
             if isfile(place / f"{name}.toml"):
                 return place / f"{name}.toml"
         choices = {path.stem for place in places for path in place.glob("*.toml")}
-        error = KeyedError.unknown(key, what, name, choices)
-        raise KeyedError(key, error.message, f"{error.expected}, or the path of a .toml file")
+        error = ConfigError.unknown(key, what, name, choices)
+        raise ConfigError(key, error.message, f"{error.expected}, or the path of a .toml file")
 
     def text(self, key: str, named_by: str, path: Path) -> str:
         """The text of a file.
@@ -61,9 +61,9 @@ class Files:
             content = path.read_bytes()
             text = content.decode("utf-8")
         except OSError as error:
-            raise KeyedError(named_by, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+            raise ConfigError(named_by, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
         except UnicodeDecodeError:
-            raise KeyedError(named_by, f"{path}: not a UTF-8 text file") from None
+            raise ConfigError(named_by, f"{path}: not a UTF-8 text file") from None
         self.sources[f"{key}{path.suffix}"] = content
         self.read_from[key], self.texts[key] = path, text
         return text
@@ -78,9 +78,9 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     try:
         return copied(_tables(text))
     except tomllib.TOMLDecodeError as error:
-        raise SceneError("", f"not valid TOML: {error}", source=Source(path)) from None
+        raise SceneError("", f"not valid TOML: {error}", source=KeyOrigin(path)) from None
     except RecursionError:
-        raise SceneError("", "not valid TOML: nested too deeply", source=Source(path)) from None
+        raise SceneError("", "not valid TOML: nested too deeply", source=KeyOrigin(path)) from None
 
 
 @lru_cache(maxsize=64)

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lapwing.cosim.scene.files import Files
-from lapwing.cosim.scene.scene_error import Source
+from lapwing.cosim.scene.scene_error import KeyOrigin
 
 
-def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: Files) -> Source:
+def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: Files) -> KeyOrigin:
     """Who gave a key its value: the one who wrote most of its path.
 
     Args:
@@ -23,15 +23,15 @@ def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: 
     content = max(around, key=len, default="")  # the key under which a file's content holds this one
     above = [k for k in overrides if f"{key}.".startswith(f"{k}.") and len(k) > len(content)]
     if above:
-        return Source(override=max(above, key=len))
+        return KeyOrigin(override=max(above, key=len))
     below = [k for k in overrides if k.startswith(f"{key}.")]
     if below:
-        return Source(override=below[0])
+        return KeyOrigin(override=below[0])
     line, matched = line_of(text, key)
     if content and matched <= len(content):
         inside, _ = line_of(files.texts[content], key[len(content) + 1 :])
-        return Source(files.read_from[content], inside)
-    return Source(path, line)
+        return KeyOrigin(files.read_from[content], inside)
+    return KeyOrigin(path, line)
 
 
 def line_of(text: str, key: str) -> tuple[int | None, int]:

@@ -12,9 +12,9 @@ from lapwing.cosim.scene import vehicle_scenes
 from lapwing.cosim.scene.files import Files, copied, parse_toml
 from lapwing.cosim.scene.key_origin import line_of, source_of
 from lapwing.cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
-from lapwing.cosim.scene.scene import Scene, Section, Vocabulary
-from lapwing.cosim.scene.scene_error import SceneError, Source
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
+from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 
 SCENE_FILE = "scene.toml"  # the scene's own text among its sources
@@ -67,12 +67,12 @@ def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary)
     return _scene(path, tree, given, vocabulary, files, locate)
 
 
-def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
     """The key and where it was said."""
     return key, source_of(key, path, text, keys, files)
 
 
-def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, Source]:
+def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
     """`_locate` of a key of one of several vehicles, which may be its own or common to all."""
     full = vehicle_scenes.own_key(key, vehicle)
     said = line_of(text, full)[1] > len(f"{vehicle_scenes.VEHICLE}.{vehicle}.")
@@ -100,7 +100,7 @@ def _scene(
     given: list[Override],
     vocabulary: Vocabulary,
     files: Files,
-    locate: Callable[[str], tuple[str, Source]],
+    locate: Callable[[str], tuple[str, KeyOrigin]],
 ) -> Scene:
     with Scene(path, {}, vocabulary, files.sources, tuple(given), locate).located():
         _resolve(tree, given, vocabulary, files)
@@ -134,7 +134,7 @@ def _find(scene: str | Path, shipped: Path) -> Path:
         return path
     if not (shipped / f"{path}.toml").is_file():
         choices = [p.stem for p in shipped.glob("*.toml")]
-        error = KeyedError.unknown("", "scene", str(path), choices)
+        error = ConfigError.unknown("", "scene", str(path), choices)
         raise SceneError("", error.message, f"{error.expected}, or the path of a .toml file")
     return shipped / f"{path}.toml"
 
@@ -143,14 +143,14 @@ def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except IsADirectoryError:
-        raise SceneError("", "is a folder", "a scene file (TOML)", Source(path)) from None
+        raise SceneError("", "is a folder", "a scene file (TOML)", KeyOrigin(path)) from None
     except UnicodeDecodeError:
-        raise SceneError("", "not valid TOML: not a UTF-8 text file", source=Source(path)) from None
+        raise SceneError("", "not valid TOML: not a UTF-8 text file", source=KeyOrigin(path)) from None
     except OSError as error:
         near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
         hint = f"did you mean {path.parent / near[0]}?" if near else "`lapwing scenes` lists those there are"
         message = (error.strerror or "cannot be read").lower()
-        raise SceneError("", f"{message}; {hint}", source=Source(path)) from None
+        raise SceneError("", f"{message}; {hint}", source=KeyOrigin(path)) from None
 
 
 def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary, files: Files) -> None:
@@ -168,19 +168,19 @@ def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary
         apply(tree, override)
 
 
-def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[Section], Section]:
+def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[SceneTable], SceneTable]:
     """Every table, validated by itself."""
     known = vocabulary.sections
     for name in tree:
         if name not in known:
-            raise KeyedError.unknown(name, "table", name, known)
-    tables: dict[type[Section], Section] = {}
+            raise ConfigError.unknown(name, "table", name, known)
+    tables: dict[type[SceneTable], SceneTable] = {}
     for name, section in known.items():
         if section.OPTIONAL and name not in tree:
             continue
         raw = tree.get(name, {})
         if not isinstance(raw, dict):
-            raise KeyedError(name, f"got {raw!r}", f"a table [{name}]")
+            raise ConfigError(name, f"got {raw!r}", f"a table [{name}]")
         try:
             tables[section] = section.model_validate(copied(raw))
         except ValidationError as error:
@@ -188,7 +188,7 @@ def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[Sectio
     return tables
 
 
-def _check(scene: Scene, tables: Mapping[type[Section], Section], vocabulary: Vocabulary) -> None:
+def _check(scene: Scene, tables: Mapping[type[SceneTable], SceneTable], vocabulary: Vocabulary) -> None:
     for check in vocabulary.checks:
         check(scene)
     for table in tables.values():

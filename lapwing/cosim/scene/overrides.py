@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from lapwing.cosim.scene.scene_error import SceneError, Source
+from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 
 Overrides = Iterable[str] | Mapping[str, Any]
 """KEY=VALUE with a TOML value each (a bare word counts as a text), or values by dotted key."""
@@ -35,11 +35,11 @@ def _parsed(text: str) -> Override:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key or not value:
         expected = "KEY=VALUE, for example solver.step=0.001"
-        raise SceneError(key, f"got {text}", expected, Source(override=text))
+        raise SceneError(key, f"got {text}", expected, KeyOrigin(override=text))
     try:
         return Override(key, value_of(value), text)
     except ValueError as error:
-        raise SceneError(key, str(error), source=Source(override=text)) from None
+        raise SceneError(key, str(error), source=KeyOrigin(override=text)) from None
 
 
 def value_of(text: str) -> Any:
@@ -91,11 +91,11 @@ def apply(tree: dict[str, Any], override: Override) -> None:
         at[last] = value
     else:
         message = f"{'.'.join(parents)} is a value, not a table"
-        raise SceneError(override.key, message, source=Source(override=override.text))
+        raise SceneError(override.key, message, source=KeyOrigin(override=override.text))
 
 
 def _index(items: list, text: str, override: Override) -> int:
     if not text.isdigit() or int(text) >= len(items):
         expected = f"an index from 0 to {len(items) - 1}"
-        raise SceneError(override.key, f"got {text}", expected, Source(override=override.text))
+        raise SceneError(override.key, f"got {text}", expected, KeyOrigin(override=override.text))
     return int(text)

@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict
 
 from lapwing.cosim.scene.files import Files
 from lapwing.cosim.scene.overrides import Override
-from lapwing.cosim.scene.scene_error import SceneError, Source
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
+from lapwing.dynamics.config_error import ConfigError
 
 
-class Section(BaseModel):
+class SceneTable(BaseModel):
     """A table of the scene. Subclasses say `TABLE`, the table's name.
 
     Strict: TOML has types, so a number in quotes or `true` for 1.0 is a slip of the pen.
@@ -62,18 +62,18 @@ class Section(BaseModel):
 class Vocabulary(NamedTuple):
     """What a scene may say: its tables by name, and checks beyond those of single tables."""
 
-    sections: Mapping[str, type[Section]]
+    sections: Mapping[str, type[SceneTable]]
     checks: tuple[Callable[["Scene"], None], ...] = ()
 
     @classmethod
     def of(cls, modules: Iterable[ModuleType], *checks: Callable[["Scene"], None]) -> "Vocabulary":
         """The tables that some modules declare or import."""
         found = [value for module in modules for value in vars(module).values()]
-        sections = [v for v in found if isinstance(v, type) and issubclass(v, Section) and hasattr(v, "TABLE")]
+        sections = [v for v in found if isinstance(v, type) and issubclass(v, SceneTable) and hasattr(v, "TABLE")]
         return cls({section.TABLE: section for section in sections}, checks)
 
 
-S = TypeVar("S", bound=Section)
+S = TypeVar("S", bound=SceneTable)
 T = TypeVar("T")
 
 
@@ -81,7 +81,7 @@ class _Found(NamedTuple):
     """What a function has found in a scene, and the tables that it has asked for."""
 
     value: Any
-    read: set[type[Section] | None]
+    read: set[type[SceneTable] | None]
 
 
 class Scene:
@@ -90,11 +90,11 @@ class Scene:
     def __init__(
         self,
         path: Path,
-        tables: Mapping[type[Section], Section],
+        tables: Mapping[type[SceneTable], SceneTable],
         vocabulary: Vocabulary,
         sources: Mapping[str, bytes] | None = None,
         given: tuple[Override, ...] | None = None,
-        locate: Callable[[str], tuple[str, Source]] | None = None,
+        locate: Callable[[str], tuple[str, KeyOrigin]] | None = None,
         vehicles: Sequence["Scene"] = (),
     ):
         self.path = path  # where it was read from
@@ -105,7 +105,7 @@ class Scene:
         self._tables = dict(tables)
         self._vocabulary = vocabulary
         self._found: dict[Callable[[Scene], Any], _Found] = {}
-        self._reading: list[set[type[Section] | None]] = []  # the tables that functions under way have asked for
+        self._reading: list[set[type[SceneTable] | None]] = []  # the tables that functions under way have asked for
 
     def once(self, of: Callable[["Scene"], T]) -> T:
         """What a function finds in the scene, which never changes: called once, and remembered.
@@ -127,13 +127,13 @@ class Scene:
     def __getitem__(self, section: type[S]) -> S:
         return self._known(section)._tables[section]  # type: ignore[return-value]
 
-    def _known(self, section: type[Section] | None) -> "Scene":
+    def _known(self, section: type[SceneTable] | None) -> "Scene":
         """This scene; SceneError where that is one of several vehicles, who each have such a table of their own."""
         if self._reading:
             self._reading[-1].add(section)
         if self.vehicles and section is not None and not section.SHARED:
             expected = "a scene of one vehicle, which is all that can be used here"
-            raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, Source(self.path))
+            raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, KeyOrigin(self.path))
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -145,12 +145,12 @@ class Scene:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def has(self, section: type[Section] | str) -> bool:
+    def has(self, section: type[SceneTable] | str) -> bool:
         """Whether there is this table, by its class or name: always, unless it is optional."""
         known = self._vocabulary.sections.get(section) if isinstance(section, str) else section
         return known in self._known(known)._tables
 
-    def replaced(self, section: Section) -> "Scene":
+    def replaced(self, section: SceneTable) -> "Scene":
         """The same scene with this table in the place of its own; not checked against the others."""
         tables = {**self._tables, type(section): section}
         vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
@@ -165,8 +165,8 @@ class Scene:
             yield
         except SceneError:
             raise
-        except KeyedError as error:
-            key, source = self._locate(error.key) if self._locate else (error.key, Source(self.path))
+        except ConfigError as error:
+            key, source = self._locate(error.key) if self._locate else (error.key, KeyOrigin(self.path))
             raise SceneError(key, error.message, error.expected, source) from error.__cause__
 
     def __repr__(self) -> str:

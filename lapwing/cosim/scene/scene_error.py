@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 
-class Source(NamedTuple):
+class KeyOrigin(NamedTuple):
     """Who gave a key its value: a line of a file, or an override."""
 
     path: Path | None = None
@@ -20,13 +20,13 @@ class Source(NamedTuple):
         return f"{self.path or ''}{f':{self.line}' if self.line else ''}"
 
 
-NOWHERE = Source()
+NOWHERE = KeyOrigin()
 
 
-class SceneError(KeyedError):
+class SceneError(ConfigError):
     """A scene that cannot be flown; `str` is one line for the user."""
 
-    def __init__(self, key: str, message: str, expected: str = "", source: Source = NOWHERE):
+    def __init__(self, key: str, message: str, expected: str = "", source: KeyOrigin = NOWHERE):
         super().__init__(key, message, expected)
         self.args = (key, message, expected, source)
         self.source = source

@@ -9,9 +9,9 @@ from typing import Any
 
 from lapwing.cosim.scene.files import copied, laid_over
 from lapwing.cosim.scene.overrides import Override
-from lapwing.cosim.scene.scene import Scene, Section, Vocabulary
-from lapwing.cosim.scene.scene_error import SceneError, Source
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
+from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
+from lapwing.dynamics.config_error import ConfigError
 
 VEHICLE = "vehicle"
 MOST = 50  # vehicles
@@ -27,10 +27,10 @@ def count(tree: Mapping[str, Any]) -> int:
     if not isinstance(entries, list):
         return 0
     if not 1 <= len(entries) <= MOST:
-        raise KeyedError(VEHICLE, f"{len(entries)} vehicles", f"1 to {MOST}")
+        raise ConfigError(VEHICLE, f"{len(entries)} vehicles", f"1 to {MOST}")
     for i, entry in enumerate(entries):
         if not isinstance(entry, dict):
-            raise KeyedError(f"{VEHICLE}.{i}", f"got {entry!r}", f"a table [[{VEHICLE}]]")
+            raise ConfigError(f"{VEHICLE}.{i}", f"got {entry!r}", f"a table [[{VEHICLE}]]")
     return len(entries)
 
 
@@ -68,7 +68,7 @@ def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: V
             known = {*vocabulary.sections, *vocabulary.sections[VEHICLE].model_fields}
             which = len(rest) > 1 and rest[0] not in known
             expected = f"{VEHICLE}.N.{'.'.join(rest[which:]) or 'KEY'}, N from 0 to {vehicles - 1}"
-            raise SceneError(override.key, "which vehicle?", expected, Source(override=override.text))
+            raise SceneError(override.key, "which vehicle?", expected, KeyOrigin(override=override.text))
         name, *inner = rest[1:]
         if int(rest[0]) == i:
             if inner and name in vocabulary.sections:
@@ -105,12 +105,12 @@ def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any,
 
 def _check_own(table: str, key: str, vocabulary: Vocabulary) -> None:
     if vocabulary.sections[table].SHARED:
-        raise KeyedError(key, "all vehicles share it", f"a table [{table}] of the scene")
+        raise ConfigError(key, "all vehicles share it", f"a table [{table}] of the scene")
 
 
-def _check_distinct(values: list[Any], section: type[Section]) -> None:
+def _check_distinct(values: list[Any], section: type[SceneTable]) -> None:
     for i, value in enumerate(values):
         if value in values[:i]:
             table = "" if section.TABLE == VEHICLE else f"{section.TABLE}."
             message = f"{value} is also that of {VEHICLE}.{values.index(value)}"
-            raise KeyedError(f"{VEHICLE}.{i}.{table}{section.DISTINCT}", message, "another")
+            raise ConfigError(f"{VEHICLE}.{i}.{table}{section.DISTINCT}", message, "another")

@@ -168,7 +168,7 @@ class Refilled:
         return list(_unpack(self._ask(str(due_ns)) or b""))
 
 
-class Progress(NamedTuple):
+class LogProgress(NamedTuple):
     """How far a log is: all messages before these ticks are there."""
 
     handed: int  # of one service
@@ -179,7 +179,7 @@ class Progress(NamedTuple):
         return _PROGRESS.pack(*self)
 
     @classmethod
-    def unpack(cls, answer: bytes) -> "Progress":
+    def unpack(cls, answer: bytes) -> "LogProgress":
         """The progress in the bytes that `pack` has made."""
         return cls(*_PROGRESS.unpack(answer))
 

@@ -4,16 +4,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lapwing.cosim.diagram.block_diagram import Graph, Service
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import due
 from lapwing.cosim.executors.log_backpressure import AHEAD
-from lapwing.cosim.executors.participant import PATIENCE, POLL, Process
+from lapwing.cosim.executors.participant import PATIENCE, POLL, Participant
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.bus_keys import BATCH_KEY, HANDED_KEY, HELD_KEY, WAITING_KEY
-from lapwing.cosim.transport.input_journal import Held, Progress, Refilled
-from lapwing.cosim.transport.packet_schedule import EACH_TICK, Way, way, ways
-from lapwing.cosim.transport.packets import BundleError, Bundles, pack_batch
-from lapwing.cosim.transport.publish_watchdog import Delivery
+from lapwing.cosim.transport.input_journal import Held, LogProgress, Refilled
+from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, way, ways
+from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch
+from lapwing.cosim.transport.publish_watchdog import PublishWatchdog
 from lapwing.kernels import uncompiled
 from lapwing.messages.topics import Topic
 
@@ -28,14 +28,14 @@ class EndOfRun(Exception):
     """A producer says that there will be no further message; its name."""
 
 
-class Source:
+class PacketReceiver:
     """A service that gives something that this one takes."""
 
-    def __init__(self, process: Process, name: str, taken: list[tuple[str, int, int]], graph: Graph):
+    def __init__(self, process: Participant, name: str, taken: list[tuple[str, int, int]], graph: BlockDiagram):
         """`taken`: (port, period, delay) of each input that it gives."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
         self._way = way(process.setup, name, process.name) if process.bundles_ahead else EACH_TICK
-        self._bundles = Bundles(self._way.ports(process.setup.services[name].ports), self._way.ticks)
+        self._bundles = StepPacketCodec(self._way.ports(process.setup.services[name].ports), self._way.ticks)
         ((key, mark),) = process.participants.senders(self._way.key, [name]).items()
         self._inbox = process.bus.inbox(key, mark)
         self._refilled = Refilled(self._inbox.get, lambda words: process.ask(HELD_KEY, name, words))
@@ -65,7 +65,7 @@ class Source:
                 raise LockStepError(f"{self._name}: expected the bundle of tick {stamp}, got {time_ns} ns")
             try:
                 self._bundles.unpack(payload, self._graph, stamp)
-            except BundleError as error:
+            except PacketError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
             self._newest = stamp + self._way.every - 1
         self._known = min([(self._newest // period + 1) * period + delay for period, delay in self._needs])
@@ -90,30 +90,30 @@ class Source:
         return f"{', '.join(ports)} of tick {tick} from {self._name}"
 
 
-def sources(process: Process, graph: Graph) -> list[Source]:
+def sources(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
     """Who gives what the service of this process takes."""
     setup = process.setup
     taken: dict[str, list[tuple[str, int, int]]] = {}
     for needed in setup.services[process.name].inputs:
         producer = setup.producers[needed.port]
         taken.setdefault(producer, []).append((needed.port, setup.port(needed.port).period, needed.delay))
-    return [Source(process, producer, ports, graph) for producer, ports in sorted(taken.items())]
+    return [PacketReceiver(process, producer, ports, graph) for producer, ports in sorted(taken.items())]
 
 
 @dataclass
 class _Outlet:
     """The bundles to the consumers that take them the same way."""
 
-    way: Way
-    bundles: Bundles
+    way: PacketSchedule
+    bundles: StepPacketCodec
     put: Callable[[bytes, int], None]
     given: int = 0  # tick before which all has gone
 
 
-class Outlets:
+class PacketSender:
     """What a service publishes: bundles to its consumers, batches to recorders, topics to those who listen."""
 
-    def __init__(self, process: Process, service: Service, graph: Graph, hands_over: bool = True):
+    def __init__(self, process: Participant, service: Service, graph: BlockDiagram, hands_over: bool = True):
         """Declare the publishers; the bundles are somebody else's where it does not hand over."""
         key_prefix, bus = process.key_prefix, process.bus
         self._process, self._service, self._graph = process, service, graph
@@ -121,7 +121,7 @@ class Outlets:
         if hands_over:
             for way in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
                 put = bus.publisher(f"{key_prefix}/{way.key}/{service.name}")
-                bundles = Bundles(way.ports(process.setup.services[service.name].ports), way.ticks)
+                bundles = StepPacketCodec(way.ports(process.setup.services[service.name].ports), way.ticks)
                 self._outlets.append(_Outlet(way, bundles, put))
         self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = {topic: process.key(topic) for topic in service.topics}
@@ -131,14 +131,16 @@ class Outlets:
         self._due = 0.0
         self._interval_ns = process.setup.interval_ns
         bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
-        self._delivery = Delivery(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
+        self._delivery = PublishWatchdog(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
         self._journal, self._held = process.journal, Held(HELD) if process.restarts else None
         if self._held:
             bus.answer(f"{key_prefix}/{HELD_KEY}/{service.name}", self._held.since)
 
     def resume(self, recorder: str) -> int:
         """Hand over to the recorder what it has not got; the tick before which all that it has is complete."""
-        there = Progress.unpack(self._process.ask(HANDED_KEY, recorder, self._service.name) or Progress(0, 0).pack())
+        there = LogProgress.unpack(
+            self._process.ask(HANDED_KEY, recorder, self._service.name) or LogProgress(0, 0).pack()
+        )
         self._handed = there.handed
         return there.recorded
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, SETUP_KEY, STEP_KEY, WAITING_KEY
 
@@ -16,7 +16,7 @@ def columns(like: Any, name: str = "") -> list[str]:
     return [column for field, part in parts for column in columns(part, f"{name}.{field}" if name else str(field))]
 
 
-def layout(setup: Setup) -> dict[str, Any]:
+def layout(setup: RunConfig) -> dict[str, Any]:
     """Ports, periods and columns of all services, as a tree for JSON.
 
     Returns:

@@ -11,18 +11,18 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.transport.bus_keys import STEP_KEY
 
 
-def ticks_at_once(setup: Setup, name: str) -> int:
+def ticks_at_once(setup: RunConfig, name: str) -> int:
     """The ticks that a service steps, and hands over, at once."""
     delays = [i.delay for i in setup.services[name].inputs]
     return max(1, min(delays, default=0) // 2)
 
 
-class Way(NamedTuple):
+class PacketSchedule(NamedTuple):
     """How bundles go from one service to another."""
 
     ticks: int  # of a bundle
@@ -40,20 +40,20 @@ class Way(NamedTuple):
         return [port for port in given if self.ticks > 1 or port.period % self.every == 0]
 
 
-EACH_TICK = Way(1, 1)
+EACH_TICK = PacketSchedule(1, 1)
 """A bundle at each tick, of all that a service gives."""
 
 
-def way(setup: Setup, producer: str, consumer: str) -> Way:
+def way(setup: RunConfig, producer: str, consumer: str) -> PacketSchedule:
     """How bundles go from one service to another that takes something of it."""
     if (ticks := max(ticks_at_once(setup, producer), ticks_at_once(setup, consumer))) > 1:
-        return Way(ticks, ticks)
+        return PacketSchedule(ticks, ticks)
     taken = {i.port for i in setup.services[consumer].inputs}
     periods = [port.period for port in setup.services[producer].ports if port.name in taken]
-    return Way(1, math.gcd(*periods))
+    return PacketSchedule(1, math.gcd(*periods))
 
 
-def ways(setup: Setup, producer: str) -> set[Way]:
+def ways(setup: RunConfig, producer: str) -> set[PacketSchedule]:
     """How the bundles of a service go; those of one whose rows nobody takes at each tick."""
     given = {port.name for port in setup.services[producer].ports}
     takers = [name for name, service in setup.services.items() if any(i.port in given for i in service.inputs)]

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Page, due_ticks
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, due_ticks
 from lapwing.kernels.row_packing import width
 from lapwing.messages.topics import topic_named
 
@@ -27,7 +27,7 @@ _PAGE = struct.Struct("<HII")
 _TICKS = struct.Struct("<qq")
 
 
-class BundleError(ValueError):
+class PacketError(ValueError):
     """Bytes that are no bundle or batch of this run."""
 
 
@@ -40,7 +40,7 @@ class _Rows(NamedTuple):
     place: slice  # among the numbers of the bundle
 
 
-class Bundles:
+class StepPacketCodec:
     """The bundles of one service: which rows they hold."""
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
@@ -61,20 +61,20 @@ class Bundles:
         rows = self._rows(first)
         return 8 * rows[-1].place.stop if rows else 0
 
-    def pack(self, graph: Graph, first: int) -> bytes:
+    def pack(self, graph: BlockDiagram, first: int) -> bytes:
         """The bundle from the tick `first` on, from the rows of a graph."""
         if self._ticks == 1:
             return b"".join([graph.row(rows.port, first).tobytes() for rows in self._rows(first)])
         return b"".join([graph.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
 
-    def unpack(self, payload: bytes, graph: Graph, first: int) -> None:
+    def unpack(self, payload: bytes, graph: BlockDiagram, first: int) -> None:
         """Put the rows of the bundle from the tick `first` on into those of a graph that uses them.
 
         Raises:
             BundleError: it has not the size that is due.
         """
         if len(payload) != self.size(first):
-            raise BundleError(f"a bundle of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
+            raise PacketError(f"a bundle of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
         numbers = np.frombuffer(payload, "<f8")
         for rows in self._rows(first):
             if not graph.has(rows.port):
@@ -107,7 +107,7 @@ class Bundles:
         return self._known[numbers]
 
 
-def pack_batch(pages: Iterable[Page], start: int, stop: int) -> bytes:
+def pack_batch(pages: Iterable[RecordBatch], start: int, stop: int) -> bytes:
     """A batch of pages, which have all messages of the ticks [start, stop)."""
     parts = [_TICKS.pack(start, stop)]
     for page in pages:
@@ -118,7 +118,7 @@ def pack_batch(pages: Iterable[Page], start: int, stop: int) -> bytes:
     return b"".join(parts)
 
 
-def unpack_batch(payload: bytes) -> tuple[int, int, list[Page]]:
+def unpack_batch(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
     """The ticks [start, stop) of which it has all messages, and the pages, payloads of shape (n, size).
 
     Raises:
@@ -136,7 +136,7 @@ def unpack_batch(payload: bytes) -> tuple[int, int, list[Page]]:
             place += 8 * n
             payloads = np.frombuffer(payload, np.uint8, n * size, place).reshape(n, size)
             place += n * size
-            pages.append(Page(topic, ticks, payloads))
+            pages.append(RecordBatch(topic, ticks, payloads))
         return start, stop, pages
     except (struct.error, ValueError, IndexError) as error:
-        raise BundleError(f"a batch of {len(payload)} bytes: {error}") from None
+        raise PacketError(f"a batch of {len(payload)} bytes: {error}") from None

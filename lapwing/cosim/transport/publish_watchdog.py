@@ -8,7 +8,7 @@ from collections.abc import Callable
 LOOK = 0.2  # [s] between two looks
 
 
-class Delivery:
+class PublishWatchdog:
     """Says from a thread of its own that a message finds no room, since the thread that publishes it stands still.
 
     Whoever watches the run then names the one who takes nothing, and not the one who waits for it.

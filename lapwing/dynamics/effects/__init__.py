@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from lapwing.dynamics import discovery
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.environment import STANDARD, Environment
 
@@ -39,10 +39,10 @@ def get(name: str, module: str | None = None) -> ModuleType:
     """
     if module is not None:
         if name in names():
-            raise KeyedError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
+            raise ConfigError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
         return importlib.import_module(module)
     if name not in names():
-        raise KeyedError.unknown(f"effects.{name}", "effect", name, names())
+        raise ConfigError.unknown(f"effects.{name}", "effect", name, names())
     return importlib.import_module(f"{__name__}.{name}")
 
 
@@ -55,7 +55,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
     """The parameter NamedTuple of an effect; arguments as of `get`."""
     found, wanted = get(name, module), class_name(name)
     if not hasattr(found, wanted):
-        raise KeyedError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")
+        raise ConfigError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")
     return getattr(found, wanted)
 
 
@@ -73,18 +73,18 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment:
         module = table.pop("module", None)
         kind = getattr(get(name, module), "KIND", name)
         if kind in kinds:
-            raise KeyedError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
+            raise ConfigError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
         kinds[kind] = name
         if hasattr(get(name, module), "check"):
             try:
                 get(name, module).check(table, tables)
-            except KeyedError as error:
+            except ConfigError as error:
                 raise error.under(f"effects.{name}") from None
         cls = parameter_class(name, module)
         build = getattr(cls, "from_scene", None)
         try:
             effect = build(table, airframe) if build else checked(cls, table)
-        except KeyedError as error:
+        except ConfigError as error:
             raise error.under(f"effects.{name}") from None
         active.append(effect.in_environment(environment) if hasattr(effect, "in_environment") else effect)
     return tuple(active)

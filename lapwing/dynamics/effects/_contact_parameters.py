@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
@@ -60,7 +60,7 @@ class GroundContact(NamedTuple):
         given = checked(Settings, table)
         if given.friction_dynamic > given.friction_static:
             expected = f"at most friction_static = {given.friction_static}"
-            raise KeyedError("friction_dynamic", f"got {given.friction_dynamic}", expected)
+            raise ConfigError("friction_dynamic", f"got {given.friction_dynamic}", expected)
         points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
         feet = points.feet + points.hull
         common = (

@@ -43,7 +43,7 @@ def in_reach(stance, feet_body):
     return -(stance.over + dot(stance.upright_body, feet_body))
 
 
-class Footing(NamedTuple):
+class FootContact(NamedTuple):
     """Four feet on the ground or above it, in world coordinates; every number in four lanes."""
 
     arm: Vec3  # [m] from the centre of mass
@@ -94,4 +94,4 @@ def footing(e, stance, feet_body):
     onset = where(1.0 - onset, onset, 1.0)
     press = onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach)
     press = where(depth, where(press, press, 0.0), 0.0)
-    return Footing(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)
+    return FootContact(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)

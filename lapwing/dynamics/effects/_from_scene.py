@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from pydantic import TypeAdapter
@@ -46,4 +46,4 @@ def _tuples(value: Any) -> Any:
 
 def cannot(reason: str) -> NoReturn:
     """Refuse an effect that the vehicle cannot have."""
-    raise KeyedError("", reason)
+    raise ConfigError("", reason)

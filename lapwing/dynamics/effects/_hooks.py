@@ -48,14 +48,14 @@ from numba.core.errors import TypingError
 
 from lapwing.dynamics.effects._axes import beside, in_world
 from lapwing.dynamics.vector import add, apply
-from lapwing.kernels import ByClass, leaf
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.kernels.codegen import define, generated
 
-HOOKS: dict[str, ByClass] = {}
+HOOKS: dict[str, DispatchTable] = {}
 
 
 def _hook(name: str) -> Callable:
-    registered = HOOKS.setdefault(name, ByClass())
+    registered = HOOKS.setdefault(name, DispatchTable())
 
     def for_type(parameters: type) -> Callable:
         def register(function: Callable) -> Callable:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 NEEDED = {"j": "J", "ct": "CT", "cp": "CP or CQ"}
 
@@ -28,13 +28,13 @@ def parsed(key: str, text: str) -> dict[str, Any]:
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line and not line.startswith(("#", "!"))]
     if not lines:
-        raise KeyedError(key, "the file is empty", "columns J, CT, CP")
+        raise ConfigError(key, "the file is empty", "columns J, CT, CP")
     names = [name.lower() for name in _cells(lines[0][1])]
     if "cq" in names:
         names = ["cp" if name == "cq" else name for name in names]
     for name, said in NEEDED.items():
         if names.count(name) != 1:
-            raise KeyedError(
+            raise ConfigError(
                 key, f"line {lines[0][0]} names {names.count(name)} columns {said}", "one of each: J, CT, CP"
             )
     turn = 2.0 * math.pi if "cq" in lines[0][1].lower() else 1.0
@@ -43,12 +43,12 @@ def parsed(key: str, text: str) -> dict[str, Any]:
         row = dict(zip(names, _numbers(key, number, line, len(names)), strict=True))
         curves.setdefault(row.get("angle", 0.0), []).append((row["j"], row["ct"], turn * row["cp"]))
     if not curves:
-        raise KeyedError(key, "has no row of numbers", "columns J, CT, CP")
+        raise ConfigError(key, "has no row of numbers", "columns J, CT, CP")
     angles = sorted(curves)
     advance = [j for j, _, _ in curves[angles[0]]]
     for angle in angles:
         if [j for j, _, _ in curves[angle]] != advance:
-            raise KeyedError(
+            raise ConfigError(
                 key, f"the J at {angle:g} deg are not those at {angles[0]:g} deg", "the same at each angle"
             )
     return {
@@ -66,11 +66,11 @@ def _cells(line: str) -> list[str]:
 def _numbers(key: str, number: int, line: str, count: int) -> Sequence[float]:
     cells = _cells(line)
     if len(cells) != count:
-        raise KeyedError(key, f"line {number} has {len(cells)} columns", f"{count} as its first line")
+        raise ConfigError(key, f"line {number} has {len(cells)} columns", f"{count} as its first line")
     try:
         found = [float(cell) for cell in cells]
     except ValueError:
         found = [math.nan]
     if not all(map(math.isfinite, found)):
-        raise KeyedError(key, f"line {number}: {line!r} has a hole", "a number in each column")
+        raise ConfigError(key, f"line {number}: {line!r} has a hole", "a number in each column")
     return found

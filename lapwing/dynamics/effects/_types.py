@@ -140,7 +140,7 @@ class Rotors(NamedTuple):
     power: PerRotor  # [W] taken by each motor and its controller
 
 
-class Situation(NamedTuple):
+class EffectInputs(NamedTuple):
     """What an effect may look at."""
 
     t: float  # [s] simulation time

@@ -1,23 +1,23 @@
 """What vehicles of a fleet do to one another: the hook of effects that know of other vehicles, and what they know.
 
-At every tick each vehicle gives its `Presence`. One tick later, before it steps, the hook
+At every tick each vehicle gives its `NeighbourState`. One tick later, before it steps, the hook
 
     interact  (e, memory, own, others, interval) -> memory
 
 of each such effect makes of its own presence and of those of the others, both of the tick before, what the effect
 remembers for the coming exchange interval: a force, or a wind. Its other hooks (`_hooks`) act by that memory. A
-parameter class says with `presence()` which numbers of the `Presence` are the effect's own.
+parameter class says with `presence()` which numbers of the `NeighbourState` are the effect's own.
 """
 
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects._hooks import HOOKS
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import ByClass, leaf
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.kernels.codegen import define, generated
 
 
-class Presence(NamedTuple):
+class NeighbourState(NamedTuple):
     """What others of a fleet may know of a vehicle at a tick, or of the load that some carry together."""
 
     position_world: Vec3 = ZERO  # [m] of the centre of mass
@@ -37,7 +37,7 @@ class Presence(NamedTuple):
     is_load: bool = False
 
 
-INTERACT = HOOKS.setdefault("interact", ByClass())
+INTERACT = HOOKS.setdefault("interact", DispatchTable())
 
 
 def interact(parameters: type) -> Any:
@@ -55,10 +55,10 @@ def interacts(effects: tuple) -> bool:
     return any(type(e) in INTERACT for e in effects)
 
 
-def presence(effects: tuple) -> Presence:
+def presence(effects: tuple) -> NeighbourState:
     """What the effects of a vehicle say of it; the rest is for its state to fill in."""
     given = [e.presence() for e in effects if type(e) in INTERACT]
-    return Presence(**{key: value for table in given for key, value in table.items()})
+    return NeighbourState(**{key: value for table in given for key, value in table.items()})
 
 
 def _all_interactions(effects: Any, *_rest: Any) -> Any:

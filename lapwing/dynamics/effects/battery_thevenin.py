@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.atmosphere import temperature as air_temperature
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import gauge, sample, supply
 from lapwing.dynamics.effects._rotor_sums import total
@@ -73,7 +73,7 @@ class BatteryThevenin(NamedTuple):
         given = checked(Settings, table)
         pack = airframe.battery or cannot("the vehicle has no [battery]")
         if given.restart is not None and given.restart <= given.cut_off:
-            raise KeyedError("restart", f"got {given.restart:g} V", f"more than cut_off = {given.cut_off:g} V")
+            raise ConfigError("restart", f"got {given.restart:g} V", f"more than cut_off = {given.cut_off:g} V")
         n, ohmic = pack.cells, pack.cell_resistance
         fast, slow = given.transient_resistance or (0.627 * ohmic, 0.669 * ohmic)
         heat = given.heat_capacity or n * NOMINAL_VOLTAGE * pack.capacity * HEAT_PER_ENERGY

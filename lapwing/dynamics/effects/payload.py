@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import body, sample
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
@@ -44,11 +44,11 @@ class Payload(NamedTuple):
         release = float("inf") if given.release_time is None else given.release_time
         if airframe.payload:
             if twice := {"mass", "size"} & set(table):
-                raise KeyedError(min(twice), "stands beside the table airframe.payload", "one of them")
+                raise ConfigError(min(twice), "stands beside the table airframe.payload", "one of them")
             return cls(release, *_with_and_without(airframe))
         mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
         if mass >= total:
-            raise KeyedError("mass", f"got {mass}", f"less than the vehicle's {total} kg")
+            raise ConfigError("mass", f"got {mass}", f"less than the vehicle's {total} kg")
         x, y, z = given.size
         box = (mass * (y * y + z * z) / 12.0, mass * (z * z + x * x) / 12.0, mass * (x * x + y * y) / 12.0)
         inertia, products = airframe.mass.inertia, airframe.mass.products

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import factors, sample
 from lapwing.dynamics.effects._types import Factors, PerRotor
@@ -41,7 +41,7 @@ class RotorDamage(NamedTuple):
         given = checked(Settings, table)
         count = len(airframe.rotors.position)
         if given.rotor > count:
-            raise KeyedError("rotor", f"got {given.rotor}", f"one of the vehicle's rotors, 1 to {count}")
+            raise ConfigError("rotor", f"got {given.rotor}", f"one of the vehicle's rotors, 1 to {count}")
 
         def only_this(left):
             return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))

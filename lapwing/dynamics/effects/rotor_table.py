@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import loads
@@ -87,38 +87,40 @@ def embed(table: dict[str, Any], folder: Path) -> None:
     if not isinstance(file := table.get("file"), str):
         return
     if given := {"advance", "angle_deg", "thrust", "power"} & set(table):
-        raise KeyedError(min(given), "stands beside file", "one of them")
+        raise ConfigError(min(given), "stands beside file", "one of them")
     path = folder / file
     try:
         table.update(parsed("file", path.read_text(encoding="utf-8")))
     except OSError as error:
-        raise KeyedError("file", f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+        raise ConfigError("file", f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:
-        raise KeyedError("file", f"{path}: not a UTF-8 text file") from None
+        raise ConfigError("file", f"{path}: not a UTF-8 text file") from None
 
 
 def _check(given: Settings) -> None:
     """KeyedError where the table is not one that can be interpolated."""
     j, angles = given.advance, given.angle_deg
     if not j:
-        raise KeyedError("advance", "missing", "the advance ratios, or file = the path of a table of test data")
+        raise ConfigError("advance", "missing", "the advance ratios, or file = the path of a table of test data")
     for name, values in (("advance", j), ("angle_deg", angles)):
         for before, after in itertools.pairwise(values):
             if after <= before:
-                raise KeyedError(name, f"got {after:g} after {before:g}", "growing numbers")
+                raise ConfigError(name, f"got {after:g} after {before:g}", "growing numbers")
     for before, after in itertools.pairwise(j):
         if after - before > WIDEST:
-            raise KeyedError(
+            raise ConfigError(
                 "advance", f"there is nothing between J = {before:g} and {after:g}", f"gaps up to {WIDEST:g}"
             )
     if 0.0 not in j or len(j) < 2:
-        raise KeyedError("advance", f"got J from {j[0]:g} to {j[-1]:g}", "two rows or more, J = 0 (at rest) among them")
+        raise ConfigError(
+            "advance", f"got J from {j[0]:g} to {j[-1]:g}", "two rows or more, J = 0 (at rest) among them"
+        )
     for name, curves in (("thrust", given.thrust), ("power", given.power)):
         if [len(curve) for curve in curves] != [len(j)] * len(angles):
-            raise KeyedError(name, f"got rows of {[len(c) for c in curves]}", f"{len(angles)} of {len(j)} numbers")
+            raise ConfigError(name, f"got rows of {[len(c) for c in curves]}", f"{len(angles)} of {len(j)} numbers")
         at_rest = curves[0][j.index(0.0)]
         if at_rest <= 0.0:
-            raise KeyedError(name, f"got {at_rest:g} at J = 0", "a number above 0 there")
+            raise ConfigError(name, f"got {at_rest:g} at J = 0", "a number above 0 there")
 
 
 @leaf

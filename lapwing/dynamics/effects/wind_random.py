@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import sample, wind, wrench
 from lapwing.dynamics.noise import normal3
@@ -62,11 +62,11 @@ class WindRandom(NamedTuple):
 
 
 def check(table: Mapping, tables: Mapping) -> None:
-    """KeyedError beside `body_drag`, unless the table insists."""
+    """ConfigError beside `body_drag`, unless the table insists."""
     if "body_drag" in tables and not table.get("beside_drag"):
         message = "is drag already, and counts it twice beside effects.body_drag"
         expected = "wind_constant or wind_dryden with body_drag, or beside_drag = true"
-        raise KeyedError("", message, expected)
+        raise ConfigError("", message, expected)
 
 
 @leaf

@@ -15,12 +15,12 @@ from lapwing.dynamics import discovery
 from lapwing.dynamics.integrators._adaptive import adapt
 from lapwing.dynamics.integrators._fixed_step import RATES, march, rate, record, step
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
-from lapwing.dynamics.integrators._step_doubling import SHORTEST, Controlled, march_controlled, shorter
+from lapwing.dynamics.integrators._step_doubling import SHORTEST, StepDoubling, march_controlled, shorter
 
 __all__ = [
     "RATES",
     "SHORTEST",
-    "Controlled",
+    "StepDoubling",
     "adapt",
     "check_start",
     "fitting",

@@ -8,11 +8,11 @@ import sys
 from collections import namedtuple
 from typing import Any
 
-from lapwing.kernels import ByClass, kernel, leaf
+from lapwing.kernels import DispatchTable, kernel, leaf
 from lapwing.kernels.codegen import implements
 from lapwing.kernels.state_tree import finite, flatten
 
-RATES = ByClass()
+RATES = DispatchTable()
 """The compiled `rate(p, t, x)` of a system, by the NamedTuple class of its parameters."""
 
 

@@ -11,7 +11,7 @@ from lapwing.kernels.state_tree import apart, finite
 SHORTEST = 0.01  # [s] times the tolerance: a part no longer than this is not split
 
 
-class Controlled(NamedTuple):
+class StepDoubling(NamedTuple):
     """A method, and how far a part of a step may be off."""
 
     method: Any  # `Method()` of an integrator

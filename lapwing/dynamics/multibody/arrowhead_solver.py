@@ -1,7 +1,8 @@
 """The fast path: one core body and four leaves hinged to it at their centres of mass, nothing assembled.
 
 The leaves are eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)), all four at once: every number of a
-`Leaf` is `lanes`, a lane a leaf. What remains is one symmetric 3x3 system. All vectors are in the same axes, whichever
+`HingedBody` is `lanes`, a lane a leaf. What remains is one symmetric 3x3 system. All vectors are in the same axes,
+whichever
 they are. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
 """
 
@@ -23,7 +24,7 @@ class Core(NamedTuple):
     torque: Vec3  # [N m], gyroscopic part included
 
 
-class Leaf(NamedTuple):
+class HingedBody(NamedTuple):
     """The leaves, the motion their hinges leave them, a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn +
     s axis, and what acts on them. One that is gone has no mass, no inertia, and nothing acts on it."""
 

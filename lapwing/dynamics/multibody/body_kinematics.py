@@ -15,7 +15,7 @@ from lapwing.dynamics.vector import IDENTITY, ZERO, apply
 from lapwing.kernels import apart, kernel
 
 
-class Placement(NamedTuple):
+class BodyKinematics(NamedTuple):
     """Pose and velocity of n bodies; the last entry, index n or -1, is the ground."""
 
     position: np.ndarray  # (n + 1, 3) [m], world
@@ -50,7 +50,7 @@ def put(a, i, values):
 def place(configuration, velocity):
     """Placement of the bodies of a configuration (n, 6 or 7) and velocity (n, 6); theory.md, eqs. (8.1)-(8.3)."""
     n, width = configuration.shape
-    p = Placement(
+    p = BodyKinematics(
         np.zeros((n + 1, 3)), np.zeros((n + 1, 9)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)),
         np.zeros((n, 9)), np.zeros((n, 3)), -1,
     )  # fmt: skip
@@ -75,7 +75,7 @@ def place(configuration, velocity):
             put(p.bias, i, apply(cardan_angles.rate_matrix_derivative(angles, rates), rates))
     put(p.rotation, n, IDENTITY)
     put(p.omega, n, ZERO)
-    return Placement(p.position, p.rotation, p.velocity, p.omega, p.rate_matrix, p.bias, singular)
+    return BodyKinematics(p.position, p.rotation, p.velocity, p.omega, p.rate_matrix, p.bias, singular)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
-from lapwing.dynamics.multibody.arrowhead_solver import Core, Leaf, eliminate
+from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate
 from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
 from lapwing.kernels import kernel, leaf
 from lapwing.kernels.simd import apart, beside, separate
@@ -144,7 +144,7 @@ def _propellers(d, x, loads, g):
     momentum = ((mean + c) * w[0] + s * w[1], s * w[0] + (mean - c) * w[1], moments[2] * own[2])
     gyroscopic = cross(own, momentum)
     weight, zero = scale(mass, g), 0.0 * mass
-    return Leaf(
+    return HingedBody(
         mass,
         (mean + c, mean - c, (1.0 - spins) * moments[2], s, zero, zero),
         offset,

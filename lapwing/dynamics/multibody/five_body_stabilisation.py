@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.integrators import step
 from lapwing.dynamics.lie import quaternion
-from lapwing.dynamics.multibody.arrowhead_solver import Core, Leaf, eliminate, felt
+from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, felt
 from lapwing.dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, choose, column, free_turn, from_chassis
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 from lapwing.kernels import kernel, leaf
@@ -25,7 +25,7 @@ def _gap(chassis, R0, offset, x):
 def _resting(r, spins, C, drift, turn, force, torque):
     """Leaves whose drives rest; what acts on them are momenta, or nothing."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
-    return Leaf(
+    return HingedBody(
         mass, felt(C, moments, spins), r.offset, column(C, 2), r.inertia[2], spins, rest, drift, turn, force, torque
     )
 

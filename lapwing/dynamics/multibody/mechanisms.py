@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lapwing.dynamics.multibody.delivery_drone import Drone
-from lapwing.dynamics.multibody.system import GROUND, Body, Drive, Revolute, System, assemble
+from lapwing.dynamics.multibody.system import GROUND, Body, DrivingConstraint, Revolute, System, assemble
 
 GRAVITY = (0.0, -9.81, 0.0)
 Z = (0.0, 0.0, 1.0)
@@ -86,5 +86,5 @@ def drone_system(drone: Drone, driven: Sequence[bool] = (True, True, True, True)
     bodies = [Body("chassis", drone.mass, drone.inertia)]
     bodies += [Body(f"propeller {k + 1}", drone.propeller_mass[k], drone.propeller_inertia[k]) for k in range(4)]
     joints = [Revolute(f"hinge {k + 1}", 0, k + 1, drone.hubs[k], origin, Z, Z) for k in range(4)]
-    drives = [Drive(f"drive {k + 1}", k + 1, 0, Z) for k in range(4) if driven[k]]
+    drives = [DrivingConstraint(f"drive {k + 1}", k + 1, 0, Z) for k in range(4) if driven[k]]
     return assemble(bodies, joints, drives)

@@ -39,7 +39,7 @@ class Revolute:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DrivingConstraint:
     """An imposed angular velocity of body i relative to body j about an axis fixed in body j (theory.md, eq. (8.15)):
     three nonholonomic equations."""
 
@@ -68,7 +68,7 @@ class System:
 
     bodies: tuple[Body, ...]
     joints: tuple[Revolute, ...]
-    drives: tuple[Drive, ...]
+    drives: tuple[DrivingConstraint, ...]
     arrays: Arrays
 
     def row_names(self) -> list[str]:
@@ -103,7 +103,7 @@ def triad(axis: ArrayLike) -> np.ndarray:
 def assemble(
     bodies: Iterable[Body],
     joints: Iterable[Revolute] = (),
-    drives: Iterable[Drive] = (),
+    drives: Iterable[DrivingConstraint] = (),
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> System:
     """Check the parts and pack them; gravity in the world frame [m/s^2], shape (3,).
@@ -114,7 +114,7 @@ def assemble(
     bodies, joints, drives = tuple(bodies), tuple(joints), tuple(drives)
     for body in bodies:
         _check_body(body)
-    constraints: tuple[Revolute | Drive, ...] = (*joints, *drives)
+    constraints: tuple[Revolute | DrivingConstraint, ...] = (*joints, *drives)
     for constraint in constraints:
         for index in (constraint.body_i, constraint.body_j):
             if not GROUND <= index < len(bodies):

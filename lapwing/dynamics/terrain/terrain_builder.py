@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.terrain.heightfield import Relief, field
 from lapwing.dynamics.terrain.terrain_queries import LEVEL, Level
 
@@ -49,7 +49,7 @@ def relief(
     steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
     if steep > STEEPEST:
         key = "bump_height" if bump_height else "slope"
-        raise KeyedError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
+        raise ConfigError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
     base, treads = _treads(steps, step_heading)
     rows = [_row(box) for box in boxes] + treads
     plane = [[corner @ np.array(slope) for corner in _corners(row)] for row in rows]
@@ -72,16 +72,16 @@ def relief(
 def _checked(grid: np.ndarray, corner: tuple[float, float], spacing: float) -> np.ndarray:
     heights = np.ascontiguousarray(grid, dtype=float)
     if heights.ndim != 2 or min(heights.shape) < 2:
-        raise KeyedError("grid.heights", f"got an array of shape {heights.shape}", "at least 2 rows and 2 columns")
+        raise ConfigError("grid.heights", f"got an array of shape {heights.shape}", "at least 2 rows and 2 columns")
     rows, columns = heights.shape
     if not (0.0 <= -corner[0] <= (columns - 1) * spacing and 0.0 <= -corner[1] <= (rows - 1) * spacing):
         x, y = corner[0] + (columns - 1) * spacing, corner[1] + (rows - 1) * spacing
         reach = f"it reaches from ({corner[0]:g}, {corner[1]:g}) to ({x:g}, {y:g}) m"
-        raise KeyedError("grid.corner", f"the grid does not hold home: {reach}", "(0, 0) within it")
+        raise ConfigError("grid.corner", f"the grid does not hold home: {reach}", "(0, 0) within it")
     rise = max(abs(np.diff(heights, axis=axis)).max() for axis in (0, 1)) / spacing
     if rise > STEEPEST:
         message = f"ground steeper than 45 degrees, tangent {rise:.2f}"
-        raise KeyedError(
+        raise ConfigError(
             "grid.heights", message, "a tangent of at most 1 between neighbours; steps and boxes are walls"
         )
     return heights
@@ -102,7 +102,7 @@ def _treads(steps: Sequence[tuple[float, float]], heading: float) -> tuple[float
     """(height of the lowest level, a box for each that is higher, under all that is higher still beside it)."""
     at = [distance for distance, _ in steps]
     if any(later <= earlier for earlier, later in zip([0.0, *at], at, strict=False)):
-        raise KeyedError("steps.distance", f"got {at}", "growing distances above 0 m")
+        raise ConfigError("steps.distance", f"got {at}", "growing distances above 0 m")
     level = [0.0, *np.cumsum([rise for _, rise in steps]).tolist()]
     edge = [-FAR, *at, FAR]
     base, rows = min(level), []

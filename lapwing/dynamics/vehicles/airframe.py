@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError, model_validator
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import steiner
 from lapwing.dynamics.validation import fault
 from lapwing.dynamics.vehicles.airframe_tables import (
@@ -43,7 +43,7 @@ class Airframe(Section):
     def _one_payload(self) -> "Airframe":
         if self.payload and self.mass.payload:
             message = f"got {self.mass.payload:g} beside a table [payload], of which [mass] has nothing"
-            raise KeyedError("mass.payload", message, "0")
+            raise ConfigError("mass.payload", message, "0")
         return self
 
     @property

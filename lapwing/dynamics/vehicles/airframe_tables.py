@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import principal_moments
 
 Positive = Annotated[float, Gt(0)]
@@ -40,15 +40,15 @@ class Mass(Section):
     def _physical(self) -> "Mass":
         a, b, c = principal_moments(self.inertia, self.products)
         if a <= 0.0:
-            raise KeyedError(
+            raise ConfigError(
                 "products", f"got {list(self.products)}", "smaller ones: a principal moment is not above 0"
             )
         if a + b < c:
-            raise KeyedError(
+            raise ConfigError(
                 "inertia", f"got {list(self.inertia)}", "none above the sum of the others (triangle inequality)"
             )
         if self.payload >= self.total:
-            raise KeyedError("payload", f"got {self.payload:g}", f"less than total = {self.total:g} kg")
+            raise ConfigError("payload", f"got {self.payload:g}", f"less than total = {self.total:g} kg")
         return self
 
     @property
@@ -86,18 +86,18 @@ class RotorPlacement(Section):
     def _one_direction_each(self) -> "RotorPlacement":
         if len(self.spin_direction) != len(self.position):
             expected = f'"cw" or "ccw" for each of the {len(self.position)} rotors'
-            raise KeyedError("spin_direction", f"got {len(self.spin_direction)} of them", expected)
+            raise ConfigError("spin_direction", f"got {len(self.spin_direction)} of them", expected)
         return self
 
     @model_validator(mode="after")
     def _upward(self) -> "RotorPlacement":
         if len(self.axis) not in (0, len(self.position)):
             expected = f"a direction for each of the {len(self.position)} rotors"
-            raise KeyedError("axis", f"got {len(self.axis)} of them", expected)
+            raise ConfigError("axis", f"got {len(self.axis)} of them", expected)
         for k, (x, y, z) in enumerate(self.axis):
             if math.hypot(x, y, z) < SHORTEST_AXIS or z <= 0.0:
                 expected = "a direction that points up, with z above 0: rotors push upwards"
-                raise KeyedError(f"axis.{k}", f"got {[x, y, z]}", expected)
+                raise ConfigError(f"axis.{k}", f"got {[x, y, z]}", expected)
         return self
 
     @property

@@ -10,7 +10,7 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.dynamics.lie.ts2 import Swing, tangent
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, divide, dot, multiply, scale, subtract
-from lapwing.kernels import ByClass, kernel, leaf
+from lapwing.kernels import DispatchTable, kernel, leaf
 from lapwing.kernels.codegen import each_index, implements
 
 
@@ -57,7 +57,7 @@ class CooperativeLoadState(NamedTuple):
     link: tuple[Swing, ...]  # direction from quadrotor to load, angular velocity [rad/s]
 
 
-COMMANDS = ByClass()
+COMMANDS = DispatchTable()
 """The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
 
 

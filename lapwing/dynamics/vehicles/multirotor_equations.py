@@ -11,11 +11,20 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._axes import thrust_wrench
-from lapwing.dynamics.effects._types import Air, AnyMassProperties, Factors, Loads, Motion, PerRotor, Rotors, Situation
+from lapwing.dynamics.effects._types import (
+    Air,
+    AnyMassProperties,
+    EffectInputs,
+    Factors,
+    Loads,
+    Motion,
+    PerRotor,
+    Rotors,
+)
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
-from lapwing.kernels import ByClass, leaf
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.kernels.codegen import each, implements
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
@@ -54,7 +63,7 @@ class MultirotorState(NamedTuple):
     memory: tuple  # one tuple for each effect
 
 
-class Form(NamedTuple):
+class StateForm(NamedTuple):
     """The compiled functions of a class that stands for the motion in the state."""
 
     seen: Callable  # (layout, x) -> Motion that effects look at
@@ -63,7 +72,7 @@ class Form(NamedTuple):
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
 
 
-FORMS = ByClass()
+FORMS = DispatchTable()
 
 
 class MultirotorDrive(NamedTuple):
@@ -104,9 +113,9 @@ def evaluate(drive, t, motion):
     body = drive.body
     R_world_body = rotation_matrix(motion.attitude)
     still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
-    s = Situation(t, motion, R_world_body, body, layout, still, ZERO)
+    s = EffectInputs(t, motion, R_world_body, body, layout, still, ZERO)
     air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
-    s = Situation(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
+    s = EffectInputs(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
     # adding to -0.0 changes no number, so the compiler drops it
     one, zero = each(_constant, 1.0, speed, speed), each(_constant, -0.0, speed, speed)
     factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
@@ -143,7 +152,7 @@ def accelerations(drive, t, motion):
     return newton_euler(s.body, drive, s, force, torque)
 
 
-FORMS[Motion] = Form(_itself, rate, _itself, accelerations)
+FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
 
 
 def seen(layout: RotorLayout, x: Any) -> Motion:

@@ -18,7 +18,7 @@ from lapwing.dynamics.multibody.system import Arrays
 from lapwing.dynamics.vector import ZERO, Vec3, apply
 from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorParameters, MultirotorState, StateForm
 from lapwing.kernels import apart, kernel, leaf
 
 NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
@@ -212,7 +212,7 @@ def accelerations(drive, t, x):
     return tangent.velocity_world, angular
 
 
-FORMS[FiveEulerBodies] = Form(seen, rate, held, accelerations)
+FORMS[FiveEulerBodies] = StateForm(seen, rate, held, accelerations)
 
 
 def singular(x: FiveEulerBodies) -> int:

@@ -16,7 +16,7 @@ from lapwing.dynamics.multibody import five_body_stabilisation as hold
 from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.multibody.five_bodies import NO_WRENCH, FiveBodies, Machine, Rotor, Wrench
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, scale, subtract
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import FORMS, StateForm, evaluate
 from lapwing.kernels import kernel, leaf
 from lapwing.kernels.codegen import each
 
@@ -31,7 +31,7 @@ class Assembly(NamedTuple):
     arrays: Any  # system.Arrays of the general engine; () on the fast path
 
 
-class Acting(NamedTuple):
+class AppliedLoads(NamedTuple):
     """What acts on the bodies, each where it acts."""
 
     gravity_world: Vec3  # [m/s^2]
@@ -79,7 +79,7 @@ def acting(drive, t, motion):
     )
     loads = each(pair, 0.0, rotors.thrust, rotors.torque)
     parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
-    return s, Acting(field, subtract(force, known), subtract(torque, arms), parts)
+    return s, AppliedLoads(field, subtract(force, known), subtract(torque, arms), parts)
 
 
 @leaf
@@ -159,7 +159,7 @@ def accelerations(drive, t, x):
     return tangent.chassis.velocity_world, tangent.chassis.omega_body
 
 
-FORMS[FiveBodies] = Form(seen, rate, held, accelerations)
+FORMS[FiveBodies] = StateForm(seen, rate, held, accelerations)
 
 
 @leaf

@@ -14,7 +14,13 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate, rot
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, Form, MultirotorParameters, MultirotorState, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    FORMS,
+    MultirotorParameters,
+    MultirotorState,
+    StateForm,
+    evaluate,
+)
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import kernel, leaf
 
@@ -127,7 +133,7 @@ def accelerations(drive, t, x):
     return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
 
 
-FORMS[SlungMotion] = Form(seen, rate, _itself, accelerations)
+FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations)
 
 
 @leaf

@@ -1,7 +1,7 @@
 """What a compiled version of a kernel is made of, as text that is the same in every process.
 
 Three things make it up: the types of its arguments; every function that it can reach through names, closures and
-tables (`ByClass`), with the constants that these take from their modules; and the sources that can be in it.
+tables (`DispatchTable`), with the constants that these take from their modules; and the sources that can be in it.
 Anything that cannot be told for certain makes the version one that is not kept.
 """
 
@@ -21,7 +21,7 @@ from numba.core import config, types
 from numba.core.dispatcher import Dispatcher
 
 from lapwing.kernels.compiler import source_digest
-from lapwing.kernels.compiler.dispatch_table import ByClass
+from lapwing.kernels.compiler.dispatch_table import DispatchTable
 
 VERSIONED = {"builtins", "llvmlite", "numba", "numpy"}  # their version is in every key
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
@@ -103,7 +103,7 @@ class _Writer:
         if found is not value or module == "__main__":
             raise NotKeptError(f"class {name} cannot be imported")
         self.modules.add(module)
-        tables = sorted(ByClass.tables.items())  # modules are not imported in the same order everywhere
+        tables = sorted(DispatchTable.tables.items())  # modules are not imported in the same order everywhere
         entries = [f", {name}: {self.value(table[value])}" for name, table in tables if value in table]
         return f"{module}.{name}{''.join(entries)}"
 
@@ -144,9 +144,9 @@ _entered = 0
 def _part(function: FunctionType) -> Part:
     """A function by itself: its code, and what its names, closure and defaults refer to."""
     global _entered
-    if _entered != ByClass.entered:
+    if _entered != DispatchTable.entered:
         _parts.clear()
-        _entered = ByClass.entered
+        _entered = DispatchTable.entered
     part = _parts.get(function)
     if part and all(namespace.get(name) is value for namespace, name, value in part.seen):
         return part

@@ -55,7 +55,7 @@ def _converted(builder: Any, value: Any, kind: Any) -> Any:
     return array
 
 
-class WholeValues(CPUCallConv):
+class ValueCallConv(CPUCallConv):
     """numba's convention for calls, but for tuples: they are handed over as they are."""
 
     def _get_arg_packer(self, argtypes: Sequence[types.Type]) -> _Whole:
@@ -94,7 +94,7 @@ class _Failed(NamedTuple):
 
 
 def is_whole(fndesc: Any) -> bool:
-    """Whether the function of a descriptor is called by `WholeValues`."""
+    """Whether the function of a descriptor is called by `ValueCallConv`."""
     return fndesc.mangled_name.endswith(WHOLE)
 
 
@@ -105,7 +105,7 @@ def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
         return
 
     def call(context: Any, builder: Any, signature: Any, values: Sequence[Any]) -> Any:
-        result = WholeValues(context).call(builder, fndesc, values)
+        result = ValueCallConv(context).call(builder, fndesc, values)
         return impl_ret_new_ref(context, builder, fndesc.restype, result)
 
     call.libs = (library,)  # type: ignore[attr-defined]
@@ -141,7 +141,7 @@ class KernelLower(Lower):
 
 
 class InnerLower(KernelLower):
-    """Writes an inner function, to be called by `WholeValues` unless it needs what only numba's own way can do."""
+    """Writes an inner function, to be called by `ValueCallConv` unless it needs what only numba's own way can do."""
 
     def __init__(self, context: Any, library: Any, fndesc: Any, interp: Any, **more: Any):
         special = isinstance(fndesc.restype, types.Optional) or interp.generator_info is not None
@@ -152,14 +152,14 @@ class InnerLower(KernelLower):
     @property
     def call_conv(self) -> CPUCallConv:
         """Of the function itself."""
-        return WholeValues(self.context) if is_whole(self.fndesc) else super().call_conv
+        return ValueCallConv(self.context) if is_whole(self.fndesc) else super().call_conv
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin the function."""
         if not is_whole(fndesc):
             super().setup_function(fndesc)
             return
-        self.function = WholeValues(self.context).declare(self.module, fndesc)
+        self.function = ValueCallConv(self.context).declare(self.module, fndesc)
         if hasattr(self.func_ir.func_id.func, "__apart__"):
             self.function.attributes.add("noinline")
         self.entry_block = self.function.append_basic_block("entry")

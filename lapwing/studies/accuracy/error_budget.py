@@ -11,11 +11,11 @@ import numpy as np
 
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import TRUTH
-from lapwing.services.common.communication_schema import Exchange, Rates
+from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.run_schema import Run
 from lapwing.services.scene_resolver import load
 from lapwing.studies.accuracy.plant import longest_step
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
 LONGEST = 20.0  # [s] of a motion that has no end of its own
@@ -52,11 +52,11 @@ def errors(scene: Scene) -> list[Part]:
         ValueError: a flight comes to no end.
     """
     base = [*scene.overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
-    rate, interval = scene[Exchange].rate, scene[Exchange].interval
+    rate, interval = scene[Communication].rate, scene[Communication].interval
 
-    def flown(factor: int, coupling: str, solver: list[str]) -> Flight:
+    def flown(factor: int, coupling: str, solver: list[str]) -> FlightData:
         settings = [*base, *_exchange(scene, rate * factor), f"exchange.coupling={coupling}", *solver]
-        flight: Flight = fly(load(scene.path, settings), (TRUTH,))
+        flight: FlightData = fly(load(scene.path, settings), (TRUTH,))
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")
         return flight
@@ -65,7 +65,7 @@ def errors(scene: Scene) -> list[Part]:
         step = interval / max(FINEST_STEPS, factor)
         return ["solver.integrator=rkmk4", f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]
 
-    coupling = scene[Exchange].coupling
+    coupling = scene[Communication].coupling
     parts = []
     exact = flown(1, coupling, fine(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
@@ -98,7 +98,7 @@ def touches(scene: Scene) -> bool:
 def _duration(scene: Scene) -> float:
     if touches(scene):
         return min(scene[Run].duration, WHOLE)
-    interval = scene[Exchange].interval
+    interval = scene[Communication].interval
     return min(scene[Run].duration, max(min(LONGEST, MOST_TICKS * interval), 1000 * interval))
 
 
@@ -112,15 +112,15 @@ def _clean(scene: Scene) -> list[str]:
 
 def _exchange(scene: Scene, rate: int) -> list[str]:
     """Overrides for another exchange rate; what is due at every tick stays so."""
-    bodies = [f"rates.bodies={rate}"] if scene[Rates].bodies == scene[Exchange].rate else []
+    bodies = [f"rates.bodies={rate}"] if scene[Rates].bodies == scene[Communication].rate else []
     return [f"exchange.rate={rate}", *bodies]
 
 
-def _part(source: str, setting: float, label: str, flight: Flight, exact: Flight) -> Part:
+def _part(source: str, setting: float, label: str, flight: FlightData, exact: FlightData) -> Part:
     return Part(source, setting, label, *difference(flight, exact))
 
 
-def difference(one: Flight, other: Flight) -> tuple[float, float, float]:
+def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]:
     """Distance [m] and angle [rad] between two flights that nine ticks in ten stay below, and the largest distance.
 
     Compared at the ticks of the one with fewer.

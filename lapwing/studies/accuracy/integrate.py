@@ -11,7 +11,7 @@ from lapwing.dynamics.integrators import adapt, rate, record
 from lapwing.kernels import kernel, uncompiled
 from lapwing.kernels.state_tree import flatten, unflatten
 from lapwing.studies.accuracy.coordinates import coordinates, defect
-from lapwing.studies.accuracy.problem import Outcome, Way
+from lapwing.studies.accuracy.problem import SolverMethod, SolverRun
 
 ADAPTIVE = "rkmk54"  # the method that `adapt` runs
 SAMPLES = 8  # parts of a run after which its invariants are looked at; every count of steps is a multiple
@@ -46,7 +46,7 @@ def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray
     return adapt(p, x, times, tolerance, out)
 
 
-def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
+def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
     """A way for each integrator, the adaptive one by tolerances.
 
     Args:
@@ -59,12 +59,12 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
     return [_adaptive(p, x, duration) if way.name == ADAPTIVE else way for way in fixed]
 
 
-def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[Way]:
+def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
     """A way for each integrator, all by steps."""
     return [_fixed(name, p, x, duration, coarsest) for name in integrators.fitting(p, x)]
 
 
-def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
+def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverMethod:
     method, width = integrators.get(name), len(flatten(x))
     token = method.Method()
 
@@ -75,34 +75,38 @@ def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> Way:
         out, every = np.empty((SAMPLES + 1, width)), steps(h) // SAMPLES
         return lambda: (sampled(token, p, x, duration / steps(h), every, out), out)
 
-    def read(h: float, result: Any) -> Outcome | None:
+    def read(h: float, result: Any) -> SolverRun | None:
         rows, out = result
         if rows < len(out):
             return None
         times = np.linspace(0.0, duration, SAMPLES + 1)
         each = getattr(method, "EVALUATIONS", None) or counted(method, p, x, h, times[:-1], out[:-1])
         evaluations = round(steps(h) * each)
-        return Outcome(times, coordinates(x, out), defect(x, out[-1]), evaluations)
+        return SolverRun(times, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]
     start = np.empty((1, width))
-    return Way(name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start))
+    return SolverMethod(
+        name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start)
+    )
 
 
-def _adaptive(p: Any, x: Any, duration: float) -> Way:
+def _adaptive(p: Any, x: Any, duration: float) -> SolverMethod:
     method, ends = integrators.get(ADAPTIVE), np.array([0.0, duration])
 
     def prepare(tolerance: float) -> Callable[[], Any]:
         out = np.empty((2, len(flatten(x))))
         return lambda: (adapted(p, x, ends, tolerance, out), out)
 
-    def read(tolerance: float, result: Any) -> Outcome | None:
+    def read(tolerance: float, result: Any) -> SolverRun | None:
         (status, _, _, steps, rejected), out = result
         if status != 0:
             return None
         # the first stage is the last of the step before
         evaluations = 1 + (method.EVALUATIONS - 1) * (steps + rejected)
-        return Outcome(ends, coordinates(x, out), defect(x, out[-1]), evaluations)
+        return SolverRun(ends, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     start = np.empty((1, len(flatten(x))))
-    return Way(ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapted(p, x, ends[:1], 1.0, start))
+    return SolverMethod(
+        ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapted(p, x, ends[:1], 1.0, start)
+    )

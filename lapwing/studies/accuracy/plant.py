@@ -17,13 +17,13 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters,
 from lapwing.kernels import kernel, leaf
 from lapwing.kernels.codegen import each
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.integrate import SAMPLES
-from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 
 DURATION = 2.0  # [s], about
 HEIGHT = 20.0  # [m] clear of the ground
@@ -81,7 +81,7 @@ def longest_step(scene: Scene) -> float:
 
 def problem(scene: Scene) -> Problem:
     """The plant of such a scene, and the ways to integrate it."""
-    exchange = scene[Exchange]
+    exchange = scene[Communication]
     (p, state), longest = physics(scene), longest_step(scene)
     motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
     volts = (hover_speed(p) / p.layout.speed_per_volt,) * len(motion.rotor_speed)
@@ -95,19 +95,19 @@ def problem(scene: Scene) -> Problem:
         token, h = method.Method(), exchange.interval / steps
         return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
 
-    def way(name: str) -> Way:
+    def way(name: str) -> SolverMethod:
         method = integrators.get(name)
 
-        def read(step: float, out: np.ndarray) -> Outcome | None:
+        def read(step: float, out: np.ndarray) -> SolverRun | None:
             if not np.isfinite(out).all():
                 return None
             each_step = getattr(method, "EVALUATIONS", None)
             evaluations = each_step and SAMPLES * every * round(exchange.interval / step) * each_step
             times = np.linspace(0.0, duration, SAMPLES + 1)
-            return Outcome(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
+            return SolverRun(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
 
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
-        return Way(
+        return SolverMethod(
             name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
             flown(method, 1, rows=1),
         )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 
-class Outcome(NamedTuple):
+class SolverRun(NamedTuple):
     """What one run of a way gives."""
 
     times: np.ndarray  # of the samples, shape (k,), the first the start, the last the end
@@ -15,7 +15,7 @@ class Outcome(NamedTuple):
     evaluations: int | None  # of the right-hand side; None where they are not known
 
 
-class Way(NamedTuple):
+class SolverMethod(NamedTuple):
     """One method, for one problem.
 
     A setting is its step or its tolerance. `prepare(setting)` gives what is timed, a call that does all the work and
@@ -28,7 +28,7 @@ class Way(NamedTuple):
     unit: str  # of the settings: "s", or "tol" for a tolerance
     settings: Sequence[float]  # coarse to fine
     prepare: Callable[[float], Callable[[], Any]]
-    read: Callable[[float, Any], Outcome | None]
+    read: Callable[[float, Any], SolverRun | None]
     idle: Callable[[], Any]
 
 
@@ -38,7 +38,7 @@ class Problem(NamedTuple):
     title: str
     unit: str  # of time
     duration: float
-    ways: Sequence[Way]
+    ways: Sequence[SolverMethod]
     reference: Callable[[], np.ndarray]  # coordinates at the end, shape (n,)
     source: str  # what the reference is
     invariants: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]  # (times, samples) -> values, shape (k, ...)

@@ -8,7 +8,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics.integrators import get
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.accuracy import plant
@@ -46,7 +46,7 @@ def physics(scene: Scene) -> tuple[Any, Any]:
 
 
 def _marched(scene: Scene, p: Any, x: Any) -> Problem:
-    interval = scene[Exchange].interval
+    interval = scene[Communication].interval
     ticks = SAMPLES * max(1, round(scene[Run].duration / interval / SAMPLES))
     p = lifted(p)
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from lapwing.cosim.scene import Scene, SceneError, Source
+from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
 from lapwing.dynamics import integrators
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, source_digest
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver
@@ -38,9 +38,9 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
         points = [p for p in points if p.way == solver.integrator]
     try:
         chosen = cheapest(points, solver.accuracy)
-    except KeyedError as error:
+    except ConfigError as error:
         message = f"{solver.accuracy:g}: {error.message}"
-        raise SceneError("solver.accuracy", message, source=Source(scene.path)) from None
+        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
     # the step that `Solver.check` takes for a divisor of the interval
     return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
 
@@ -84,7 +84,7 @@ def _file(scene: Scene) -> Path | None:
         run.seed,
         scene[Vehicle].name,
         run.duration,
-        scene[Exchange].rate,
+        scene[Communication].rate,
         dict(scene[Effects].tables),
         scenes.physics(scene),
     ):

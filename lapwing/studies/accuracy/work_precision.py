@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.studies.accuracy.coordinates import error
-from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 
 FINE_ENOUGH = 1e-11  # errors below are round-off, of the run or of the reference
 LONGEST = 0.1  # [s] of wall time of one run; what takes longer is not repeated, and not refined by default
@@ -41,7 +41,7 @@ def measure(problem: Problem, longest: float = LONGEST) -> list[Point]:
     return points
 
 
-def _refine(problem: Problem, way: Way, exact: np.ndarray, longest: float) -> list[Point]:
+def _refine(problem: Problem, way: SolverMethod, exact: np.ndarray, longest: float) -> list[Point]:
     points: list[Point] = []
     idle = clock(way.idle)[0]
     for setting in way.settings:
@@ -65,7 +65,7 @@ def _exhausted(errors: list[float]) -> bool:
     return best < FINE_ENOUGH or (best < 1e-8 and len(errors) > 2 and best < min(errors[-2:]))
 
 
-def drift(problem: Problem, outcome: Outcome) -> dict[str, float]:
+def drift(problem: Problem, outcome: SolverRun) -> dict[str, float]:
     """Largest change of each invariant over the samples, relative to its size at the start."""
     found = {"manifold": outcome.defect}
     for name, invariant in problem.invariants.items():
@@ -97,7 +97,7 @@ def cheapest(points: list[Point], target: float) -> Point:
     if not met:
         best = min(points, key=lambda p: p.error, default=None)
         reached = f"; the smallest reached is {best.error:.2g}, by {best.way}" if best else ""
-        raise KeyedError(f"--target {target:g}", f"no method meets this error{reached}")
+        raise ConfigError(f"--target {target:g}", f"no method meets this error{reached}")
     return min(met, key=lambda p: p.time)
 
 

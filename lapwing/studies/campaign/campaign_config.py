@@ -1,17 +1,17 @@
 """What a campaign looks at in a flight."""
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Exchange, Rates
+from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.scene_resolver import resolve
 
 TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, STATUS)
 
 
-def campaign_setup(scene: Scene) -> Setup:
+def campaign_setup(scene: Scene) -> RunConfig:
     """The set-up of a flight of this scene, with an estimate at every tick.
 
     Raises:
@@ -22,7 +22,7 @@ def campaign_setup(scene: Scene) -> Setup:
             _check(vehicle)
     else:
         _check(scene)
-    return resolve(scene.replaced(scene[Rates].model_copy(update={"estimate": scene[Exchange].rate})))
+    return resolve(scene.replaced(scene[Rates].model_copy(update={"estimate": scene[Communication].rate})))
 
 
 def _check(scene: Scene) -> None:

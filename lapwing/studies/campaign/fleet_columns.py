@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lapwing.services.common.success_criteria import Success
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.metrics import FIGURES
 from lapwing.studies.separation import nearest
 
@@ -24,7 +24,7 @@ def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
     return {NEAREST: float, **each, **figures} if vehicles else {}
 
 
-def joined(flights: Mapping[str, Flight], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
+def joined(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
     """The columns of a run besides what it draws.
 
     Args:

@@ -15,7 +15,7 @@ import numpy as np
 
 import lapwing.services
 from lapwing.cosim.config.provenance import package_version
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene, SceneError
 from lapwing.services.common.success_criteria import Success
 from lapwing.services.common.vehicle_schema import Vehicle
@@ -69,7 +69,7 @@ def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
     return {**found, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
 
 
-def first_setup(plan: Plan) -> tuple[int, Setup]:
+def first_setup(plan: Plan) -> tuple[int, RunConfig]:
     """The first run that the scene takes, and its set-up.
 
     Raises:
@@ -86,7 +86,7 @@ def first_setup(plan: Plan) -> tuple[int, Setup]:
     raise refusal
 
 
-def reference(run: int, setup: Setup) -> Reference:
+def reference(run: int, setup: RunConfig) -> Reference:
     """What a run comes to here; flies it."""
     return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
 
@@ -145,7 +145,7 @@ def _of_refused(names: tuple[str, ...]) -> Row:
     return {**found, "verdict": REFUSED, "end_state": ""}
 
 
-def setup_of(plan: Plan, run: int) -> Setup:
+def setup_of(plan: Plan, run: int) -> RunConfig:
     """The set-up of a run.
 
     Raises:
@@ -196,7 +196,7 @@ def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
 
 
 @cache
-def _resolved(scene: str, overrides: tuple[str, ...]) -> Setup:
+def _resolved(scene: str, overrides: tuple[str, ...]) -> RunConfig:
     return campaign_setup(_scene(scene, overrides))
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 
 
 class Influence(NamedTuple):
@@ -16,7 +16,7 @@ class Influence(NamedTuple):
     failure: str = ""
 
 
-def influence(flown: Flight, other: Flight) -> Influence:
+def influence(flown: FlightData, other: FlightData) -> Influence:
     """The difference of `other` from `flown`; a flight that ends earlier is taken to stay where it ended."""
     if other.failure:
         return Influence(np.inf, np.inf, np.inf, other.failure)

@@ -11,8 +11,8 @@ from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.influence import Influence, influence
-from lapwing.studies.effects.variants import Hangar, Tables, hangar, refusal
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.effects.variants import Tables, VariantPool, hangar, refusal
+from lapwing.studies.flight_data import FlightData
 
 
 class Row(NamedTuple):
@@ -95,7 +95,7 @@ def _without(tables: Tables, *names: str) -> dict[str, Any]:
 
 
 def _smallest(
-    crew: Hangar, tables: Tables, flown: Flight, out: list[str], within: float, say: Callable[[str], None]
+    crew: VariantPool, tables: Tables, flown: FlightData, out: list[str], within: float, say: Callable[[str], None]
 ) -> tuple[dict[str, Any], float]:
     """The effects left, and how far off that is, when all of `out` go that can go together.
 

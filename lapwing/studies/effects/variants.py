@@ -11,7 +11,7 @@ from lapwing.dynamics import effects
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import Effects, airframe
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 from lapwing.studies.workers import workers
 
@@ -32,24 +32,24 @@ def refusal(scene: Scene, tables: Tables) -> str:
     return ""
 
 
-def truth_of(scene: Scene) -> Flight:
+def truth_of(scene: Scene) -> FlightData:
     """The scene flown to its end, with the true state alone."""
     return fly(scene, (TRUTH,))
 
 
-class Hangar:
+class VariantPool:
     """Flies variants of one scene side by side; each set of effects is compiled once and kept on disk."""
 
     def __init__(self, scene: Scene, pool: ProcessPoolExecutor):
         self._scene, self._pool = scene, pool
 
-    def fly(self, variants: Iterable[Tables]) -> Iterator[Flight]:
+    def fly(self, variants: Iterable[Tables]) -> Iterator[FlightData]:
         """The flight of each variant, in order, as they come."""
         return self._pool.map(truth_of, [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager
-def hangar(scene: Scene) -> Iterator[Hangar]:
+def hangar(scene: Scene) -> Iterator[VariantPool]:
     """A hangar whose processes end with the block, at once where it ends with an error, and with this process."""
     with workers(os.cpu_count() or 1) as pool:
-        yield Hangar(scene, pool)
+        yield VariantPool(scene, pool)

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from lapwing.cosim.executors.deadlines import MISSED, WORST
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 
 LONG = 60  # letters of a value or of an effect's keys that are still listed
 MANY = 12  # keys in which two scenes differ that are listed
 
 
-def facts(flight: Flight) -> dict[str, str]:
+def facts(flight: FlightData) -> dict[str, str]:
     """What flew, and how it was computed, by name; what the log does not say is left out."""
     said, scene = flight.metadata, flight.origin.scene
     t = flight.truth.times

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import AXES, Flight
+from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
 DEGREES = 180.0 / np.pi  # of 1 rad
 
 
-def over(flight: Flight) -> dict:
+def over(flight: FlightData) -> dict:
     """Span and phases of a flight, as arguments of a `Plot`."""
     t = flight.truth.times
     return {"span": (float(t[0]), float(max(t[-1], t[0] + 1e-9))), "phases": tuple(phases(flight))}
 
 
-def phases(flight: Flight) -> list[tuple[str, float, float]]:
+def phases(flight: FlightData) -> list[tuple[str, float, float]]:
     """Name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
     if not flight.has("setpoint"):
         return []
@@ -28,7 +28,7 @@ def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
     return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
 
 
-def three_axes(flight: Flight, first: int, flown: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
+def three_axes(flight: FlightData, first: int, flown: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
     """Three axes over time, a row each; where something was followed, beside each its error.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.report import shapes
 from lapwing.studies.report.sections import labels
@@ -72,7 +72,7 @@ class Motion(NamedTuple):
     links: tuple[Link, ...] = ()
 
 
-def motion(flight: Flight) -> Motion:
+def motion(flight: FlightData) -> Motion:
     """What moves in a flight: as the shape of its vehicle's model has it, else three axes."""
     model = flight.origin.scene.get("vehicle", {}).get("model", "reduced")
     for module in shapes.modules():
@@ -86,14 +86,14 @@ def motion(flight: Flight) -> Motion:
 
 
 def of_truth(
-    flight: Flight, strokes: tuple[Stroke, ...], rotors: tuple[Rotor, ...] = (), surface: Surface | None = None
+    flight: FlightData, strokes: tuple[Stroke, ...], rotors: tuple[Rotor, ...] = (), surface: Surface | None = None
 ) -> Body:
     """The vehicle as one body."""
     truth = flight.truth
     return Body(flight.vehicle, truth.times, truth.position, truth.orientation, strokes, rotors, None, surface)
 
 
-def of_bodies(flight: Flight, drawn: Sequence[tuple[tuple[Stroke, ...], tuple[Rotor, ...]]]) -> tuple[Body, ...]:
+def of_bodies(flight: FlightData, drawn: Sequence[tuple[tuple[Stroke, ...], tuple[Rotor, ...]]]) -> tuple[Body, ...]:
     """The bodies of the topic of that name, in its order, with strokes and rotors of each."""
     said = flight.topic("bodies")
     names = said["name"][0]
@@ -103,7 +103,7 @@ def of_bodies(flight: Flight, drawn: Sequence[tuple[tuple[Stroke, ...], tuple[Ro
     )
 
 
-def to_json(flights: Sequence[Flight]) -> str:
+def to_json(flights: Sequence[FlightData]) -> str:
     """Motions of a flight with its fleet, or of two laid over each other, for the browser (motion.js); safe within an
     HTML element."""
     if len(flights) == 1:
@@ -119,7 +119,7 @@ def to_json(flights: Sequence[Flight]) -> str:
     return json.dumps({"end": longest, "flights": found}, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def steps_to_json(steps: Sequence[Flight], events: Sequence[Sequence[Event]], first: bool) -> str:
+def steps_to_json(steps: Sequence[FlightData], events: Sequence[Sequence[Event]], first: bool) -> str:
     """What is new of the vehicles of a run that goes on, and what happened to each, for the browser; surfaces in the
     first step."""
     frames = max(LEAST, STEP_FRAMES // len(steps))
@@ -141,7 +141,7 @@ def _colour(place: int) -> str:
     return COLOURS[place % len(COLOURS)]
 
 
-def _table(flight: Flight, name: str, colour: str, frames: int, later: bool = False) -> dict[str, Any]:
+def _table(flight: FlightData, name: str, colour: str, frames: int, later: bool = False) -> dict[str, Any]:
     """A flight in at most so many rows; `later`: wind and forces that are not there may come yet."""
     truth, moved = flight.truth, motion(flight)
     kept = np.unique(np.linspace(0, len(truth) - 1, min(frames, len(truth))).round().astype(int))
@@ -178,7 +178,7 @@ def _body(body: Body, times: np.ndarray, kept: np.ndarray, later: bool) -> dict[
     }
 
 
-def _contact(flight: Flight, times: np.ndarray) -> dict[str, Any] | None:
+def _contact(flight: FlightData, times: np.ndarray) -> dict[str, Any] | None:
     """Points that may touch the ground, and the forces on them, point by point in each row; None where nobody tells."""
     if not flight.has("contact"):
         return None

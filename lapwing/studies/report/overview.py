@@ -1,12 +1,12 @@
 """A quick look at a flight: position over time, and the path in space."""
 
-from lapwing.studies.flight_data import AXES, Flight
+from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot, reference
 from lapwing.studies.report.plots.path import space
 
 
-def overview(flight: Flight) -> Plot:
+def overview(flight: FlightData) -> Plot:
     """The displacements beside their references, and the path."""
     t, followed = flight.truth.times, flight.reference
     panels = []

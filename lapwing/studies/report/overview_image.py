@@ -6,15 +6,15 @@ python -m lapwing.studies.report.overview_image recordings/LOG.mcap docs/picture
 import sys
 from pathlib import Path
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.matplotlib_figure import write_png
 from lapwing.studies.report.overview import overview
 
 
-def draw(flight: Flight, target: Path) -> None:
+def draw(flight: FlightData, target: Path) -> None:
     """Write the picture as PNG."""
     write_png(target, [overview(flight)])
 
 
 if __name__ == "__main__":
-    draw(Flight.read(Path(sys.argv[1])), Path(sys.argv[2]))
+    draw(FlightData.read(Path(sys.argv[1])), Path(sys.argv[2]))

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.studies.flight_data import AXES, Flight
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.flight_header import differences, facts
 from lapwing.studies.report.motion_3d import to_json
 from lapwing.studies.report.plotly_figure import script
@@ -27,7 +27,7 @@ class Accuracy(NamedTuple):
     values: tuple[float | None, ...]
 
 
-def flight_page(flights: Sequence[Flight]) -> str:
+def flight_page(flights: Sequence[FlightData]) -> str:
     """The page of one flight, or of two laid over each other."""
     scenes = [flight.origin.scene for flight in flights]
     published = scenes[0].get("published", {})
@@ -52,7 +52,7 @@ def flight_page(flights: Sequence[Flight]) -> str:
     )
 
 
-def live_page(setup: Setup, stream: str) -> str:
+def live_page(setup: RunConfig, stream: str) -> str:
     """The page of a flight that goes on; the address `stream` gives what is new of it."""
     said = {"name": setup.scene, "title": setup.title, "several": len(setup.vehicles) > 1}
     return render("live.html", [], stream=stream, moving=_moving(), **said)
@@ -72,7 +72,7 @@ def render(template: str, sections: Iterable[Section], **values: Any) -> str:
     return _TEMPLATES.get_template(template).render(library=script(), code=code, sections=sections, **values)
 
 
-def accuracy(flights: Sequence[Flight], published: dict[str, float]) -> list[Accuracy]:
+def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list[Accuracy]:
     """Root-mean-square error of each axis [m], [°] beside the published one; empty without a reference."""
     if not any(flight.rmse for flight in flights):
         return []

@@ -5,7 +5,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report import plots
 from lapwing.studies.report.overlay import overlay
 from lapwing.studies.report.plot import NotRecordedError, Plot, in_hours
@@ -28,7 +28,7 @@ class Section(NamedTuple):
         return to_json(self.plot) if self.plot else ""
 
 
-def sections(flights: Sequence[Flight]) -> Iterator[Section]:
+def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
     """Every plot of the vehicles' models, of one flight or of two laid over each other.
 
     They are drawn one after the other, as they are asked for: each holds all rows of what it shows.
@@ -40,7 +40,7 @@ def sections(flights: Sequence[Flight]) -> Iterator[Section]:
     return (_section(module, flights) for module in wanted)
 
 
-def labels(flights: Sequence[Flight]) -> tuple[str, ...]:
+def labels(flights: Sequence[FlightData]) -> tuple[str, ...]:
     """Names that tell the flights apart: those of their logs, with folders where these are the same."""
     sources = [Path(flight.origin.source) for flight in flights]
     stems = tuple(source.stem for source in sources)
@@ -50,7 +50,7 @@ def labels(flights: Sequence[Flight]) -> tuple[str, ...]:
     return named if len(set(named)) == len(named) else tuple("AB"[: len(flights)])
 
 
-def _section(module: ModuleType, flights: Sequence[Flight]) -> Section:
+def _section(module: ModuleType, flights: Sequence[FlightData]) -> Section:
     name = module.__name__.rpartition(".")[2]
     drawn: list[tuple[str, Plot]] = []
     missing: list[str] = []
@@ -73,6 +73,6 @@ def _section(module: ModuleType, flights: Sequence[Flight]) -> Section:
     return Section(name, module.TITLE, in_hours(plot) if long(flights) else plot)
 
 
-def long(flights: Sequence[Flight]) -> bool:
+def long(flights: Sequence[FlightData]) -> bool:
     """Whether time is told in hours."""
     return bool(max(flight.truth.times[-1] for flight in flights) > LONG)

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 
 FORMATS = (".html", ".pdf", ".png")
 
 
-def write(flights: Flight | Sequence[Flight], target: Path) -> Path:
+def write(flights: FlightData | Sequence[FlightData], target: Path) -> Path:
     """Write the report of a flight, or of two laid over each other; its path.
 
     A name that ends in .html gives a page for a browser; .pdf a page a plot, .png all of them in one picture.
@@ -17,7 +17,7 @@ def write(flights: Flight | Sequence[Flight], target: Path) -> Path:
     Raises:
         ValueError: the report cannot be written, or the file's name has another ending.
     """
-    flown = [flights] if isinstance(flights, Flight) else list(flights)
+    flown = [flights] if isinstance(flights, FlightData) else list(flights)
     check_format(target)
     try:
         if target.suffix == ".html":

@@ -3,6 +3,6 @@
 `lapwing stability [CASE]`; a case is a file of `cases/`.
 """
 
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 
-__all__ = ["Curve", "Found", "Plot", "Row", "Sweep"]
+__all__ = ["CaseResult", "Curve", "Plot", "Row", "Sweep"]

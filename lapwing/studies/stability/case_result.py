@@ -54,7 +54,7 @@ class Row(NamedTuple):
         return self.passes and not self.naive_passes
 
 
-class Found(NamedTuple):
+class CaseResult(NamedTuple):
     """What a case came to."""
 
     rows: Sequence[Row]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.studies.stability import cases, other_simulators
-from lapwing.studies.stability.case_result import Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Plot, Row, Sweep
 from lapwing.studies.workers import workers
 
 
@@ -18,7 +18,7 @@ class Result(NamedTuple):
 
     case: str
     hard: str
-    found: Found
+    found: CaseResult
     sweep: Sweep | None
     seconds: float  # of wall time
 
@@ -68,7 +68,7 @@ def one(name: str, sweep: bool) -> Result:
             found = module.run()
     except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
         why = f"ended in an error: {error}"
-        found = Found([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
+        found = CaseResult([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
     with np.errstate(all="ignore"):
         others = other_simulators.figures(name)
         walked = module.sweep() if sweep else None

@@ -7,21 +7,21 @@ import numpy as np
 
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
 
-def flown(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> Flight:
+def flown(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> FlightData:
     """A flight of a scene with overrides "KEY=VALUE", until its end or until its numbers end.
 
     Raises:
         SceneError: what is set is refused.
     """
-    found: Flight = fly(load(scene, list(overrides)), topics)
+    found: FlightData = fly(load(scene, list(overrides)), topics)
     return found
 
 
-def finite(flight: Flight) -> bool:
+def finite(flight: FlightData) -> bool:
     """Whether all that is told of the motion is."""
     told = flight.truth
     return all(np.isfinite(a).all() for a in (told.position, told.orientation, told.velocity, told.angular_velocity))

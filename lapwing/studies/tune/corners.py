@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
@@ -35,19 +35,19 @@ class Corner(NamedTuple):
 CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repeat=3)]
 
 
-def flown(setup: Setup) -> dict[str, Any]:
+def flown(setup: RunConfig) -> dict[str, Any]:
     """Figures of a flight of which all that a campaign looks at is told at every tick."""
     return figures(fly(setup, TOPICS))
 
 
-def with_gains(setup: Setup, gains: GainSet) -> Setup:
+def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:
     """The run with another gain set, also where the scene's parameters had changed single gains of its own."""
     own, changed = setup.services["autopilot"].parameters, {p.name: p for p in of_gains(gains)}
     parameters = tuple(changed.get(p.name, p) for p in own.parameters)
     return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
 
 
-def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
+def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
     """The run with a vehicle that differs from the one which the autopilot knows."""
     frame = airframe(scene)
     mass = frame.mass.model_copy(
@@ -66,7 +66,7 @@ def with_vehicle(setup: Setup, scene: Scene, corner: Corner) -> Setup:
     return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
 
 
-def _with(setup: Setup, name: str, parameters: Any) -> Setup:
+def _with(setup: RunConfig, name: str, parameters: Any) -> RunConfig:
     changed = setup.services[name]._replace(parameters=parameters)
     return setup._replace(services={**setup.services, name: changed})
 

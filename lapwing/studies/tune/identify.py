@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import bilinear, lfilter
 
 from lapwing.services.autopilot.control import Parameters
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune.linearise import Hover
 
 CUT = 60.0  # [rad/s] of the filter, above the loops' bandwidths
@@ -36,7 +36,7 @@ class _Signals(NamedTuple):
     used: np.ndarray  # (n,) bool: in the air
 
 
-def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
+def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
     """Fit acceleration = gain * lag(demand) + constant to a log.
 
     Args:
@@ -80,7 +80,7 @@ def identify(flight: Flight, p: Parameters, guess: Hover) -> Identified:
     return Identified(guess._replace(lag=lag, **gains), fit)
 
 
-def _signals(flight: Flight, p: Parameters, tick: float) -> _Signals:
+def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
     """Demands and filtered responses tick by tick."""
     thrust = flight.actuators.thrust
     sensed = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)

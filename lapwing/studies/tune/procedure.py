@@ -11,11 +11,11 @@ from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import Margins, margins, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_setup
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
@@ -77,10 +77,10 @@ def tune(
     for name, value in wanted._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
-    airframe, tick, config = known_airframe(scene), scene[Exchange].interval, scene[Autopilot]
+    airframe, tick, config = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
     own = build(scene[GainSet].plain(), airframe)
     compiled = hover(scene)
-    identified = identify(Flight.read(log), own, compiled) if log else None
+    identified = identify(FlightData.read(log), own, compiled) if log else None
     model = identified.model if identified else compiled
     plant = assumed_airframe(airframe, model)
     before = _judged(config.gains, own, plant, tick)

@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
 from lapwing.services.autopilot.interface import Setpoint
@@ -23,7 +23,7 @@ class AltitudeFlight:
     def step(
         self,
         constants: Constants,
-        view: View,
+        view: CommanderInput,
         guidance: Guidance,
         climb_rate: float,
         yaw_rate: float,

@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, retract, to_roll_pitch_yaw
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import CUT_HEIGHT
@@ -22,7 +22,7 @@ def stick_thrust(constants: Constants, up: float) -> float:
 class AttitudeFlight:
     """Makes setpoints of attitudes, turned on by body rates where those are given; what leans on the wind stays."""
 
-    def __init__(self, view: View):
+    def __init__(self, view: CommanderInput):
         """From the attitude [rad] that the vehicle has."""
         self.roll, self.pitch, self.yaw = to_roll_pitch_yaw(view.estimate.attitude)
         self._altitude = view.estimate.position_world[2]
@@ -39,7 +39,13 @@ class AttitudeFlight:
         self.roll, self.pitch = (max(-limit, min(limit, angle)) for angle in (roll, pitch))
 
     def setpoint(
-        self, constants: Constants, view: View, guidance: Guidance, yaw_rate: float, thrust: float, climb_rate: float
+        self,
+        constants: Constants,
+        view: CommanderInput,
+        guidance: Guidance,
+        yaw_rate: float,
+        thrust: float,
+        climb_rate: float,
     ) -> Setpoint:
         """The setpoint of the present attitude.
 

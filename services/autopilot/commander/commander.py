@@ -9,8 +9,8 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.messages import CommandAck
 from lapwing.services.autopilot.commander import failsafes, failure_handlers, plan_handlers, prearm_checks  # noqa: F401 (two declare their handlers)
 from lapwing.services.autopilot.commander.command_handlers import handle
-from lapwing.services.autopilot.commander.commander_input import Constants, View
-from lapwing.services.autopilot.commander.commander_output import Outbox, Request, Status
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
+from lapwing.services.autopilot.commander.commander_output import CommanderOutput, OperatorMessages, Status
 from lapwing.services.autopilot.commander.commander_state import State, initial
 from lapwing.services.autopilot.commander.commander_status import status
 from lapwing.services.autopilot.commander.transitions import Context, arm, disarm, enter
@@ -34,7 +34,7 @@ class Commander:
 
     def initial_status(self) -> Status:
         """What the vehicle is doing before the first tick."""
-        view = View(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
+        view = CommanderInput(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
         return status(self.constants, view, self.state)
 
     def skip(self, ticks: int, dt: float, flying: bool, setpoint: Setpoint | None) -> None:
@@ -53,12 +53,12 @@ class Commander:
         if setpoint is not None:
             guidance.follow(setpoint)
 
-    def step(self, view: View) -> Request:
+    def step(self, view: CommanderInput) -> CommanderOutput:
         """What is asked for at this tick. While a request is quiet it needs to be called only where something may
         change (`quiet_time`); with an operator, whose commands see what `guidance` was before, `skip` comes first.
         """
         constants, state = self.constants, self.state
-        context = Context(constants, view, state, Outbox())
+        context = Context(constants, view, state, OperatorMessages())
         if constants.has_operator:
             prearm_checks.count_outages(view, state)
         for command in view.commands:
@@ -67,7 +67,7 @@ class Commander:
         _retry_arming(context)
         setpoint, from_estimate = _setpoint(context)
         volts = state.mode.motor_voltage if state.mode and state.guidance.flying else None
-        return Request(
+        return CommanderOutput(
             setpoint=setpoint,
             parameters=context.outbox.parameters,
             faults=context.outbox.faults,

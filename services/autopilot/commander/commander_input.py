@@ -24,7 +24,7 @@ class Constants(NamedTuple):
     rotors: int = 4
 
 
-class View(NamedTuple):
+class CommanderInput(NamedTuple):
     """All that the commander is told at one tick."""
 
     dt: float  # length of the tick [s]

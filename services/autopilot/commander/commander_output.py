@@ -28,7 +28,7 @@ class Status(NamedTuple):
     battery_warning: int  # 0 none, 1 low, 2 critical, 3 nearly empty
 
 
-class Request(NamedTuple):
+class CommanderOutput(NamedTuple):
     """All that the commander asks for at one tick."""
 
     setpoint: Setpoint | None  # to be followed; None: the scene's trajectory
@@ -46,7 +46,7 @@ class Request(NamedTuple):
 
 
 @dataclass
-class Outbox:
+class OperatorMessages:
     """What is to be told at one tick, while it is collected."""
 
     acknowledgements: list[Any] = field(default_factory=list)

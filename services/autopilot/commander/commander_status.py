@@ -1,14 +1,14 @@
 """The status words of the commander's state."""
 
 from lapwing.services.autopilot.commander import prearm_checks
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.commander_output import Status
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.commander.route import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
 
 
-def status(constants: Constants, view: View, state: State) -> Status:
+def status(constants: Constants, view: CommanderInput, state: State) -> Status:
     """What the vehicle is doing after a tick."""
     guidance, route = state.guidance, state.guidance.route
     armed = guidance.armed and not state.on_trajectory

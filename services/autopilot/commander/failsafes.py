@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from lapwing.services.autopilot.commander.commander_input import View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput
 from lapwing.services.autopilot.commander.commander_state import FailsafeTimer, State
 from lapwing.services.autopilot.commander.transitions import Context, enter
 from lapwing.services.common import status_texts
@@ -18,7 +18,7 @@ class Failsafe(NamedTuple):
     """A condition that has to last for a while, and the parameter that says what then happens."""
 
     reason: str
-    holds: Callable[[View, State], bool]
+    holds: Callable[[CommanderInput, State], bool]
     delay: Callable[[dict[str, float]], float]  # of the parameters [s]
     action: str  # parameter
 
@@ -27,7 +27,7 @@ def _battery(reason: str, threshold: str, action: str) -> Failsafe:
     return Failsafe(reason, lambda v, s: v.battery_charge < s.guidance.parameters[threshold], lambda p: 0.5, action)
 
 
-def _link_lost(view: View, state: State) -> bool:
+def _link_lost(view: CommanderInput, state: State) -> bool:
     inputs = state.guidance.inputs
     return inputs.linked and inputs.link_age > state.guidance.parameters["COM_DL_LOSS_T"]
 

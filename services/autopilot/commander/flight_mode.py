@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.interface import Setpoint
 
@@ -24,7 +24,7 @@ class FlightMode:
         """What it does now, for people."""
         return ""
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Move the smoothed setpoint for one tick; or return another one, made from the estimate of this tick."""
         return None
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
@@ -101,7 +101,7 @@ class Guidance:
         """Whether setpoints from outside are coming."""
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
 
-    def lift_off(self, constants: Constants, view: View) -> None:
+    def lift_off(self, constants: Constants, view: CommanderInput) -> None:
         """Let the setpoint leave the ground, from where the vehicle is by the estimate, if it is armed."""
         if not self.flying and self.armed:
             x, y, _ = view.estimate.position_world

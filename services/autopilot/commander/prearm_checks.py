@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.autopilot.commander.commander_input import View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.autopilot.initial_estimate import NOT_STARTED
@@ -13,13 +13,13 @@ MAXIMUM_OUTAGE = 0.5  # [s] of a source: single readings are refused now and the
 _UNCERTAIN = {64: status_texts.POSITION_UNCERTAIN, 128: status_texts.ATTITUDE_UNCERTAIN}
 
 
-def count_outages(view: View, state: State) -> None:
+def count_outages(view: CommanderInput, state: State) -> None:
     """Take in the health of an estimate: how long each source has been lost or refused."""
     health, interval = view.estimate.health, view.estimate_interval
     state.source_outage = [t + interval if health >> bit & 1 else 0.0 for bit, t in enumerate(state.source_outage)]
 
 
-def reasons(view: View, state: State) -> list[str]:
+def reasons(view: CommanderInput, state: State) -> list[str]:
     """Why the vehicle cannot be armed; empty: it can."""
     estimate, guidance = view.estimate, state.guidance
     if estimate.health == NOT_STARTED:

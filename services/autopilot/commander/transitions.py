@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
-from lapwing.services.autopilot.commander.commander_input import Constants, View
-from lapwing.services.autopilot.commander.commander_output import Outbox
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
+from lapwing.services.autopilot.commander.commander_output import OperatorMessages
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.commander.mode_table import MODES
 from lapwing.services.common import status_texts
@@ -14,9 +14,9 @@ class Context(NamedTuple):
     """One tick, as command handlers and failsafes work on it."""
 
     constants: Constants
-    view: View
+    view: CommanderInput
     state: State
-    outbox: Outbox
+    outbox: OperatorMessages
 
 
 def enter(constants: Constants, state: State, name: str, *values: float) -> None:

@@ -7,20 +7,20 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import leaf, uncompiled
 from lapwing.kernels.codegen import implements
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import Controller, estimate_of, outcome, setpoint_of
-from lapwing.services.autopilot.custom.controller_output import NO_WRENCH, Demand, command, demand, off
+from lapwing.services.autopilot.custom.controller_output import NO_WRENCH, ControllerOutput, command, demand, off
 from lapwing.services.autopilot.interface import PerRotor
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, Stage, advance_stage
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LandedState, advance_stage
 from lapwing.services.autopilot.mixer import at_rest
 from lapwing.services.common.ports import Reference, StateEstimate
 
 
-class FromPort(NamedTuple):
+class PythonControllerProxy(NamedTuple):
     """Stands for the parameters of a controller in Python, whose demand comes by a port."""
 
     rate: float
@@ -30,7 +30,7 @@ class CustomController(NamedTuple):
     """A controller of the user's on its vehicle."""
 
     common: Controller
-    own: Any  # parameters of a compiled controller, or `FromPort`
+    own: Any  # parameters of a compiled controller, or `PythonControllerProxy`
     own_start: Any  # its state at take-off
     every: int  # ticks between two of its steps
     lift: float  # force along body z [N] of a collective demand of 1 N
@@ -41,9 +41,9 @@ class CustomController(NamedTuple):
 class CustomState(NamedTuple):
     """Memory of the part."""
 
-    stage: Stage
+    stage: LandedState
     own: Any
-    held: Demand  # of the user's last step
+    held: ControllerOutput  # of the user's last step
     watch: motor_failure.State
     still_from: int  # [tick]
     charge: float  # of the battery, fraction; NaN: not known
@@ -62,15 +62,15 @@ def _ask(
     time: float,
     estimate: StateEstimate,
     setpoint: Reference,
-    by_port: tuple[Received, ...],
+    by_port: tuple[InputSample, ...],
     none: PerRotor,
-) -> tuple[Any, Demand]:
+) -> tuple[Any, ControllerOutput]:
     """`step` of the user's module; or what has come by the port."""
     raise NotImplementedError("compiled code only")
 
 
 @leaf
-def _demanded(given: tuple, none: PerRotor) -> tuple[Any, Demand]:
+def _demanded(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
     """State and output of the user's step, the output as a demand."""
     return given[0], demand(given[1], none)
 
@@ -85,7 +85,7 @@ def _ask_of(
     by_port: types.Type,
     none: types.Type,
 ) -> Callable:
-    if p.instance_class is FromPort:
+    if p.instance_class is PythonControllerProxy:
         return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
     return lambda p, s, time, estimate, setpoint, by_port, none: _demanded(found(p, s, time, estimate, setpoint), none)
@@ -93,7 +93,7 @@ def _ask_of(
 
 @leaf
 def step(
-    p: CustomController, s: CustomState, tick: int, inputs: tuple[Received, ...]
+    p: CustomController, s: CustomState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CustomState, tuple, int]:
     """The command at `tick`."""
     c = p.common
@@ -106,9 +106,9 @@ def step(
     stage = advance_stage(stage, c.law.value.resting_height, estimate_of(e), setpoint_of(wanted), c.interval)
     own, held, none = s.own, s.held, at_rest(c.law.value.shares[0])
     if stage.name != FLYING:
-        own, held = p.own_start, Demand(True, none, NO_WRENCH, (0.0, 0.0))
+        own, held = p.own_start, ControllerOutput(True, none, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:
         own, held = _ask(p.own, own, tick * c.interval, e, wanted, inputs[4:], none)
     given = command(c.law.value, p.lift, p.moments, p.voltage_max, held, wanted.yaw, stage.name, watched.failed)
     watched, outputs = outcome(c, watched, still_from, charge, order, e, wanted, stage.name, given)
-    return CustomState(stage, own, held, watched, still_from, charge), outputs, GO_ON
+    return CustomState(stage, own, held, watched, still_from, charge), outputs, CONTINUE

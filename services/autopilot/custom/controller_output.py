@@ -12,7 +12,7 @@ from lapwing.kernels.codegen import define, each, implements
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.interface import Command, PerRotor
 from lapwing.services.autopilot.land_detector import FLYING, LANDED
-from lapwing.services.autopilot.mixer import Demands, at_rest, mix, possible, saturate, shares_in_force
+from lapwing.services.autopilot.mixer import VirtualControls, at_rest, mix, possible, saturate, shares_in_force
 from lapwing.services.autopilot.motor import Motor, thrust_at, voltages
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
 
@@ -22,7 +22,7 @@ Wrench = tuple[float, float, float, float]
 NO_WRENCH = (0.0, 0.0, 0.0, 0.0)
 
 
-class Demand(NamedTuple):
+class ControllerOutput(NamedTuple):
     """Either voltages, or thrust and moments, as numbers."""
 
     to_motors: bool
@@ -31,12 +31,12 @@ class Demand(NamedTuple):
     roll_pitch: tuple[float, float]  # [rad] that the controller steers to
 
 
-def off(rotors: int) -> Demand:
+def off(rotors: int) -> ControllerOutput:
     """What stops the motors."""
-    return Demand(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
+    return ControllerOutput(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
 
 
-def demand(output: Any, none: PerRotor) -> Demand:
+def demand(output: Any, none: PerRotor) -> ControllerOutput:
     """The demand of a `MotorVoltages` or `ThrustAndMoments`.
 
     Args:
@@ -54,7 +54,7 @@ def demand(output: Any, none: PerRotor) -> Demand:
         wrench = (*_numbers("thrust", (output.thrust,), 1), *moments)
     else:
         raise TypeError(f"step returned {type(output).__name__}, expected MotorVoltages or ThrustAndMoments")
-    return Demand(to_motors, volts, wrench, _numbers("roll_pitch", output.roll_pitch, 2))
+    return ControllerOutput(to_motors, volts, wrench, _numbers("roll_pitch", output.roll_pitch, 2))
 
 
 def _numbers(what: str, given: Iterable[float], n: int) -> Any:
@@ -77,7 +77,9 @@ def _demand(output: types.Type, none: types.Type) -> Callable:
         given = "True, output[0], (0.0, 0.0, 0.0, 0.0)"
     else:
         given = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
-    return define("demand(output, none)", {"Demand": Demand}, f"return Demand({given}, {roll_pitch})")
+    return define(
+        "demand(output, none)", {"ControllerOutput": ControllerOutput}, f"return Demand({given}, {roll_pitch})"
+    )
 
 
 @leaf
@@ -91,7 +93,7 @@ def command(
     lift: float,
     moments: Vec3,
     voltage_max: float,
-    asked: Demand,
+    asked: ControllerOutput,
     yaw: float,
     stage: int,
     failed: int,
@@ -117,7 +119,7 @@ def command(
     else:
         shares, w = shares_in_force(law.shares, failed), asked.wrench
         part = 1.0 / lift
-        demands = Demands(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
+        demands = VirtualControls(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
         thrust = possible(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
         volts = voltages(law.motor, thrust)
     return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)

@@ -3,17 +3,17 @@
 from collections.abc import Mapping
 from typing import Any
 
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.block import Controller
-from lapwing.services.autopilot.commander_wakeup import Attention
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.controller_parameters import lift, moments
 from lapwing.services.autopilot.custom import block
-from lapwing.services.autopilot.custom.block import CustomController, FromPort
+from lapwing.services.autopilot.custom.block import CustomController, PythonControllerProxy
 from lapwing.services.autopilot.custom.controller_output import DEMAND
-from lapwing.services.autopilot.custom.python_controller import AskedController
-from lapwing.services.autopilot.custom.python_estimator import HELD, AskedEstimator, HeldEstimate
+from lapwing.services.autopilot.custom.python_controller import PythonControllerBlock
+from lapwing.services.autopilot.custom.python_estimator import HELD, HeldEstimate, PythonEstimatorBlock
 from lapwing.services.autopilot.custom.user_code_loader import CONTROLLER, ESTIMATOR, compiled, constructor, is_compiled
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common.user_code import named
@@ -24,7 +24,7 @@ def controller_parts(
     texts: Mapping[str, str],
     given: AutopilotSetup,
     common: Controller,
-    inputs: tuple[Input, ...],
+    inputs: tuple[InputPort, ...],
     outputs: tuple[Port, ...],
 ) -> list[Any]:
     """The controller itself where it stays in Python, and the part from its demand to the motors.
@@ -45,20 +45,20 @@ def controller_parts(
     if is_compiled(found):
         own, start = compiled(module, found, vehicle, code.options)
         p = CustomController(common, own, start, code.every, *per_demand, vehicle.voltage_max)
-        return [Part(name, p, Cell(block.start(p)), inputs, outputs, trusted=False)]
+        return [Block(name, p, Cell(block.start(p)), inputs, outputs, trusted=False)]
     construct = constructor(CONTROLLER, module, found, vehicle, code.options)
-    asked = AskedController(code, module, construct, inputs[3].port, vehicle)
-    p = CustomController(common, FromPort(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
-    return [asked, Part(name, p, Cell(block.start(p)), (*inputs, Input(DEMAND)), outputs)]
+    asked = PythonControllerBlock(code, module, construct, inputs[3].port, vehicle)
+    p = CustomController(common, PythonControllerProxy(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
+    return [asked, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(DEMAND)), outputs)]
 
 
 def estimator_parts(
     name: str,
     texts: Mapping[str, str],
     given: AutopilotSetup,
-    attention: Attention,
+    attention: WakeupParameters,
     sensors: dict[str, int],
-    inputs: tuple[Input, ...],
+    inputs: tuple[InputPort, ...],
     estimate: Port,
 ) -> list[Any]:
     """The estimator, and the part that gives its estimate at every tick.
@@ -76,5 +76,5 @@ def estimator_parts(
     assert code is not None
     assert vehicle is not None
     module, found = named(ESTIMATOR, code.name, texts)
-    asked = AskedEstimator(code, module, constructor(ESTIMATOR, module, found, vehicle, code.options), sensors)
-    return [asked, Part(name, HeldEstimate(attention), Cell(0.0), (Input(HELD), *inputs), (estimate,))]
+    asked = PythonEstimatorBlock(code, module, constructor(ESTIMATOR, module, found, vehicle, code.options), sensors)
+    return [asked, Block(name, HeldEstimate(attention), Cell(0.0), (InputPort(HELD), *inputs), (estimate,))]

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.services.autopilot.service_config import CustomCode
 
 
@@ -11,7 +11,7 @@ class PeriodicPart(ABC):
 
     _code: CustomCode
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Read and write the rows of `graph`."""
         self._graph = graph
 

@@ -5,13 +5,13 @@ from types import ModuleType
 from typing import Any
 
 from lapwing.cosim.config.user_module import FAULTS, blame
-from lapwing.cosim.diagram.tick_schedule import KEPT, Port
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import uncompiled
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
 from lapwing.services.autopilot.custom.controller_output import DEMAND, demand, off
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, Stage, advance_stage
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LandedState, advance_stage
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common import ports
 from lapwing.services.common.controller_api import VehicleModel
@@ -20,7 +20,7 @@ _advance_stage, _estimate_of = uncompiled(advance_stage), uncompiled(estimate_of
 _setpoint_of = uncompiled(setpoint_of)
 
 
-class AskedController(PeriodicPart):
+class PythonControllerBlock(PeriodicPart):
     """Shows the controller estimate and setpoint, and puts what it asks for into the port `demand`."""
 
     name = "autopilot.controller"
@@ -42,7 +42,7 @@ class AskedController(PeriodicPart):
             reference: port of the trajectory, or `NO_TRAJECTORY`.
             vehicle: what it is told.
         """
-        self.outputs = (Port(DEMAND, off(len(vehicle.rotor_positions_body)), KEPT),)
+        self.outputs = (Port(DEMAND, off(len(vehicle.rotor_positions_body)), LATCHED),)
         self._none = self.outputs[0].like.volts
         self._code, self._module, self._construct = code, module, construct
         self._reference, self._resting_height = reference, vehicle.resting_height
@@ -53,7 +53,7 @@ class AskedController(PeriodicPart):
         estimate, order = graph.latest(ports.ESTIMATE, tick), graph.latest(ORDER, tick)
         follows = order.follow and self._reference != NO_TRAJECTORY
         setpoint = graph.latest(self._reference, tick) if follows else order.reference
-        stage = Stage(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else INITIAL_STAGE
+        stage = LandedState(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else INITIAL_STAGE
         if stage.name != FLYING or order.restart_at == tick:
             self._controller = None
             before = INITIAL_STAGE if order.restart_at == tick else stage

@@ -5,11 +5,11 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from lapwing.cosim.config.user_module import FAULTS, blame
-from lapwing.cosim.diagram.compiled_block import GO_ON, LOOK, Received
-from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port
+from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import leaf
-from lapwing.services.autopilot.commander_wakeup import Attention, attention_due
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common.estimator_api import checked_estimate
@@ -18,18 +18,18 @@ from lapwing.services.common.ports import StateEstimate
 HELD = "held_estimate"  # port within the autopilot
 
 
-class AskedEstimator(PeriodicPart):
+class PythonEstimatorBlock(PeriodicPart):
     """Shows the estimator the readings that have come, and puts what it says into the port `held_estimate`."""
 
     name = "autopilot.estimator"
-    outputs = (Port(HELD, StateEstimate(), KEPT),)
+    outputs = (Port(HELD, StateEstimate(), LATCHED),)
 
     def __init__(
         self, code: CustomCode, module: ModuleType, construct: Callable[[], Any], sensors: dict[str, int]
     ) -> None:
         """An estimator on these sensors, each with the ticks between its readings."""
         self._code, self._module, self._construct, self._sensors = code, module, construct, sensors
-        self.inputs = tuple(Input(name) for name in sensors)
+        self.inputs = tuple(InputPort(name) for name in sensors)
         self._estimator: Any = None
 
     def _ask(self, tick: int) -> None:
@@ -48,12 +48,12 @@ class AskedEstimator(PeriodicPart):
 class HeldEstimate(NamedTuple):
     """What calls the commander."""
 
-    attention: Attention
+    attention: WakeupParameters
 
 
 @leaf
-def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
+def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The estimate that holds at `tick`; it has no state of its own."""
     held, battery, flight = inputs
     due = attention_due(p.attention, tick, held.value.health, battery, flight)
-    return s, (held.value,), LOOK if due else GO_ON
+    return s, (held.value,), WAKE_PYTHON if due else CONTINUE

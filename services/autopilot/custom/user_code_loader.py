@@ -11,7 +11,7 @@ import numba
 from numba.core.errors import NumbaError
 
 from lapwing.cosim.config.user_module import FAULTS, blame
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.custom.controller_output import demand
@@ -86,17 +86,17 @@ def estimator_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, o
 
 def _try(key: str, name: str, module: ModuleType, owner: Any, step: Callable[[], Any]) -> None:
     if not callable(getattr(owner, "step", None)):
-        raise KeyedError(key, f"{name} has no step", "the method `step`")
+        raise ConfigError(key, f"{name} has no step", "the method `step`")
     try:
         step()
     except FAULTS as error:
-        raise KeyedError(key, f"{name}: {_told(error, module)}") from error
+        raise ConfigError(key, f"{name}: {_told(error, module)}") from error
 
 
 def _rate(key: str, name: str, p: Any) -> float:
     rate = getattr(p, "rate", None)
     if isinstance(rate, bool) or not isinstance(rate, int | float) or not (math.isfinite(rate) and rate > 0.0):
-        raise KeyedError(key, f"{name} has rate = {rate!r}", "a number of steps a second [Hz]")
+        raise ConfigError(key, f"{name} has rate = {rate!r}", "a number of steps a second [Hz]")
     return float(rate)
 
 
@@ -117,7 +117,7 @@ def constructor(
 ) -> Callable[[], Any]:
     """Makes a new one of what `key` names: of a class, or as a copy of an object; KeyedError where that is refused."""
     if options and not inspect.isclass(found):
-        raise KeyedError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
+        raise ConfigError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
 
     cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
 
@@ -138,11 +138,11 @@ def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Map
         raise _refused(CONTROLLER, error, module) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
         expected = "a NamedTuple of its own module, which has `step` too"
-        raise KeyedError(CONTROLLER, f"{found.__name__} gives a {type(p).__name__} for the parameters", expected)
+        raise ConfigError(CONTROLLER, f"{found.__name__} gives a {type(p).__name__} for the parameters", expected)
     return p, s
 
 
-def _refused(key: str, error: BaseException, module: ModuleType) -> KeyedError:
+def _refused(key: str, error: BaseException, module: ModuleType) -> ConfigError:
     """Options that do not fit, or whatever else a constructor complains of."""
     options = isinstance(error, TypeError) and "argument" in str(error)
-    return KeyedError(f"{key}_options" if options else key, blame(error, module))
+    return ConfigError(f"{key}_options" if options else key, blame(error, module))

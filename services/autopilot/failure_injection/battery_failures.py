@@ -2,10 +2,10 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf
 from lapwing.services.common.failure_types import OFF, STUCK, WRONG
-from lapwing.services.common.ports import BatteryGauge
+from lapwing.services.common.ports import BatteryReading
 
 
 class BatteryInjection(NamedTuple):
@@ -16,14 +16,14 @@ class BatteryInjection(NamedTuple):
 
 @leaf
 def step(
-    p: BatteryInjection, s: BatteryGauge, tick: int, inputs: tuple[Received, ...]
-) -> tuple[BatteryGauge, tuple, int]:
+    p: BatteryInjection, s: BatteryReading, tick: int, inputs: tuple[InputSample, ...]
+) -> tuple[BatteryReading, tuple, int]:
     """What arrives of the gauge; the state is what arrived of it before it stuck."""
     r, kind = inputs[0].value, p.faults.value.battery
     last = s if kind == STUCK else r
     x = last
     if kind == OFF:
-        x = BatteryGauge(0.0, r.voltage, r.current, r.temperature)
+        x = BatteryReading(0.0, r.voltage, r.current, r.temperature)
     elif kind == WRONG:
-        x = BatteryGauge(p.faults.value.battery_charge, r.voltage, r.current, r.temperature)
-    return last, (x,), GO_ON
+        x = BatteryReading(p.faults.value.battery_charge, r.voltage, r.current, r.temperature)
+    return last, (x,), CONTINUE

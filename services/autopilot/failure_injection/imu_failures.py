@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import leaf
@@ -34,7 +34,7 @@ def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: 
 
 
 @leaf
-def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
     r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer
     late, turn, push = before.value, r.omega_body, r.specific_force_body
@@ -55,4 +55,4 @@ def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) ->
         r.omega_variance, r.specific_force_variance, r.valid,
     )  # fmt: skip
     x = ImuReading(omega, force, r.omega_variance, r.specific_force_variance, valid)
-    return Memory(last, s.readings + 1), (x,), GO_ON
+    return Memory(last, s.readings + 1), (x,), CONTINUE

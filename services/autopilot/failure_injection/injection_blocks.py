@@ -3,15 +3,15 @@
 from collections.abc import Callable, Collection
 from typing import Any
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.failure_injection.battery_failures import BatteryInjection
 from lapwing.services.autopilot.failure_injection.failure_state import DELAY, Memory
 from lapwing.services.autopilot.failure_injection.imu_failures import ImuInjection
-from lapwing.services.autopilot.failure_injection.motor_failures import Direct, MotorInjection
+from lapwing.services.autopilot.failure_injection.motor_failures import DirectMotorControl, MotorInjection
 from lapwing.services.autopilot.failure_injection.sensor_failures import SensorInjection
 from lapwing.services.autopilot.motor import Motor
 from lapwing.services.common import ports
@@ -41,11 +41,11 @@ _UNITS = {
 class Injection:
     """Where failures are injected in a run; without a cell of `Faults`, nowhere."""
 
-    def __init__(self, faults: Cell | None, setup: Setup, read: Collection[str], motor: Motor):
+    def __init__(self, faults: Cell | None, setup: RunConfig, read: Collection[str], motor: Motor):
         """`setup`: the run; `read`: ports of the sensors that the autopilot reads; `motor`: of every rotor."""
         self.faults, self._motor = faults, motor
         rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
-        self.released = Direct(False, (0.0,) * rotors)  # the controller's command reaches the motors
+        self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors
         self.direct = None if faults is None else Cell(self.released)
         self._setup, self._known = setup, setup.ports
         self._sensors = [name for name in _SENSORS if name in read] if faults is not None else []
@@ -66,7 +66,7 @@ class Injection:
         """The port that the controller writes, in place of that of the motors."""
         return actuators if self.faults is None else actuators._replace(name=f"{actuators.name}.commanded")
 
-    def before(self, name: str) -> list[Part]:
+    def before(self, name: str) -> list[Block]:
         """The parts between sensors and estimator, and behind the battery."""
         found = []
         for port in self._sensors:
@@ -75,22 +75,22 @@ class Injection:
             given = known._replace(name=self.received(port))
             key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
             late = known.period * max(1, round(DELAY / self._setup.interval / known.period))
-            inputs = Input(port), Input(port, late)
+            inputs = InputPort(port), InputPort(port, late)
             parameters = _SENSORS[port](self.faults, key)
-            found.append(Part(f"{name}.inject.{port}", parameters, memory, inputs, (given,), known.period))
+            found.append(Block(f"{name}.inject.{port}", parameters, memory, inputs, (given,), known.period))
         if self.faults is not None:
             known = self._known[ports.BATTERY]
             given = known._replace(name=self.received(ports.BATTERY))
             battery, memory = BatteryInjection(self.faults), Cell(known.like)
-            reads = (Input(ports.BATTERY),)
-            found.append(Part(f"{name}.inject.battery", battery, memory, reads, (given,), known.period))
+            reads = (InputPort(ports.BATTERY),)
+            found.append(Block(f"{name}.inject.battery", battery, memory, reads, (given,), known.period))
         return found
 
-    def after(self, name: str, actuators: Port) -> list[Part]:
+    def after(self, name: str, actuators: Port) -> list[Block]:
         """The part between the controller and the motors."""
         if self.faults is None:
             return []
-        inputs = (Input(self.commanded(actuators).name),)
+        inputs = (InputPort(self.commanded(actuators).name),)
         memory = Cell(Memory(actuators.like.motor_voltage, 0))
         parameters = MotorInjection(self.faults, self.direct, self._motor)
-        return [Part(f"{name}.inject.motors", parameters, memory, inputs, (actuators,))]
+        return [Block(f"{name}.inject.motors", parameters, memory, inputs, (actuators,))]

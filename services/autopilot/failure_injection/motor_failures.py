@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf
 from lapwing.kernels.codegen import each, each_index
 from lapwing.services.autopilot.failure_injection.failure_state import SLOWED, Memory
@@ -13,7 +13,7 @@ from lapwing.services.common.ports import MotorCommand, PerRotor
 WEAKENED = 0.7  # of its voltage that a wrong motor gets: about half of the thrust
 
 
-class Direct(NamedTuple):
+class DirectMotorControl(NamedTuple):
     """Voltages from outside."""
 
     on: bool  # whether they hold
@@ -24,7 +24,7 @@ class MotorInjection(NamedTuple):
     """Where the voltages come from, and what is wrong."""
 
     faults: Any  # cell of `Faults`
-    direct: Any  # cell of `Direct`
+    direct: Any  # cell of `DirectMotorControl`
     motor: Motor
 
 
@@ -50,11 +50,11 @@ def _thrust_at(motor: Motor, volts: float, _: float) -> float:
 
 
 @leaf
-def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """The command that reaches the motors; the controller is told nothing of it."""
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     asked = d.motor_voltage if d.on else c.motor_voltage
     thrust = each(_thrust_at, p.motor, asked, asked) if d.on else c.thrust
     heard = each_index(_heard, asked, kinds, s.last, asked, s.readings)
     volts = each(_supplied, 0.0, kinds, heard)
-    return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), GO_ON
+    return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

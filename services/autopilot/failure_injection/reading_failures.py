@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.noise import Key
-from lapwing.kernels import ByClass, leaf
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.services.autopilot.failure_injection.failure_state import garbage
 from lapwing.services.common.failure_types import Faults
 from lapwing.services.common.ports import (
@@ -132,7 +132,7 @@ def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
     )  # fmt: skip
 
 
-FAILURES = ByClass()
+FAILURES = DispatchTable()
 """The failures by the class of a reading."""
 FAILURES[BarometerReading] = Failure(_barometer_kind, _wrong_barometer, _garbage_barometer)
 FAILURES[DistanceReading] = Failure(_distance_kind, _wrong_distance, _garbage_distance)

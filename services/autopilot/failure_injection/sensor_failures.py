@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.kernels import leaf
 from lapwing.kernels.codegen import define, implements
@@ -64,7 +64,7 @@ def _lost_by(r: types.Type) -> Callable:
 
 
 @leaf
-def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[Received, ...]) -> tuple[Memory, tuple, int]:
+def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
     r, late = inputs[0].value, inputs[1]
     kind = kind_of(p.faults.value, r)
@@ -78,4 +78,4 @@ def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[Received, ...])
         x = late.value
     if silent(kind, p.key, 0, s.readings) or (kind == DELAYED and not late.due):
         x = lost(r)
-    return Memory(last, s.readings + 1), (x,), GO_ON
+    return Memory(last, s.readings + 1), (x,), CONTINUE

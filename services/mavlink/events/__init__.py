@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from functools import cache
 
 from lapwing.dynamics import discovery
-from lapwing.services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, Watch
+from lapwing.services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, EventDetector
 
-__all__ = ["Definition", "Watch", "definitions", "watches"]
+__all__ = ["Definition", "EventDetector", "definitions", "watches"]
 
 
 @cache
@@ -16,7 +16,7 @@ def definitions() -> Mapping[str, Definition]:
     return DEFINITIONS
 
 
-def watches() -> list[Watch]:
+def watches() -> list[EventDetector]:
     """What looks for them, anew for one vehicle."""
     definitions()
     return [kind() for kind in WATCHES]

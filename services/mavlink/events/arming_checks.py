@@ -19,7 +19,7 @@ from lapwing.services.mavlink.events.definition import (
     watch,
 )
 from lapwing.services.mavlink.telemetry.system_status import healthy, sensor_health
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
 WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
@@ -100,7 +100,7 @@ class ArmingWatch:
         self._reported: tuple = ()
         self._next = 0  # [ns]
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """The next report, where one is due."""
         told = v.reports_asked, tuple(v.status.prearm)
         if told == self._told and v.time_ns < self._next:

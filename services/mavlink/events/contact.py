@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from lapwing.messages.topics import TRUTH
 from lapwing.services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Happened, event, watch
 from lapwing.services.mavlink.telemetry.power import motor_fractions
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 MOTORS = 8  # that an event can name
 LASTS = 1_000_000_000  # [ns] that a motor is at a limit before that is told, or off it before that is over
@@ -32,7 +32,7 @@ class ContactWatch:
     def __init__(self) -> None:
         self._contact = True
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """Whether the vehicle has come down, or up."""
         truth = v.get(TRUTH)
         if truth is None:
@@ -51,7 +51,7 @@ class SaturationWatch:
         self._last = -LASTS  # [ns] when some were
         self._told = 0
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """Which motors have been there for long; each time once."""
         flying = v.status.armed and not v.status.landed
         fractions = motor_fractions(v)[:MOTORS] if flying else []

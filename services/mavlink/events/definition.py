@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol, TypeVar
 
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 FORMATS = {"uint8_t": "B", "uint32_t": "I"}
 EMERGENCY, CRITICAL, WARNING = (
@@ -83,18 +83,18 @@ class Definition(NamedTuple):
 Happened = tuple[Definition, Sequence[int]]  # and the values of its arguments
 
 
-class Watch(Protocol):
+class EventDetector(Protocol):
     """Looks for events of some sort."""
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """What has happened since the step before."""
 
 
-Kind = TypeVar("Kind", bound=Callable[[], Watch])
+Kind = TypeVar("Kind", bound=Callable[[], EventDetector])
 
 DEFINITIONS: dict[str, Definition] = {}
 """Every event that has been declared, by its name."""
-WATCHES: list[Callable[[], Watch]] = []
+WATCHES: list[Callable[[], EventDetector]] = []
 """What looks for them."""
 
 

@@ -15,7 +15,7 @@ from lapwing.services.mavlink.events.definition import (
     watch,
 )
 from lapwing.services.mavlink.events.flight import mode_number, mode_type
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 _CAUSES = tuple(Entry(k, reason.replace(" ", "_"), reason) for k, reason in enumerate(status_texts.FAILSAFES))
 _cause = Argument("cause", Enumeration("failsafe_cause_t", "uint8_t", _CAUSES))
@@ -42,7 +42,7 @@ class FailureWatch:
     def __init__(self) -> None:
         self._failsafe, self._motor, self._battery = "", 0, 0
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """What has come up, and which failsafe has gone."""
         s = v.status
         if s.battery_warning != self._battery:

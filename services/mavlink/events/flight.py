@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Happened, event, watch
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
 _PLACES = (
@@ -39,7 +39,7 @@ class FlightWatch:
     def __init__(self) -> None:
         self._armed, self._landed, self._mode = False, True, ""
 
-    def step(self, v: VehicleView) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Happened]:
         """What is another."""
         s = v.status
         if s.mode != self._mode:

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.dynamics import discovery
 from lapwing.services.mavlink.telemetry.message_stream import ON_REQUEST, STREAMS, Stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 __all__ = ["Stream", "requested", "streams"]
 
@@ -17,7 +17,7 @@ def streams() -> dict[int, Stream]:
     return STREAMS
 
 
-def requested(vehicle: VehicleView, number: int, parameter: float = 0.0) -> list[Any] | None:
+def requested(vehicle: VehicleCache, number: int, parameter: float = 0.0) -> list[Any] | None:
     """The messages that answer a request for one of this number, as they would be now.
 
     Args:

@@ -7,7 +7,7 @@ from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, R
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import Quaternion, from_euler, saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 CENTIMETRE = 0.01
 SONAR_ID, RANGEFINDER_ID = 0, 1
@@ -18,30 +18,30 @@ NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # of an orientation that has a name
 DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
 
 
-def good_distance(v: VehicleView) -> bool:
+def good_distance(v: VehicleCache) -> bool:
     """Whether every sensor of distances gives readings."""
     found = [v.get(topic) for topic in (SONAR, RANGEFINDER)]
     return any(found) and not any(math.isnan(m.range) for m in found if m)
 
 
-def good_flow(v: VehicleView) -> bool:
+def good_flow(v: VehicleCache) -> bool:
     """Whether the camera sees the ground pass by."""
     m = v.get(OPTICAL_FLOW)
     return m is not None and math.isfinite(m.flow[0])
 
 
-def _airspeed(v: VehicleView) -> Any:
+def _airspeed(v: VehicleCache) -> Any:
     """What the autopilot has got of the airspeed; what the sensor reads where no operator is listened to."""
     return v.get(AIRSPEED_RECEIVED) or v.get(AIRSPEED)
 
 
-def good_airspeed(v: VehicleView) -> bool:
+def good_airspeed(v: VehicleCache) -> bool:
     """Whether the newest reading is one."""
     m = _airspeed(v)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
-def indicated_airspeed(v: VehicleView) -> float | None:
+def indicated_airspeed(v: VehicleCache) -> float | None:
     """Speed [m/s] of the air along the tube by its pressure, at the density of the sea; None without a reading."""
     return math.sqrt(max(0.0, 2.0 * _airspeed(v).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
 
@@ -62,7 +62,7 @@ def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaterni
 
 
 @stream("DISTANCE_SENSOR", 5.0, 10.0)
-def distance_sensors(v: VehicleView) -> Any:
+def distance_sensors(v: VehicleCache) -> Any:
     """Distance that each sees; nothing in reach reads just beyond it."""
     found = []
     if (sonar := v.get(SONAR)) is not None:
@@ -73,7 +73,7 @@ def distance_sensors(v: VehicleView) -> Any:
     return [message for message in found if message is not None]
 
 
-def _distance(v: VehicleView, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:
+def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:
     if math.isnan(m.range):
         return None
     minimum, maximum = (saturated(metres / CENTIMETRE, 16, unsigned=True) for metres in (m.min_range, m.max_range))
@@ -94,7 +94,7 @@ def _distance(v: VehicleView, m: Any, number: int, kind: int, towards: tuple[int
 
 
 @stream("OPTICAL_FLOW_RAD", 1.0, 10.0)
-def optical_flow(v: VehicleView) -> Any:
+def optical_flow(v: VehicleCache) -> Any:
     """The flow of the newest reading over the time between two; without texture its quality is 0."""
     m = v.get(OPTICAL_FLOW)
     if m is None:

@@ -7,13 +7,13 @@ from lapwing.messages.topics import TRUTH
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import saturated, swap_world
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 MILLI_G = 9.80665e-3  # [m/s^2]
 
 
 @stream("HIL_STATE_QUATERNION", 15.0)
-def true_state(v: VehicleView) -> Any:
+def true_state(v: VehicleCache) -> Any:
     """The true state; the acceleration is dv/dt along the body's axes."""
     m, truth = v.truth, v.get(TRUTH)
     if m is None:
@@ -36,7 +36,7 @@ def true_state(v: VehicleView) -> Any:
 
 
 @stream("WIND_COV", 0.5, 1.0)
-def wind(v: VehicleView) -> Any:
+def wind(v: VehicleCache) -> Any:
     """The wind that blows where the vehicle is: the velocity of the air, and the altitude above the sea."""
     m, truth = v.truth, v.get(TRUTH)
     if m is None:

@@ -8,7 +8,7 @@ from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import saturated
 from lapwing.services.mavlink.geo_coordinates import enu_to_geodetic, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 # What the estimator gives: attitude, velocities, position relative and absolute, height; nothing over terrain.
 _GIVEN = (
@@ -24,7 +24,7 @@ _GIVEN = (
 
 
 @stream("HOME_POSITION", 0.5)
-def home_position(v: VehicleView) -> Any:
+def home_position(v: VehicleCache) -> Any:
     """Where it stood when it was armed, and returns to; before that, where it stood at the start."""
     home = v.home_world
     latitude, longitude, height = enu_to_geodetic(v.description.home, home)
@@ -40,13 +40,13 @@ def home_position(v: VehicleView) -> Any:
 
 
 @stream("GPS_GLOBAL_ORIGIN")
-def global_origin(v: VehicleView) -> Any:
+def global_origin(v: VehicleCache) -> Any:
     """The origin of local positions."""
     return mavlink.MAVLink_gps_global_origin_message(*v.origin, time_usec=v.boot_us)
 
 
 @stream("ESTIMATOR_STATUS", 0.5, 1.0)
-def estimator_status(v: VehicleView) -> Any:
+def estimator_status(v: VehicleCache) -> Any:
     """How far the estimate is to be trusted."""
     e = v.get(ESTIMATE)
     if e is None:

@@ -6,7 +6,7 @@ from lapwing.services.mavlink import component_metadata
 from lapwing.services.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.file_server import crc32
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -25,7 +25,7 @@ CHANNELS, NO_CHANNEL, NO_SIGNAL_STRENGTH = 18, 0xFFFF, 255
 
 
 @stream("AUTOPILOT_VERSION")
-def autopilot_version(v: VehicleView) -> Any:
+def autopilot_version(v: VehicleCache) -> Any:
     """What it can do, and how whole parameters travel."""
     nobody = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
@@ -37,14 +37,14 @@ def autopilot_version(v: VehicleView) -> Any:
 
 
 @stream("PROTOCOL_VERSION")
-def protocol_version(v: VehicleView) -> Any:
+def protocol_version(v: VehicleCache) -> Any:
     """MAVLink 2, and 1 is understood."""
     nobody = [0] * 8
     return message_class("PROTOCOL_VERSION")(MAVLINK_2, MAVLINK_1, MAVLINK_2, nobody, nobody)
 
 
 @stream("COMPONENT_METADATA")
-def metadata(v: VehicleView) -> Any:
+def metadata(v: VehicleCache) -> Any:
     """Where the file is that names the other files about this vehicle."""
     general = component_metadata.files(v.description)[component_metadata.GENERAL]
     place = component_metadata.uri(component_metadata.GENERAL).encode()
@@ -52,13 +52,13 @@ def metadata(v: VehicleView) -> Any:
 
 
 @stream("RC_CHANNELS")
-def rc_channels(v: VehicleView) -> Any:
+def rc_channels(v: VehicleCache) -> Any:
     """No radio-control receiver is fitted."""
     return mavlink.MAVLink_rc_channels_message(v.boot_ms, 0, *[NO_CHANNEL] * CHANNELS, NO_SIGNAL_STRENGTH)
 
 
 @stream("FLIGHT_INFORMATION")
-def flight_information(v: VehicleView) -> Any:
+def flight_information(v: VehicleCache) -> Any:
     """When it was armed, took off and landed, since the start; the number of the flight."""
     f = v.flight
     return mavlink.MAVLink_flight_information_message(

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from lapwing.services.mavlink.dialect import id_of
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-Builder = Callable[[VehicleView], Any]  # the message, None while there is nothing to say, or a list of several
+Builder = Callable[[VehicleCache], Any]  # the message, None while there is nothing to say, or a list of several
 
 
 class Stream(NamedTuple):
@@ -17,7 +17,7 @@ class Stream(NamedTuple):
     onboard: float  # [Hz] to a companion computer
     build: Builder
 
-    def messages(self, vehicle: VehicleView) -> list[Any]:
+    def messages(self, vehicle: VehicleCache) -> list[Any]:
         """What there is to say now."""
         found = self.build(vehicle)
         if found is None:
@@ -29,7 +29,7 @@ STREAMS: dict[int, Stream] = {}
 """Every stream by the number of its message: what the dialect lacks is not here."""
 
 
-Requested = Callable[[VehicleView, float], list[Any]]  # the messages for parameter 2 of the request
+Requested = Callable[[VehicleCache, float], list[Any]]  # the messages for parameter 2 of the request
 
 ON_REQUEST: dict[int, Requested] = {}
 """Messages that are sent on request only and depend on a parameter of it, by number."""

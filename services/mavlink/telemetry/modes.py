@@ -5,11 +5,11 @@ from typing import Any
 
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.message_stream import on_request, stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 
 @stream("CURRENT_MODE", 0.5)
-def current_mode(v: VehicleView) -> Any:
+def current_mode(v: VehicleCache) -> Any:
     """The flight mode. The one that was asked for is not told apart from it."""
     number = v.flavour.mode_number(v.status.mode)
     standard = {mode.number: mode.standard for mode in v.flavour.MODES}
@@ -19,7 +19,7 @@ def current_mode(v: VehicleView) -> Any:
 
 
 @on_request("AVAILABLE_MODES")
-def available_modes(v: VehicleView, index: float) -> list[Any]:
+def available_modes(v: VehicleCache, index: float) -> list[Any]:
     """The mode of an index from 1, or all of them for 0."""
     modes = v.flavour.MODES
     wanted = 0 if math.isnan(index) else round(index)

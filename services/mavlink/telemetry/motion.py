@@ -8,11 +8,11 @@ from lapwing.services.mavlink.frames import compass, saturated
 from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 
 @stream("ATTITUDE", 50.0)
-def attitude(v: VehicleView) -> Any:
+def attitude(v: VehicleCache) -> Any:
     """Euler angles and body rates."""
     if (m := v.estimate) is None:
         return None
@@ -20,7 +20,7 @@ def attitude(v: VehicleView) -> Any:
 
 
 @stream("ATTITUDE_QUATERNION", 50.0)
-def attitude_quaternion(v: VehicleView) -> Any:
+def attitude_quaternion(v: VehicleCache) -> Any:
     """The attitude without its singularity."""
     if (m := v.estimate) is None:
         return None
@@ -28,7 +28,7 @@ def attitude_quaternion(v: VehicleView) -> Any:
 
 
 @stream("LOCAL_POSITION_NED", 50.0)
-def local_position(v: VehicleView) -> Any:
+def local_position(v: VehicleCache) -> Any:
     """From home, north east down."""
     if (m := v.estimate) is None:
         return None
@@ -36,7 +36,7 @@ def local_position(v: VehicleView) -> Any:
 
 
 @stream("GLOBAL_POSITION_INT", 50.0)
-def global_position(v: VehicleView) -> Any:
+def global_position(v: VehicleCache) -> Any:
     """On the Earth."""
     if (m := v.estimate) is None:
         return None
@@ -53,7 +53,7 @@ def global_position(v: VehicleView) -> Any:
 
 
 @stream("VFR_HUD", 4.0)
-def hud(v: VehicleView) -> Any:
+def hud(v: VehicleCache) -> Any:
     """What a pilot's display shows."""
     if (m := v.estimate) is None:
         return None
@@ -73,7 +73,7 @@ def hud(v: VehicleView) -> Any:
 
 
 @stream("ALTITUDE", 1.0)
-def altitude(v: VehicleView) -> Any:
+def altitude(v: VehicleCache) -> Any:
     """Every altitude there is."""
     if (m := v.estimate) is None:
         return None

@@ -7,7 +7,7 @@ from lapwing.messages.topics import TRUTH
 from lapwing.services.mavlink.dialect import message_class
 from lapwing.services.mavlink.frames import saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 BATCH = 4  # motors of one message
 RPM = 60.0 / math.tau  # of 1 rad/s
@@ -20,7 +20,7 @@ def _padded(values: Any, nothing: Any) -> list[Any]:
 
 
 @stream("ESC_STATUS", 1.0, 10.0)
-def esc_status(v: VehicleView) -> Any:
+def esc_status(v: VehicleCache) -> Any:
     """Rotor speed, voltage and current of each motor."""
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:
@@ -32,7 +32,7 @@ def esc_status(v: VehicleView) -> Any:
 
 
 @stream("ESC_INFO", 1.0, 1.0)
-def esc_info(v: VehicleView) -> Any:
+def esc_info(v: VehicleCache) -> Any:
     """Which speed controllers are there, all without a fault."""
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:

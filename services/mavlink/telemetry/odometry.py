@@ -6,7 +6,7 @@ from typing import Any
 from lapwing.messages.topics import ESTIMATE
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 _DIAGONAL = (0, 6, 11, 15, 18, 20)  # of the upper triangle of a 6 x 6 matrix, row by row
 _GOOD, _BAD = 100, -1  # quality [%], -1: failed
@@ -21,7 +21,7 @@ def _triangle(*variances: float) -> list[float]:
 
 
 @stream("ODOMETRY", 0.0, 30.0)
-def odometry(v: VehicleView) -> Any:
+def odometry(v: VehicleCache) -> Any:
     """Pose from body FRD to NED; velocity along NED, as PX4 sends it."""
     m, e = v.estimate, v.get(ESTIMATE)
     if m is None:

@@ -7,7 +7,7 @@ from lapwing.messages.topics import ACTUATORS, BATTERY
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 PULSE_MIN, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
 OUTPUTS, ACTUATORS_MAX = 8, 32  # that SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS have room for
@@ -21,7 +21,7 @@ _STATES = (
 )
 
 
-def motor_fractions(v: VehicleView) -> list[float]:
+def motor_fractions(v: VehicleCache) -> list[float]:
     """Voltage of each motor as a fraction of its maximum, 0 to 1."""
     actuators = v.get(ACTUATORS)
     if actuators is None or v.description.max_voltage is None:
@@ -30,7 +30,7 @@ def motor_fractions(v: VehicleView) -> list[float]:
 
 
 @stream("SERVO_OUTPUT_RAW", 5.0, 10.0)
-def servo_output(v: VehicleView) -> Any:
+def servo_output(v: VehicleCache) -> Any:
     """Motor commands as pulse widths."""
     pulses = [round(PULSE_MIN + PULSE_SPAN * fraction) for fraction in motor_fractions(v)[:OUTPUTS]]
     if not pulses:
@@ -39,7 +39,7 @@ def servo_output(v: VehicleView) -> Any:
 
 
 @stream("ACTUATOR_OUTPUT_STATUS", 0.0, 10.0)
-def actuator_outputs(v: VehicleView) -> Any:
+def actuator_outputs(v: VehicleCache) -> Any:
     """Motor commands as pulse widths, up to 32 of them."""
     pulses = [PULSE_MIN + PULSE_SPAN * fraction for fraction in motor_fractions(v)[:ACTUATORS_MAX]]
     if not pulses:
@@ -55,7 +55,7 @@ def remaining(battery: Any) -> int:
 
 
 @stream("BATTERY_STATUS", 0.5, 0.5)
-def battery_status(v: VehicleView) -> Any:
+def battery_status(v: VehicleCache) -> Any:
     """The battery, cell by cell."""
     b = v.get(BATTERY)
     if b is None:
@@ -79,7 +79,7 @@ def battery_status(v: VehicleView) -> Any:
     )
 
 
-def power(v: VehicleView) -> tuple[int, int, int]:
+def power(v: VehicleCache) -> tuple[int, int, int]:
     """Voltage [mV], current [0.01 A] and remaining charge [%] for SYS_STATUS."""
     b = v.get(BATTERY)
     if b is None or not math.isfinite(b.voltage):

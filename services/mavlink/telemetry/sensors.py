@@ -8,7 +8,7 @@ from lapwing.messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import compass, saturated, swap_body
 from lapwing.services.mavlink.telemetry.message_stream import stream
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 9.80665e-3
 FIX_TYPES = {  # by what the receiver says of itself
@@ -20,32 +20,32 @@ SATELLITES = 16  # that a fix is said to come from
 UNKNOWN_16 = 0xFFFF
 
 
-def good_imu(v: VehicleView) -> bool:
+def good_imu(v: VehicleCache) -> bool:
     """Whether the newest reading is one."""
     m = v.get(IMU)
     return m is not None and m.angular_velocity_covariance[0] >= 0.0
 
 
-def good_mag(v: VehicleView) -> bool:
+def good_mag(v: VehicleCache) -> bool:
     """Whether the newest reading is one."""
     m = v.get(MAG)
     return m is not None and math.isfinite(m.magnetic_field.x)
 
 
-def good_baro(v: VehicleView) -> bool:
+def good_baro(v: VehicleCache) -> bool:
     """Whether the newest reading is one."""
     m = v.get(BARO)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
-def good_gps(v: VehicleView) -> bool:
+def good_gps(v: VehicleCache) -> bool:
     """Whether there is a fix."""
     m = v.get(GPS)
     return m is not None and m.status.status >= NavSatStatus.STATUS_FIX
 
 
 @stream("HIGHRES_IMU", 1.5, 50.0)
-def highres_imu(v: VehicleView) -> Any:
+def highres_imu(v: VehicleCache) -> Any:
     """Every inertial, magnetic and pressure reading; what is not there is 0 and not flagged."""
     if not good_imu(v):
         return None
@@ -63,7 +63,7 @@ def highres_imu(v: VehicleView) -> Any:
 
 
 @stream("SCALED_IMU")
-def scaled_imu(v: VehicleView) -> Any:
+def scaled_imu(v: VehicleCache) -> Any:
     """The inertial and magnetic readings in whole numbers."""
     if not good_imu(v):
         return None
@@ -79,7 +79,7 @@ def scaled_imu(v: VehicleView) -> Any:
 
 
 @stream("SCALED_PRESSURE", 1.0, 5.0)
-def scaled_pressure(v: VehicleView) -> Any:
+def scaled_pressure(v: VehicleCache) -> Any:
     """Air pressure."""
     if not good_baro(v):
         return None
@@ -88,7 +88,7 @@ def scaled_pressure(v: VehicleView) -> Any:
 
 
 @stream("GPS_RAW_INT", 5.0)
-def gps_raw(v: VehicleView) -> Any:
+def gps_raw(v: VehicleCache) -> Any:
     """The receiver's fix; where there is no receiver, the estimated position as a fix."""
     if not v.description.sensors:
         return _estimated(v)
@@ -105,14 +105,14 @@ def gps_raw(v: VehicleView) -> Any:
     return _fix(v, FIX_TYPES[fix.status.status], place, (north, east), spread, moving.twist.covariance[0])
 
 
-def _estimated(v: VehicleView) -> Any:
+def _estimated(v: VehicleCache) -> Any:
     if (m := v.estimate) is None:
         return None
     return _fix(v, mavlink.GPS_FIX_TYPE_3D_FIX, m.geodetic, m.velocity_ned[:2], (0.0, 0.0), 0.0)
 
 
 def _fix(
-    v: VehicleView, fix_type: int, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float
+    v: VehicleCache, fix_type: int, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float
 ) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
@@ -134,6 +134,6 @@ def _fix(
 
 
 @stream("VIBRATION", 0.5, 0.5)
-def vibration(v: VehicleView) -> Any:
+def vibration(v: VehicleCache) -> Any:
     """The model has no vibration; displays want to be told."""
     return mavlink.MAVLink_vibration_message(v.boot_us, 0.0, 0.0, 0.0, 0, 0, 0)

@@ -10,7 +10,7 @@ from lapwing.services.mavlink.frames import from_euler, saturated, swap_attitude
 from lapwing.services.mavlink.geo_coordinates import from_world, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 _RATES_IGNORED = (
     mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
@@ -32,7 +32,7 @@ def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
 
 
 @stream("POSITION_TARGET_LOCAL_NED", 1.5, 10.0)
-def local_target(v: VehicleView) -> Any:
+def local_target(v: VehicleCache) -> Any:
     """Position, velocity and acceleration that are followed; nothing while the motors are off."""
     setpoint = v.get(SETPOINT)
     if setpoint is None or not v.status.armed:
@@ -44,7 +44,7 @@ def local_target(v: VehicleView) -> Any:
 
 
 @stream("POSITION_TARGET_GLOBAL_INT", 1.0, 10.0)
-def global_target(v: VehicleView) -> Any:
+def global_target(v: VehicleCache) -> Any:
     """The same with the position on the Earth; nothing where there is no position to follow."""
     setpoint = v.get(SETPOINT)
     if setpoint is None or not v.status.armed or not all(map(math.isfinite, setpoint.position)):
@@ -63,7 +63,7 @@ def global_target(v: VehicleView) -> Any:
 
 
 @stream("ATTITUDE_TARGET", 2.0, 10.0)
-def attitude_target(v: VehicleView) -> Any:
+def attitude_target(v: VehicleCache) -> Any:
     """Attitude that the inner loops follow, and collective thrust as a fraction; body rates are not told."""
     actuators = v.get(ACTUATORS)
     if actuators is None or not v.status.armed:

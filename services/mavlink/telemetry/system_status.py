@@ -10,7 +10,7 @@ from lapwing.services.mavlink.telemetry.external_sensors import good_airspeed, g
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import power
 from lapwing.services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_type import vehicle_type
 
 NONE = 0xFFFF  # no item of a mission
@@ -51,7 +51,7 @@ _BETWEEN = {  # ground and air, by the mode or the item of a mission
 
 
 @stream("HEARTBEAT", 1.0)
-def heartbeat(v: VehicleView) -> Any:
+def heartbeat(v: VehicleCache) -> Any:
     """I am here, in this mode."""
     s = v.status
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -71,19 +71,19 @@ def heartbeat(v: VehicleView) -> Any:
     )
 
 
-def healthy(v: VehicleView) -> bool:
+def healthy(v: VehicleCache) -> bool:
     """Whether the estimate is to be trusted."""
     e = v.get(ESTIMATE)
     return e is not None and e.health == 0
 
 
-def _refused(v: VehicleView, source: str) -> bool:
+def _refused(v: VehicleCache, source: str) -> bool:
     """Whether the estimator has no use for the newest reading of a sensor, or has got none."""
     e = v.get(ESTIMATE)
     return e is not None and source in e.rejected
 
 
-def sensor_health(v: VehicleView) -> Iterator[tuple[str, int, bool]]:
+def sensor_health(v: VehicleCache) -> Iterator[tuple[str, int, bool]]:
     """Each sensor that is there or that the true state stands for: its name, its bits of SYS_STATUS, if it is sound."""
     for bits, (good, source) in _SENSORS.items():
         yield source, bits, good(v) and not _refused(v, source) if v.description.sensors else healthy(v)
@@ -93,7 +93,7 @@ def sensor_health(v: VehicleView) -> Iterator[tuple[str, int, bool]]:
 
 
 @stream("SYS_STATUS", 1.0, 5.0)
-def sys_status(v: VehicleView) -> Any:
+def sys_status(v: VehicleCache) -> Any:
     """Which sensors are there and sound, whether it may be armed, and the battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
@@ -109,7 +109,7 @@ def sys_status(v: VehicleView) -> Any:
 
 
 @stream("EXTENDED_SYS_STATE", 1.0, 5.0)
-def extended_state(v: VehicleView) -> Any:
+def extended_state(v: VehicleCache) -> Any:
     """On the ground, in the air, or between."""
     s = v.status
     if s.landed:
@@ -122,7 +122,7 @@ def extended_state(v: VehicleView) -> Any:
 
 
 @stream("MISSION_CURRENT", 1.0)
-def mission_current(v: VehicleView) -> Any:
+def mission_current(v: VehicleCache) -> Any:
     """How far the mission is."""
     s = v.status
     item = 0 if s.mission_current == NONE else s.mission_current
@@ -131,19 +131,19 @@ def mission_current(v: VehicleView) -> Any:
 
 
 @stream("SYSTEM_TIME", 1.0)
-def system_time(v: VehicleView) -> Any:
+def system_time(v: VehicleCache) -> Any:
     """Time of day, and since the start."""
     return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, v.boot_ms)
 
 
 @stream("TIMESYNC", 10.0)
-def timesync(v: VehicleView) -> Any:
+def timesync(v: VehicleCache) -> Any:
     """What is your clock?"""
     return mavlink.MAVLink_timesync_message(0, v.time_ns)
 
 
 @stream("EKF_STATUS_REPORT")
-def ekf_status(v: VehicleView) -> Any:
+def ekf_status(v: VehicleCache) -> Any:
     """ArduPilot's word for a sound estimate."""
     # attitude, velocities, absolute and relative positions: bits 0 to 5 and 8, 9 of EKF_STATUS_FLAGS
     return mavlink.MAVLink_ekf_status_report_message(0x33F if healthy(v) else 0, *(0.0,) * 5)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler
@@ -37,7 +37,7 @@ def _on_se3(x: types.Type) -> Callable:
 
 
 @leaf
-def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[BodyMotions], int]:
+def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
     """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
     actuators = inputs[0]
     command = actuators.value.motor_voltage if actuators.due else p.off
@@ -54,4 +54,4 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[Received, ...]) -> 
         (j[0][0], j[1][0], j[2][0], j[3][0], j[4][0]),
         (j[0][1], j[1][1], j[2][1], j[3][1], j[4][1]),
     )
-    return s, (told,), GO_ON
+    return s, (told,), CONTINUE

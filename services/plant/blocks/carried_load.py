@@ -2,9 +2,9 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects._types import Air
-from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.integrators import RATES, march
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
@@ -36,12 +36,12 @@ class LoadDrive(NamedTuple):
     """What holds the load over an exchange interval."""
 
     load: LoadPlant
-    carriers: tuple[Presence, ...]  # at its beginning
+    carriers: tuple[NeighbourState, ...]  # at its beginning
     start: float  # [s]
 
 
 @leaf
-def _pull(c: Any, sling: Sling, carrier: Presence) -> Vec3:
+def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
     """Force [N] of a cable on its hook, which goes on as it was accelerated at the beginning of the interval."""
     x, ahead = c
     velocity = add(carrier.hook_velocity, scale(ahead, carrier.hook_acceleration))
@@ -71,14 +71,14 @@ RATES[LoadDrive] = rate
 
 
 @leaf
-def _presence(_: float, received: Received, same: Received) -> Presence:
+def _presence(_: float, received: InputSample, same: InputSample) -> NeighbourState:
     return received.value
 
 
 @leaf
 def step(
-    p: LoadPlant, s: LoadMotion, tick: int, inputs: tuple[Received, ...]
-) -> tuple[LoadMotion, tuple[Presence, BodyMotions], int]:
+    p: LoadPlant, s: LoadMotion, tick: int, inputs: tuple[InputSample, ...]
+) -> tuple[LoadMotion, tuple[NeighbourState, BodyMotions], int]:
     """The load at `tick`, given where its carriers were a tick ago; and the force of the cables on it."""
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
@@ -87,8 +87,8 @@ def step(
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
     place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
-    told = Presence(
+    told = NeighbourState(
         place, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, place, velocity, acceleration, ZERO,
         tick * p.interval, True,
     )  # fmt: skip
-    return x, (told, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), GO_ON
+    return x, (told, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), CONTINUE

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, seen
@@ -28,8 +28,8 @@ def _force(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
 
 
 @leaf
-def step(p: ContactView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[ContactForces], int]:
+def step(p: ContactView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[ContactForces], int]:
     """Where each point of the vehicle is at `tick`, and what the ground does to it."""
     vehicle, state = p.vehicle, s.vehicle
     pushes = hooks.all_contact_forces(vehicle.effects, state.memory, seen(vehicle.layout, state.motion))
-    return s, (ContactForces(each(_place, 0.0, pushes, pushes), each(_force, 0.0, pushes, pushes)),), GO_ON
+    return s, (ContactForces(each(_place, 0.0, pushes, pushes), each(_force, 0.0, pushes, pushes)),), CONTINUE

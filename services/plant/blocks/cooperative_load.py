@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics.integrators import march
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3
@@ -39,7 +39,7 @@ def _zero(values: tuple, i: int) -> Vec3:
 
 @leaf
 def step(
-    p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[Received, ...]
+    p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
     """March to `tick` under the command given; the load tells of the vehicle's own motion."""
     g = p.formation

@@ -2,8 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
-from lapwing.dynamics.effects._vehicle_interaction import Presence, all_interactions
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState, all_interactions
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
 from lapwing.kernels import leaf
 from lapwing.kernels.codegen import each_index
@@ -18,16 +18,16 @@ class Interaction(NamedTuple):
 
 
 @leaf
-def _presence(inputs: tuple[Received, ...], i: int) -> Presence:
+def _presence(inputs: tuple[InputSample, ...], i: int) -> NeighbourState:
     return inputs[i].value
 
 
 @leaf
-def step(p: Interaction, s: MultirotorPlantState, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
+def step(p: Interaction, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """The plant's state with what its effects make of the vehicles around, itself the first, a tick ago."""
     vehicle = s.vehicle
     if inputs[0].due:
         others = each_index(_presence, inputs[1:], inputs[1:])
         memory = all_interactions(p.effects, vehicle.memory, inputs[0].value, others, p.interval)
         vehicle = MultirotorState(vehicle.motion, memory)
-    return MultirotorPlantState(vehicle, s.last), (), GO_ON
+    return MultirotorPlantState(vehicle, s.last), (), CONTINUE

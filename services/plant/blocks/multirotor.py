@@ -2,14 +2,14 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import Received
+from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics import effects
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
 from lapwing.kernels import leaf
 from lapwing.kernels.state_tree import finite
-from lapwing.services.common.ports import BatteryGauge, PerRotor, TrueState
+from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
 from lapwing.services.plant.blocks.gripper import let_go
 from lapwing.services.plant.blocks.termination import signal
 
@@ -39,8 +39,8 @@ class MultirotorPlantState(NamedTuple):
 
 @leaf
 def step(
-    p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[Received, ...]
-) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryGauge], int]:
+    p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]
+) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
     """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is."""
     actuators, status = inputs
     command = actuators.value.motor_voltage if actuators.due else p.off
@@ -57,6 +57,6 @@ def step(
         motion.rotor_speed, o.motor_voltage, o.motor_current, o.motor_power, o.thrust, o.torque,
         o.wind_world, o.air_density, o.in_contact, o.angular_acceleration_body,
     )  # fmt: skip
-    gauge = BatteryGauge(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
+    gauge = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
     sound = finite(vehicle.motion)
     return MultirotorPlantState(vehicle, last), (truth, gauge), signal(tick, last, sound)

@@ -2,11 +2,11 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._axes import in_world, thrust_wrench
 from lapwing.dynamics.effects._types import Loads
-from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import add, apply, cross
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters
@@ -17,12 +17,12 @@ class PresenceView(NamedTuple):
     """The vehicle that is told of."""
 
     vehicle: MultirotorParameters
-    like: Presence  # with the numbers that do not change
+    like: NeighbourState  # with the numbers that do not change
     interval: float  # [s] a tick
 
 
 @leaf
-def step(p: PresenceView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[Presence], int]:
+def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[NeighbourState], int]:
     """The presence at `tick`, by the truth of that tick."""
     truth, vehicle = inputs[0].value, p.vehicle
     body = hooks.all_body(vehicle.effects, s.vehicle.memory, vehicle.body)
@@ -30,10 +30,10 @@ def step(p: PresenceView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tu
     R, hook, omega = rotation_matrix(truth.attitude), p.like.hook_body, truth.omega_body
     turning = cross(omega, hook)
     swinging = add(cross(truth.angular_acceleration_body, hook), cross(omega, turning))
-    told = Presence(
+    told = NeighbourState(
         truth.position_world, truth.velocity_world, in_world(thrust, R), body.mass, truth.air_density,
         p.like.radius, p.like.restitution, p.like.disc_radius,
         hook, add(truth.position_world, apply(R, hook)), add(truth.velocity_world, apply(R, turning)),
         add(truth.acceleration_world, apply(R, swinging)), truth.wind_world, tick * p.interval, False,
     )  # fmt: skip
-    return s, (told,), GO_ON
+    return s, (told,), CONTINUE

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.multirotor_equations import RotorLayout
 from lapwing.dynamics.vehicles.multirotor_slung import cable_force
@@ -17,8 +17,8 @@ class SlungLoadView(NamedTuple):
 
 
 @leaf
-def step(p: SlungLoadView, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[BodyMotions], int]:
+def step(p: SlungLoadView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
     """The motion of the load at `tick`, a point that does not turn, and the force of the cable on it."""
     x, zero = s.vehicle.motion, ((0.0, 0.0, 0.0),)
     force = (cable_force(p.layout, x),)
-    return s, (BodyMotions((x.load_position,), (NO_ROTATION,), (x.load_velocity,), zero, force, zero),), GO_ON
+    return s, (BodyMotions((x.load_position,), (NO_ROTATION,), (x.load_velocity,), zero, force, zero),), CONTINUE

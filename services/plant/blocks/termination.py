@@ -1,6 +1,6 @@
 """How a run ends: at its duration, a while after the mission, or because the numbers do."""
 
-from lapwing.cosim.diagram.compiled_block import END, FAILED, GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE
 from lapwing.kernels import leaf
 
 
@@ -8,5 +8,5 @@ from lapwing.kernels import leaf
 def signal(tick: int, last: int, sound: bool) -> int:
     """The plant's signal at `tick` of a run whose last tick is `last`."""
     if not sound:
-        return FAILED
-    return END if tick >= last else GO_ON
+        return NON_FINITE
+    return FINISHED if tick >= last else CONTINUE

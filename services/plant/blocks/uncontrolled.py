@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import Received
-from lapwing.dynamics.integrators import Controlled, march, march_controlled
-from lapwing.kernels import ByClass, leaf
+from lapwing.cosim.diagram.compiled_block import InputSample
+from lapwing.dynamics.integrators import StepDoubling, march, march_controlled
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.kernels.codegen import implements
 from lapwing.kernels.state_tree import finite
 from lapwing.services.plant.blocks.termination import signal
@@ -17,7 +17,7 @@ class AutonomousPlant(NamedTuple):
     """The system and how it is integrated."""
 
     system: Any  # parameters, a class of lapwing.dynamics.integrators.RATES
-    method: Any  # `Method()` of an integrator, or one whose error is `Controlled`
+    method: Any  # `Method()` of an integrator, or one whose error is `StepDoubling`
     steps: int  # of a tick
     step: float  # [s]
     interval: float  # [s] a tick
@@ -29,7 +29,7 @@ def told(p: Any, t: float, x: Any) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-TOLD = ByClass()
+TOLD = DispatchTable()
 """The compiled function of `told` by the class of a system's parameters."""
 
 
@@ -44,13 +44,13 @@ def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
 
 @implements(_marched, inline=True)
 def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
-    if getattr(method, "instance_class", None) is Controlled:
+    if getattr(method, "instance_class", None) is StepDoubling:
         return lambda method, p, t, x: march_controlled(method, p.system, t, x, p.step, t + p.interval)
     return lambda method, p, t, x: march(method, p.system, t, x, p.step, p.steps)
 
 
 @leaf
-def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple, int]:
+def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """March to `tick`; at tick 0 leave the system where it is."""
     x = s
     if tick > 0:

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale
 from lapwing.dynamics.vehicles import unloading, unloading_contact_points
@@ -38,7 +38,7 @@ def _on_roller(rollers: tuple[Vec3, ...], i: int) -> Vec3:
 
 @leaf
 def step(
-    p: UnloadingView, s: UnloadingState, tick: int, inputs: tuple[Received, ...]
+    p: UnloadingView, s: UnloadingState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[UnloadingState, tuple[BodyMotions], int]:
     """The motions of the bodies at `tick`; the door lies along z of its frame."""
     c, t = p.carrier, tick * p.interval
@@ -61,4 +61,4 @@ def step(
         ),
         (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO),
     )  # fmt: skip
-    return s, (told,), GO_ON
+    return s, (told,), CONTINUE

@@ -11,7 +11,7 @@ from functools import cache
 from types import ModuleType
 
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.vehicle_schema import Vehicle
 
 
@@ -24,7 +24,7 @@ def names() -> tuple[str, ...]:
 def get(name: str) -> ModuleType:
     """The module of a model; KeyedError that lists the choices if there is none."""
     if name not in names():
-        raise KeyedError.unknown("vehicle.model", "model", name, names())
+        raise ConfigError.unknown("vehicle.model", "model", name, names())
     return importlib.import_module(f"{__name__}.{name}")
 
 

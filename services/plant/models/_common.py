@@ -4,19 +4,19 @@ import math
 from types import ModuleType
 from typing import Any
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import integrators
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.integrators import check_start
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.ground_equilibrium import at_rest
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Exchange, Rates, ticks
-from lapwing.services.common.ports import BatteryGauge, BodyMotions, TrueState
+from lapwing.services.common.communication_schema import Communication, Rates, ticks
+from lapwing.services.common.ports import BatteryReading, BodyMotions, TrueState
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_pose
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState
@@ -28,12 +28,12 @@ from lapwing.services.plant.service_config import PlantSetup
 
 def last_tick(scene: Scene) -> int:
     """The tick at which the run ends at the latest."""
-    return round(scene[Run].duration * scene[Exchange].rate)
+    return round(scene[Run].duration * scene[Communication].rate)
 
 
 def rate_ticks(scene: Scene, key: str) -> int:
     """Ticks between messages of a rate of the table `rates`."""
-    return ticks(scene, min(getattr(scene[Rates], key), scene[Exchange].rate), f"rates.{key}")
+    return ticks(scene, min(getattr(scene[Rates], key), scene[Communication].rate), f"rates.{key}")
 
 
 def wiring(scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()) -> PlantWiring:
@@ -54,14 +54,14 @@ def needs(scene: Scene, *tables: str) -> None:
     """KeyedError if a scene lacks one of these optional tables."""
     for name in tables:
         if not scene.has(name):
-            raise KeyedError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
+            raise ConfigError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
 
 
 def can_have(scene: Scene, *tables: str) -> None:
-    """KeyedError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
+    """ConfigError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
     for name in sorted({"effects", "sensors", "autopilot", "trajectory"}.difference(tables)):
         if scene.has(name) and (scene.section(name).OPTIONAL or scene.tables(name)):
-            raise KeyedError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
+            raise ConfigError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
 
 
 def autonomous(
@@ -72,7 +72,7 @@ def autonomous(
     bodies: Any = None,
     names: tuple[str, ...] = (),
     controlled: bool = False,
-) -> ServiceSetup:
+) -> ServiceConfig:
     """A plant that nobody commands.
 
     Args:
@@ -86,10 +86,10 @@ def autonomous(
     """
     how, steps, step = method(scene)
     if controlled:
-        how = integrators.Controlled(how, scene[Solver].contact_tolerance)
-    core = AutonomousPlant(p, how, steps, step, scene[Exchange].interval, last_tick(scene))
+        how = integrators.StepDoubling(how, scene[Solver].contact_tolerance)
+    core = AutonomousPlant(p, how, steps, step, scene[Communication].interval, last_tick(scene))
     given = (Port(ports.TRUTH, told), *([bodies_port(scene, len(names))] if bodies else []))
-    return ServiceSetup(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
+    return ServiceConfig(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
 
 
 def noise_key(seed: int, vehicle: str) -> Key:
@@ -97,9 +97,9 @@ def noise_key(seed: int, vehicle: str) -> Key:
     return stream_key(seed, vehicle, "plant")
 
 
-def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceSetup:
+def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     """A multirotor with parameters p whose states the module `form` makes."""
-    exchange, frame = scene[Exchange], airframe(scene)
+    exchange, frame = scene[Communication], airframe(scene)
     n = (0.0,) * len(frame.rotors.position)
     how, steps, step = method(scene)
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
@@ -109,10 +109,10 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceSetup:
     start = MultirotorPlantState(at_rest(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay = exchange.loop_delay
-    return ServiceSetup(
+    return ServiceConfig(
         PlantSetup("reduced", core, start, wiring(scene, odometry=True, battery=frame.battery)),
-        (Input(ports.ACTUATORS, delay), Input(ports.STATUS, delay)),
-        (Port(ports.TRUTH, told), Port(ports.BATTERY, BatteryGauge(), rate_ticks(scene, "battery"))),
+        (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay)),
+        (Port(ports.TRUTH, told), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
     )
 
 
@@ -126,13 +126,13 @@ def check_system(scene: Scene, p: Any, start: Any) -> None:
     try:
         check_start(p, start)
     except ValueError as error:
-        raise KeyedError(model, str(error)) from None
+        raise ConfigError(model, str(error)) from None
     check_integrator(scene, p, start)
 
 
 def check_integrator(scene: Scene, p: Any, start: Any) -> None:
-    """KeyedError of `solver.integrator` if it is not for a system with parameters p and such states."""
+    """ConfigError of `solver.integrator` if it is not for a system with parameters p and such states."""
     name, model = scene[Solver].integrator, scene[Vehicle].model
     if why := integrators.unfit(name, p, start):
         others = ", ".join(integrators.fitting(p, start))
-        raise KeyedError("solver.integrator", f"{name} does not fit the model {model}: {why}", f"one of {others}")
+        raise ConfigError("solver.integrator", f"{name} does not fit the model {model}: {why}", f"one of {others}")

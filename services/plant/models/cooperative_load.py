@@ -1,14 +1,14 @@
 """Quadrotors that carry a point mass by rigid links: thrusts and moments in, the state of every body out."""
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.lie.ts2 import Swing
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
-from lapwing.services.common.communication_schema import Exchange, Rates
+from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.ports import LIFT, TRUTH, RotorWrenches, TrueState
 from lapwing.services.common.run_schema import CooperativeLoad
 from lapwing.services.plant.blocks.cooperative_load import CooperativePlant
@@ -24,23 +24,23 @@ def check(scene: Scene) -> None:
     """The formation is described, somebody controls it and gets its state at every tick."""
     needs(scene, "cooperative_load", "formation")
     can_have(scene)
-    rate = scene[Exchange].rate
+    rate = scene[Communication].rate
     if scene[Rates].bodies != rate:
         expected = f"exchange.rate = {rate} Hz, at which the control works"
-        raise KeyedError("rates.bodies", f"got {scene[Rates].bodies} Hz", expected)
+        raise ConfigError("rates.bodies", f"got {scene[Rates].bodies} Hz", expected)
     check_system(scene, *system(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the formation."""
     p, start = system(scene)
     n = len(p.link_length)
     off = RotorWrenches((0.0,) * n, (ZERO,) * n)
-    core = CooperativePlant(p, *method(scene), scene[Exchange].interval, last_tick(scene), off)
+    core = CooperativePlant(p, *method(scene), scene[Communication].interval, last_tick(scene), off)
     names = (LOAD, *[f"quad{i + 1}" for i in range(n)])
     ports = (Port(TRUTH, TrueState()), bodies_port(scene, len(names)))
-    inputs = (Input(LIFT, scene[Exchange].loop_delay),)
-    return ServiceSetup(PlantSetup("cooperative_load", core, start, wiring(scene, bodies=names)), inputs, ports)
+    inputs = (InputPort(LIFT, scene[Communication].loop_delay),)
+    return ServiceConfig(PlantSetup("cooperative_load", core, start, wiring(scene, bodies=names)), inputs, ports)
 
 
 def system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadState]:

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
@@ -21,7 +21,7 @@ NOTHING = (0.0, 0.0, 0.0)
 Turn = tuple[float, float, float, float]
 
 
-class Gyrostat(Section):
+class Gyrostat(SceneTable):
     """The satellite, its rotors and its control (theory.md, eqs. (7.6) to (7.9))."""
 
     TABLE: ClassVar[str] = "gyrostat"
@@ -48,7 +48,7 @@ def check(scene: Scene) -> None:
     check_system(scene, *system(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the satellite."""
     return autonomous(scene, *system(scene), TrueState())
 
@@ -58,7 +58,7 @@ def system(scene: Scene) -> tuple[GyrostatParameters, RigidBody]:
     g = scene[Gyrostat]
     for axis, moment in zip("xyz", g.inertia, strict=True):
         if not moment > 0.0:
-            raise KeyedError("gyrostat.inertia", f"got {moment:g} about {axis}", "principal moments above 0")
+            raise ConfigError("gyrostat.inertia", f"got {moment:g} about {axis}", "principal moments above 0")
     p = GyrostatParameters(
         g.inertia, g.rotor_momentum, g.forcing_amplitude, g.forcing_frequency, g.damping, g.linear_gain, g.cubic_gain,
         g.desired_rate, g.attitude_gain, g.rate_gain, exp(g.target_rotation),

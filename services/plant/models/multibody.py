@@ -6,11 +6,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, active, airframe
 from lapwing.services.plant.blocks.body_states import FiveBodiesView
@@ -33,7 +33,7 @@ class Event(BaseModel):
     becomes: Literal["locked", "free", "torn_off"]  # locked to the chassis, free of its motor, or gone
 
 
-class Multibody(Section):
+class Multibody(SceneTable):
     """How the five bodies are described, held together and driven (theory.md, chapter 8), and what breaks in flight."""
 
     TABLE: ClassVar[str] = "multibody"
@@ -46,18 +46,18 @@ class Multibody(Section):
     def check(self, scene: Scene) -> None:
         """The scene has bodies to describe, and time for the events, of which none follows on the loss of its part."""
         if scene[Vehicle].model != "multibody":
-            raise KeyedError(
+            raise ConfigError(
                 "multibody", f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "multibody"'
             )
         duration, lost = scene[Run].duration, dict[int, float]()
         for i, event in sorted(enumerate(self.event), key=lambda item: item[1].time):
             if event.time > duration:
                 expected = f"a time within run.duration = {duration:g} s"
-                raise KeyedError(f"multibody.event.{i}.time", f"got {event.time:g}", expected)
+                raise ConfigError(f"multibody.event.{i}.time", f"got {event.time:g}", expected)
             if event.propeller in lost:
                 gone = f"propeller {event.propeller} is torn off at {lost[event.propeller]:g} s"
                 message = f"{gone}; nothing can become of it after that"
-                raise KeyedError(f"multibody.event.{i}.propeller", message)
+                raise ConfigError(f"multibody.event.{i}.propeller", message)
             if event.becomes == "torn_off":
                 lost[event.propeller] = event.time
 
@@ -72,10 +72,10 @@ def check(scene: Scene) -> None:
     try:
         multirotor_multibody.drone_of(airframe(scene))
     except ValueError as error:
-        raise KeyedError("vehicle.airframe", f"{scene[Vehicle].airframe}: {error}") from None
+        raise ConfigError("vehicle.airframe", f"{scene[Vehicle].airframe}: {error}") from None
     if scene[Solver].step > longest_step(scene):
         fastest, most = LARGEST_TURN / longest_step(scene), longest_step(scene)
-        raise KeyedError("solver.step", f"propellers turn at up to {fastest:.0f} rad/s", f"at most {most:.1g} s")
+        raise ConfigError("solver.step", f"propellers turn at up to {fastest:.0f} rad/s", f"at most {most:.1g} s")
 
 
 def longest_step(scene: Scene) -> float:
@@ -92,10 +92,10 @@ def described(scene: Scene) -> tuple[ModuleType, Any]:
 
 
 def _tick(scene: Scene, time: float) -> int:
-    return math.ceil(round(time * scene[Exchange].rate, 6))
+    return math.ceil(round(time * scene[Communication].rate, 6))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of a multirotor of five bodies, and what breaks in flight."""
     form, p = described(scene)
     found = multirotor_plant(scene, form, p)

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.scene import Scene, Section
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from lapwing.services.common.ports import TrueState
@@ -27,7 +27,7 @@ class Motors(BaseModel):
     resistance: float = Field(gt=0.0)  # [ohm]
 
 
-class Os4(Section):
+class Os4(SceneTable):
     """The quadrotor (theory.md, eqs. (7.11) to (7.14))."""
 
     TABLE: ClassVar[str] = "os4"
@@ -51,7 +51,7 @@ def check(scene: Scene) -> None:
     check_system(scene, *system(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the quadrotor."""
     four = (0.0,) * 4
     return autonomous(scene, *system(scene), TrueState(rotor_speed=four, rotor_thrust=four, rotor_torque=four))

@@ -3,7 +3,7 @@
 from types import ModuleType
 from typing import Any
 
-from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.services.common.vehicle_schema import active, airframe
@@ -25,6 +25,6 @@ def described(scene: Scene) -> tuple[ModuleType, Any]:
     return multirotor, multirotor.parameters(airframe(scene), active(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of a multirotor as one rigid body."""
     return multirotor_plant(scene, *described(scene))

@@ -5,9 +5,9 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles import multirotor_slung
 from lapwing.dynamics.vehicles.multirotor_slung import Sling
@@ -30,7 +30,7 @@ NAME = "slung_load"
 FASTEST = 1.0  # frequency of the cable times the step: explicit methods of order 4 are exact to 1e-2 a turn
 
 
-class SlungLoad(Section):
+class SlungLoad(SceneTable):
     """The cable and its load; the autopilot is told of neither."""
 
     TABLE: ClassVar[str] = NAME
@@ -45,14 +45,14 @@ class SlungLoad(Section):
     def check(self, scene: Scene) -> None:
         """There is a vehicle to carry it, and the step is short enough for the cable."""
         if scene[Vehicle].model != NAME:
-            raise KeyedError(
+            raise ConfigError(
                 NAME, f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "{NAME}"'
             )
         _check_weight(scene)
         fastest = multirotor_slung.frequency(_sling(scene), airframe(scene).mass.total)
         if scene[Solver].step * fastest > FASTEST:
             message = f"the load on the taut cable swings along it with {fastest:.0f} rad/s"
-            raise KeyedError("solver.step", message, f"at most {FASTEST / fastest:.1g} s, or a softer cable")
+            raise ConfigError("solver.step", message, f"at most {FASTEST / fastest:.1g} s, or a softer cable")
 
 
 def _check_weight(scene: Scene) -> None:
@@ -65,7 +65,7 @@ def _check_weight(scene: Scene) -> None:
     weight = (frame.mass.total + load) * gravity(scene)
     if lift <= weight:
         message = f"got {load:g}: the rotors lift at most {lift:.0f} N, vehicle and load weigh {weight:.0f} N"
-        raise KeyedError(f"{NAME}.mass", message, "a lighter load [kg]")
+        raise ConfigError(f"{NAME}.mass", message, "a lighter load [kg]")
 
 
 def _sling(scene: Scene) -> Sling:
@@ -87,7 +87,7 @@ def described(scene: Scene) -> tuple[ModuleType, Any]:
     return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of a multirotor with its load, which is told of as a body."""
     found = multirotor_plant(scene, *described(scene))
     plant = found.parameters

@@ -5,12 +5,12 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from lapwing.cosim.config.run_config import ServiceSetup
-from lapwing.cosim.scene import Scene, Section
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles import unloading
 from lapwing.dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
 from lapwing.services.plant.blocks import unloading_bodies
@@ -23,7 +23,7 @@ STIFFNESS, DAMPING = 2.0e4, 60.0  # [N/m], [N s/m] of one place of contact
 Pair = tuple[float, float]  # static and dynamic friction
 
 
-class Unloading(Section):
+class Unloading(SceneTable):
     """The crate, its rollers, its door and the pack (theory.md, chapter 9)."""
 
     TABLE: ClassVar[str] = "unloading"
@@ -56,17 +56,17 @@ class Unloading(Section):
     def check(self, scene: Scene) -> None:
         """Sizes are sizes, the pack fits into the crate, friction is lower in motion."""
         if not all(side > 0.0 for side in self.pack_size):
-            raise KeyedError("unloading.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
+            raise ConfigError("unloading.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
         length, width, _ = self.pack_size
         if width > self.width or length + self.gap > self.depth:
             room = f"{self.depth:g} m deep and {self.width:g} m wide"
             expected = f"a pack that fits into the crate, {room}"
-            raise KeyedError("unloading.pack_size", f"got {length:g} m by {width:g} m", expected)
+            raise ConfigError("unloading.pack_size", f"got {length:g} m by {width:g} m", expected)
         for key in ("roller_friction", "door_friction", "ground_friction"):
             static, dynamic = getattr(self, key)
             if not 0.0 < dynamic <= static:
                 expected = "[static, dynamic] with 0 < dynamic <= static"
-                raise KeyedError(f"unloading.{key}", f"got {[static, dynamic]}", expected)
+                raise ConfigError(f"unloading.{key}", f"got {[static, dynamic]}", expected)
 
 
 def check(scene: Scene) -> None:
@@ -76,10 +76,10 @@ def check(scene: Scene) -> None:
     check_system(scene, *system(scene))
 
 
-def resolve(scene: Scene) -> ServiceSetup:
+def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the crate."""
     p, start = system(scene)
-    view = UnloadingView(p, scene[Exchange].interval)
+    view = UnloadingView(p, scene[Communication].interval)
     return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES, controlled=True)
 
 

@@ -8,7 +8,7 @@ import pkgutil
 
 from pydantic import ValidationError
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.trajectory.segments.segment import Segment
 
@@ -26,14 +26,14 @@ KINDS = _discover()
 def choose(table: object) -> Segment:
     """The validated segment that a table of a scene describes.
 
-    Raises KeyedError for anything but a table with a known `kind` and sound keys; names the choices.
+    Raises ConfigError for anything but a table with a known `kind` and sound keys; names the choices.
     """
     if isinstance(table, Segment):
         return table
     if not isinstance(table, dict) or "kind" not in table:
-        raise KeyedError("", f"got {table!r}", f"a table with a kind of segment ({', '.join(KINDS)})")
+        raise ConfigError("", f"got {table!r}", f"a table with a kind of segment ({', '.join(KINDS)})")
     if not isinstance(table["kind"], str) or table["kind"] not in KINDS:
-        raise KeyedError.unknown("kind", "kind of segment", table["kind"], KINDS)
+        raise ConfigError.unknown("kind", "kind of segment", table["kind"], KINDS)
     try:
         return KINDS[table["kind"]].model_validate(table)
     except ValidationError as error:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from lapwing.cosim.config.run_config import ServiceSetup
+from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.config.serialise import digest, first_difference, from_json, to_json
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import fly
@@ -51,7 +51,7 @@ def test_ports_and_their_producers_are_found_by_name():
 
 def test_the_order_of_the_services_follows_their_ports():
     services = {
-        "controller": ServiceSetup(None, (Input("wind"),), ()),
-        "weather": ServiceSetup(None, (), (Port("wind", 0.0),)),
+        "controller": ServiceConfig(None, (InputPort("wind"),), ()),
+        "weather": ServiceConfig(None, (), (Port("wind", 0.0),)),
     }
     assert setup_of()._replace(services=services).order == ["weather", "controller"]

@@ -10,7 +10,7 @@ import pytest
 
 from lapwing.cosim.config import user_module
 from lapwing.cosim.config.user_module import find, load
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 
 
 def test_a_module_is_found_beside_the_scene_with_what_it_imports_from_there(tmp_path):
@@ -39,7 +39,7 @@ def test_a_module_is_found_on_pythons_path(tmp_path, monkeypatch):
 def test_a_module_that_cannot_be_is_refused(tmp_path, name, said):
     for taken in ("numpy", "math"):
         (tmp_path / f"{taken}.py").write_text("")
-    with pytest.raises(KeyedError) as caught:
+    with pytest.raises(ConfigError) as caught:
         find("key", name, tmp_path)
     assert said in str(caught.value)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from lapwing.cosim.diagram.block_diagram import NEVER
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port
-from lapwing.cosim.diagram.topic_encoder import Wire
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
+from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 from lapwing.messages import Clock, Setpoint, header
@@ -20,7 +20,7 @@ from tests.cosim.parts.running_sum import Number, RunningSum
 from tests.cosim.small_graph import graph_of
 
 READINGS = Port("readings", LIKE)
-NUMBERS, TOTAL = Port("numbers", Number(0.0), KEPT), Port("total", Number(0.0))
+NUMBERS, TOTAL = Port("numbers", Number(0.0), LATCHED), Port("total", Number(0.0))
 
 
 class Acting:
@@ -40,7 +40,7 @@ class Acting:
 
 
 def readings(**signals):
-    return Part("readings", Readings(2.0, **signals), Cell(0), (), (READINGS,))
+    return Block("readings", Readings(2.0, **signals), Cell(0), (), (READINGS,))
 
 
 def test_a_python_part_acts_first_at_tick_0_and_then_at_the_ticks_that_it_names():
@@ -67,14 +67,14 @@ def test_a_python_part_acts_between_the_parts_before_and_after_it():
         graph.put("numbers", tick, Number(graph.latest("readings", tick).number))
 
     acting = Acting("number", lambda t: t + 1, (NUMBERS,), number)
-    total = Part("total", RunningSum(1.0), Cell(0.0), (Input("numbers"),), (TOTAL,))
+    total = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("numbers"),), (TOTAL,))
     graph = graph_of(readings(), acting, total, page=32)
     graph.advance(20)
     assert graph.latest("total", 19).value == sum(2.0 * tick for tick in range(20))
 
 
 def test_a_part_that_is_replaced_hands_its_state_on():
-    total = Part("total", RunningSum(1.0), Cell(0.0), (Input("numbers"),), (TOTAL,))
+    total = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("numbers"),), (TOTAL,))
 
     def exchange(graph, tick):
         if tick == 6:
@@ -90,14 +90,14 @@ def test_a_part_that_is_replaced_hands_its_state_on():
 
 def test_between_two_messages_the_latest_is_the_one_before():
     slow = Port("readings", LIKE, 5)
-    graph = graph_of(Part("readings", Readings(2.0), Cell(0), (), (slow,), 5), page=16)
+    graph = graph_of(Block("readings", Readings(2.0), Cell(0), (), (slow,), 5), page=16)
     graph.advance(13)
     assert graph.latest("readings", 4) == expected(2.0, 0, 1)
     assert graph.latest("readings", 12) == expected(2.0, 10, 3)
 
 
 def test_what_nobody_gives_is_named():
-    part = Part("total", RunningSum(1.0), Cell(0.0), (Input("wind"),), (TOTAL,))
+    part = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("wind"),), (TOTAL,))
     with pytest.raises(LockStepError, match=r"^no service of this scene gives wind$"):
         graph_of(part)
 
@@ -105,7 +105,7 @@ def test_what_nobody_gives_is_named():
 def wire(topic=SETPOINT, period=1):
     """The readings' count as a phase that has one of two texts."""
     texts = ("climb", "on the way")
-    return Wire(
+    return TopicEncoder(
         topic, "readings", period,
         lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
         lambda good: Setpoint(header(0, "world"), phase=texts[good]),
@@ -172,7 +172,7 @@ class Pair(NamedTuple):
 def test_rows_are_put_and_read_as_numbers_too():
     port = Port("pair", Pair(0.0, 0.0), 2)
     user = Acting("user")
-    user.inputs = (Input("pair", 6),)
+    user.inputs = (InputPort("pair", 6),)
     graph = graph_of(user, ports=(port,))
     for tick in range(0, 8, 2):
         graph.put_row("pair", tick, np.array([tick, -tick]))

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from lapwing.cosim.diagram.compiled_block import Part
-from lapwing.cosim.diagram.tick_schedule import KEPT, Input, Port
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell, read
 from tests.cosim.parts.echo import Echo, Heard
@@ -18,11 +18,11 @@ READINGS = Port("readings", LIKE)
 
 
 def readings(every=1, port=READINGS, **signals):
-    return Part("readings", Readings(2.0, **signals), Cell(0), (), (port,), every)
+    return Block("readings", Readings(2.0, **signals), Cell(0), (), (port,), every)
 
 
 def echo(port=READINGS, delay=0, name="echo"):
-    return Part(name, Echo(1.0), Cell(0), (Input(port.name, delay),), (Port(name, Heard(False, LIKE, 0.0)),))
+    return Block(name, Echo(1.0), Cell(0), (InputPort(port.name, delay),), (Port(name, Heard(False, LIKE, 0.0)),))
 
 
 def test_trees_of_floats_integers_and_booleans_come_out_as_they_went_in():
@@ -77,7 +77,7 @@ def test_of_a_slower_port_a_message_is_due_at_its_ticks_only(delay):
 
 
 def test_what_is_kept_is_due_at_every_tick_until_another_is_given():
-    kept = Port("kept", LIKE, KEPT)
+    kept = Port("kept", LIKE, LATCHED)
     graph = graph_of(echo(kept), ports=(kept,))
     for tick in range(20):
         if tick in (0, 7, 13):
@@ -127,7 +127,7 @@ def test_a_failure_is_the_parts_own_error_or_names_it():
 def test_parts_of_one_kind_have_states_and_parameters_of_their_own():
     numbers = Port("numbers", Number(0.0))
     parts = [
-        Part(f"sum{i}", RunningSum(weight), Cell(0.0), (Input("numbers"),), (Port(f"sum{i}", Number(0.0)),))
+        Block(f"sum{i}", RunningSum(weight), Cell(0.0), (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
         for i, weight in enumerate((1.0, -10.0))
     ]
     graph = graph_of(*parts, ports=(numbers,))
@@ -141,7 +141,8 @@ def test_parts_of_one_kind_have_states_and_parameters_of_their_own():
 def test_parts_that_are_given_one_cell_share_their_state():
     numbers, shared = Port("numbers", Number(0.0)), Cell(0.0)
     parts = [
-        Part(f"sum{i}", RunningSum(1.0), shared, (Input("numbers"),), (Port(f"sum{i}", Number(0.0)),)) for i in range(2)
+        Block(f"sum{i}", RunningSum(1.0), shared, (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
+        for i in range(2)
     ]
     graph = graph_of(*parts, ports=(numbers,))
     graph.put("numbers", 0, Number(3.0))

@@ -3,9 +3,9 @@
 import pytest
 
 from lapwing.cosim.diagram.block_diagram import NEVER
-from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.execution_groups import groups
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.kernels.cell import Cell
 from lapwing.services.process_table import create_all
@@ -19,9 +19,9 @@ TOGETHER = {"together": True, "apart": False}
 def counters(together, **parameters):
     """A part of each vehicle; together: the first takes what the last one gives."""
     names = list(parameters)
-    taken = (Input(names[-1], 1),) if together else ()
+    taken = (InputPort(names[-1], 1),) if together else ()
     return [
-        Part(name, p, Cell(0), taken if name == names[0] else (), (Port(name, 0),), vehicle=name)
+        Block(name, p, Cell(0), taken if name == names[0] else (), (Port(name, 0),), vehicle=name)
         for name, p in parameters.items()
     ]
 
@@ -35,7 +35,7 @@ def test_who_steps_together():
     alone = counters(False, a=Counter(3), b=Counter(3))
     assert groups(alone) == [[0], [1]]
     assert groups(counters(True, a=Counter(3), b=Counter(3), c=Counter(3))) == [[0, 1, 2]]
-    elsewhere = Part("c", Counter(3), Cell(0), (Input("from another process"),), vehicle="a")
+    elsewhere = Block("c", Counter(3), Cell(0), (InputPort("from another process"),), vehicle="a")
     assert groups([*alone, elsewhere]) == [[0, 1, 2]]
     fleet, carried = (
         [part for service in create_all(resolve(load(name))) for part in service.parts]
@@ -124,7 +124,7 @@ class Clock:
 
 
 def test_a_part_in_python_that_owns_time_ends_the_run():
-    graph = graph_of(Clock(3), Part("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
+    graph = graph_of(Clock(3), Block("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
     graph.advance(100)
     assert (graph.ended, graph.tick) == (True, 4)
     assert graph.latest("a", 3) == 3

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
-from lapwing.cosim.diagram.compiled_block import Part
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
+from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.multi_vehicle import joined_service, member, members
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.cosim.run_errors import DivergedError
@@ -87,10 +87,10 @@ def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
 
 def test_more_vehicles_of_a_type_compile_nothing_more(tmp_path):
     two, three = (resolve(fleet_of(n, tmp_path)) for n in (2, 3))
-    Graph(two, create_all(two), PAGE).advance(1)
+    BlockDiagram(two, create_all(two), PAGE).advance(1)
     compiled = []
     on_compile(compiled.append)
-    Graph(three, create_all(three), PAGE).advance(1)
+    BlockDiagram(three, create_all(three), PAGE).advance(1)
     assert compiled == []
 
 
@@ -113,7 +113,7 @@ class Asked:
 def test_a_vehicle_calls_its_own_python_and_the_run_ends_with_the_last_vehicle():
     asked = Asked("a"), Asked("b")
     signals = {"a": Signals(5, 7), "b": Signals(2, 9)}
-    compiled = [Part(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
+    compiled = [Block(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
     graph = graph_of(*compiled, *asked)
     graph.advance(100)
     assert (graph.ended, graph.tick) == (True, 10)
@@ -130,7 +130,7 @@ def test_a_set_up_is_that_of_its_vehicles_and_survives_text_and_another_seed(set
 
 
 def test_a_state_that_is_not_sound_is_told_with_its_vehicle(setup):
-    part = Part("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
+    part = Block("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
     joined = joined_service("plant", [(member(setup, "right"), Service("plant", [part], []))])
     error = joined.parts[0].failure(3)
     assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")

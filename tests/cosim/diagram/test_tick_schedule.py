@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lapwing.cosim.diagram.tick_schedule import KEPT, Input, due, execution_order
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, due, execution_order
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.scene_resolver import load, resolve
 
@@ -28,7 +28,7 @@ def test_a_message_is_due_its_delay_after_its_stamp(tick, period, delay):
 def test_compiled_and_in_python_it_is_the_same():
     random = np.random.default_rng(3)
     for tick, period, delay in random.integers(0, 200, (500, 3)).tolist():
-        for p in (period, KEPT, 1):
+        for p in (period, LATCHED, 1):
             assert due(tick, p, delay) == due.py_func(tick, p, delay)
 
 
@@ -42,8 +42,8 @@ def test_compiled_and_in_python_it_is_the_same():
         (11, 5, 0, -1),
         (11, 5, 1, 10),  # late by one tick
         (3, 5, 4, -1),
-        (7, KEPT, 0, 7),
-        (7, KEPT, 3, 4),
+        (7, LATCHED, 0, 7),
+        (7, LATCHED, 3, 4),
     ],
 )
 def test_examples(tick, period, delay, stamp):
@@ -51,7 +51,7 @@ def test_examples(tick, period, delay, stamp):
 
 
 def order(needs, gives):
-    return execution_order({name: [Input(*i) for i in inputs] for name, inputs in needs.items()}, gives)
+    return execution_order({name: [InputPort(*i) for i in inputs] for name, inputs in needs.items()}, gives)
 
 
 GIVES = {"plant": ["truth"], "sensors": ["imu"], "autopilot": ["actuators"]}

@@ -9,7 +9,7 @@ import pytest
 
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import Wire, due_ticks, encode
+from lapwing.cosim.diagram.topic_encoder import TopicEncoder, due_ticks, encode
 from lapwing.kernels.row_packing import reader, to_row
 from lapwing.messages import Setpoint, header
 from lapwing.messages.cdr_arrays import stamp_columns
@@ -127,7 +127,7 @@ class Named(NamedTuple):
 def test_a_page_falls_into_parts_of_the_same_texts_each_in_order():
     texts = ["climb", "on the way", "climb again"]
     setup = SimpleNamespace(interval_ns=4_000_000)
-    wire = Wire(
+    wire = TopicEncoder(
         SETPOINT, "it", 1,
         lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
         lambda text: Setpoint(header(0, "world"), phase=texts[text]),

@@ -6,9 +6,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.executors import log_backpressure
-from lapwing.cosim.executors.log_backpressure import AHEAD, LEAST, LOOK, Backlog, Teller, waits_for_disk
+from lapwing.cosim.executors.log_backpressure import (
+    AHEAD,
+    LEAST,
+    LOOK,
+    LogBackpressure,
+    LogProgressPublisher,
+    waits_for_disk,
+)
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import SHORTEST
 from lapwing.cosim.transport.packet_exchange import PAGE
@@ -34,7 +41,7 @@ class Bus:
 class Process:
     """A participant that is told that 3000 ticks more are recorded whenever it has to wait."""
 
-    participants = Participants("test")
+    participants = PublisherIds("test")
 
     def __init__(self, vehicles=1):
         self.bus, self.waits = Bus(), []
@@ -47,7 +54,7 @@ class Process:
 
 def test_a_run_is_held_until_its_log_has_come_nearer():
     process = Process()
-    held, teller = Backlog(process, "recorder"), Teller(process.bus, "test", "recorder")
+    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     for tick in range(0, 10 * AHEAD, LOOK):  # nobody records
         held.hold(tick)
     assert process.waits == []
@@ -63,7 +70,7 @@ def test_a_run_is_held_until_its_log_has_come_nearer():
 @pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
 def test_the_more_vehicles_a_run_has_the_fewer_ticks_wait_for_its_log(vehicles, ahead):
     process = Process(vehicles)
-    held, teller = Backlog(process, "recorder"), Teller(process.bus, "test", "recorder")
+    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     teller.recorded(0)
     held.hold(ahead - LOOK)
     assert process.waits == []
@@ -77,7 +84,7 @@ def test_who_waits_has_been_handed_all_that_the_log_needs_to_come_nearer():
 
 def test_progress_says_whether_the_disk_is_waited_for():
     bus = Bus()
-    teller = Teller(bus, "test", "recorder")
+    teller = LogProgressPublisher(bus, "test", "recorder")
     teller.recorded(7)
     teller.waiting()
     assert [waits_for_disk(payload) for payload in bus.said] == [False, True]

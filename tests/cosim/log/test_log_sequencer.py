@@ -9,8 +9,8 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.topic_encoder import Page
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.log.log_sequencer import CHUNK, SHORTEST, Recording, chunk
 from lapwing.messages import Clock, Imu, header
@@ -18,7 +18,7 @@ from lapwing.messages.cdr_arrays import Record, stamp_columns
 from lapwing.messages.topics import CLOCK, IMU
 
 TICKS, TICK = 2500, 4_000_000  # the ticks' length in ns
-SETUP = Setup("made_up", "", 1, TICKS - 1, 250, TICK, "sequential", "drone1", {}, {}, {})
+SETUP = RunConfig("made_up", "", 1, TICKS - 1, 250, TICK, "sequential", "drone1", {}, {}, {})
 
 
 def pages(first, stop):
@@ -26,9 +26,9 @@ def pages(first, stop):
     times = ticks * TICK
     acceleration = np.random.default_rng(1).normal(size=(TICKS, 3))[first:stop]
     imu = {**stamp_columns(times), "linear_acceleration": acceleration}
-    yield Page(IMU, ticks, Record.of(Imu(header(0, "base"))).encode(len(ticks), imu))
+    yield RecordBatch(IMU, ticks, Record.of(Imu(header(0, "base"))).encode(len(ticks), imu))
     some = ticks[ticks % 5 == 0]
-    yield Page(CLOCK, some, Record.of(Clock()).encode(len(some), stamp_columns(some * TICK, "clock")))
+    yield RecordBatch(CLOCK, some, Record.of(Clock()).encode(len(some), stamp_columns(some * TICK, "clock")))
 
 
 def record(path, stops, shuffle=False):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import apart, kernel, leaf
 
 
@@ -40,7 +40,7 @@ def step(p, s, tick, inputs):
     """The sum, the tick taken in."""
     s.ticks[tick % len(s.ticks)] = tick
     total, s = _weighted(p, s)
-    return Last(s.ticks, s.count + 1), (Sum(total),), GO_ON
+    return Last(s.ticks, s.count + 1), (Sum(total),), CONTINUE
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import END, FAILED, GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE
 from lapwing.kernels import leaf
 
 
@@ -16,4 +16,4 @@ class Counter(NamedTuple):
 @leaf
 def step(p, s, tick, inputs):
     """The steps so far."""
-    return s + 1, (s,), FAILED if tick == p.fails else END if tick >= p.last else GO_ON
+    return s + 1, (s,), NON_FINITE if tick == p.fails else FINISHED if tick >= p.last else CONTINUE

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import leaf
 
 
@@ -24,4 +24,4 @@ class Heard(NamedTuple):
 def step(p, s, tick, inputs):
     """Give the input's message on."""
     r = inputs[0]
-    return s, (Heard(r.due, r.value, p.sign),), GO_ON
+    return s, (Heard(r.due, r.value, p.sign),), CONTINUE

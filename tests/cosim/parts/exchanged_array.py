@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import leaf
 from tests.cosim.parts.arrays import Last, Sum
 
@@ -18,4 +18,4 @@ class Exchange(NamedTuple):
 @leaf
 def step(p, s, tick, inputs):
     """The first of what is remembered."""
-    return Last(p.weights, s.count + 1), (Sum(s.ticks[0]),), GO_ON
+    return Last(p.weights, s.count + 1), (Sum(s.ticks[0]),), CONTINUE

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import leaf
 from tests.cosim.parts.arrays import Last, Sum
 
@@ -19,4 +19,4 @@ class Squares(NamedTuple):
 def step(p, s, tick, inputs):
     """The sum of the squares."""
     squares = np.arange(p.size) ** 2.0
-    return Last(squares, s.count + 1), (Sum(squares.sum()),), GO_ON
+    return Last(squares, s.count + 1), (Sum(squares.sum()),), CONTINUE

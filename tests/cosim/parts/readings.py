@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import END, FAILED, GO_ON, LOOK
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import leaf
 
@@ -49,9 +49,9 @@ def step(p, s, tick, inputs):
     n, t = s + 1, float(tick)
     near, far = Place((p.factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
     given = Reading(p.factor * t, tick % 5 == 0, -n, (near, far), (n, 3 - tick))
-    signal = LOOK if p.look_every > 0 and tick % p.look_every == 0 else GO_ON
+    signal = WAKE_PYTHON if p.look_every > 0 and tick % p.look_every == 0 else CONTINUE
     if tick == p.end:
-        signal = END
+        signal = FINISHED
     if tick == p.failure:
-        signal = FAILED
+        signal = NON_FINITE
     return n, (given,), signal

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON
+from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import leaf
 
 
@@ -22,4 +22,4 @@ class RunningSum(NamedTuple):
 def step(p, s, tick, inputs):
     """Add the message that is due."""
     s += p.weight * inputs[0].value.value if inputs[0].due else 0.0
-    return s, (Number(s),), GO_ON
+    return s, (Number(s),), CONTINUE

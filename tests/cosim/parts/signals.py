@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import END, GO_ON, LOOK
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, WAKE_PYTHON
 from lapwing.kernels import leaf
 
 
@@ -16,4 +16,4 @@ class Signals(NamedTuple):
 @leaf
 def step(p, s, tick, inputs):
     """It gives nothing."""
-    return s, (), END if tick >= p.last else LOOK if tick == p.look else GO_ON
+    return s, (), FINISHED if tick >= p.last else WAKE_PYTHON if tick == p.look else CONTINUE

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from lapwing.cosim.access.publisher_ids import Participants
+from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, waited
-from lapwing.cosim.processes.run_monitor import LONGEST, Watch
+from lapwing.cosim.processes.run_monitor import LONGEST, RunMonitor
 
 pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/schedstat"), reason="the system does not tell")
 
@@ -89,7 +89,7 @@ def test_it_counts_from_when_there_was_no_news(monkeypatch):
 def watch():
     """A watch of two services that has heard nothing yet."""
     bus = SimpleNamespace(receive=lambda senders: None, watch_alive=lambda key, seen: None)
-    return Watch(bus, Participants("test"), ["plant", "sensors"])
+    return RunMonitor(bus, PublisherIds("test"), ["plant", "sensors"])
 
 
 def silent_for(watch, seconds):

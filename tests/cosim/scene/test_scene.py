@@ -13,7 +13,7 @@ from lapwing.cosim.scene import Scene, SceneError
 from lapwing.cosim.scene.files import parse_toml
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_height
 from lapwing.services.scene_resolver import from_resolved, load, vocabulary
@@ -65,8 +65,8 @@ def test_every_scene_is_valid_and_has_a_title(path):
 
 def test_settings_by_class_and_by_key():
     scene = load(DELIVERY)
-    assert scene[Exchange].rate == scene.lookup("exchange.rate") == 250
-    assert scene[Exchange].interval_ns == 4_000_000
+    assert scene[Communication].rate == scene.lookup("exchange.rate") == 250
+    assert scene[Communication].interval_ns == 4_000_000
     assert scene.lookup("sensors.gps.rate") > 0
     assert scene.has("autopilot")
     assert not scene.has("formation")
@@ -82,7 +82,7 @@ def test_overrides_change_values_add_tables_and_reach_into_lists():
     ]
     scene = load(HOVER, overrides)
     assert scene[Run].seed == 7
-    assert scene[Exchange].loop_delay == 2
+    assert scene[Communication].loop_delay == 2
     assert "gyroscopic_torque" in scene.tables("effects")
     assert scene[Trajectory].phase[1].duration == 2.0
     assert scene.overrides == tuple(overrides)

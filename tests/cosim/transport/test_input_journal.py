@@ -7,7 +7,7 @@ import tempfile
 import numpy as np
 import pytest
 
-from lapwing.cosim.diagram.topic_encoder import Page, later
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, later
 from lapwing.cosim.processes.restart_policy import MOST, Restarts
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.input_journal import NOTHING, Held, Journal, Refilled
@@ -132,7 +132,7 @@ def test_many_bundles_are_given_again_in_several_answers():
 
 
 def test_pages_from_a_tick_on():
-    page = Page(TRUTH, np.arange(0, 20, 2), np.arange(10))
+    page = RecordBatch(TRUTH, np.arange(0, 20, 2), np.arange(10))
     assert later([page], 0) == [page]
     assert later([page], 19) == []
     (rest,) = later([page], 7)

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lapwing.cosim.access.publisher_ids import Participants
-from lapwing.cosim.config.run_config import ServiceSetup, Setup
-from lapwing.cosim.diagram.block_diagram import Graph, Service
-from lapwing.cosim.diagram.tick_schedule import Input, Port, due
-from lapwing.cosim.transport.packet_exchange import Outlets, sources
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port, due
+from lapwing.cosim.transport.packet_exchange import PacketSender, sources
 from lapwing.kernels import uncompiled
 
 LAST = 120  # [tick]
@@ -75,19 +75,19 @@ class Takes(Counts):
 def exchanged(inputs):
     """What the consumer of these inputs notes, and how many bundles came by key."""
     ports = tuple(Port(name, 0.0, period) for name, period in zip(NAMES, PERIODS, strict=True))
-    services = {"giver": ServiceSetup(None, (), ports), "taker": ServiceSetup(None, inputs, ())}
-    setup = Setup("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    services = {"giver": ServiceConfig(None, (), ports), "taker": ServiceConfig(None, inputs, ())}
+    setup = RunConfig("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
     bus = Bus()
 
     def process(name):
         return SimpleNamespace(
-            setup=setup, name=name, bus=bus, participants=Participants("test"), key_prefix="test", journal=None,
+            setup=setup, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test", journal=None,
             tell_of_refused=lambda: None, key=str, restarts=False, bundles_ahead=True, abandoned="",
         )  # fmt: skip
 
     giver, taker = Service("giver", [Counts(ports)], []), Service("taker", [Takes(inputs)], [])
-    given_rows, taken_rows = Graph(setup, [giver], 2048), Graph(setup, [taker], 2048)
-    outlets, (source,) = Outlets(process("giver"), giver, given_rows), sources(process("taker"), taken_rows)
+    given_rows, taken_rows = BlockDiagram(setup, [giver], 2048), BlockDiagram(setup, [taker], 2048)
+    outlets, (source,) = PacketSender(process("giver"), giver, given_rows), sources(process("taker"), taken_rows)
     for tick in range(LAST + 1):
         given_rows.advance(tick + 1)
         outlets.publish(tick, tick + 1)
@@ -106,12 +106,12 @@ def exchanged(inputs):
 @example({"port3": 0})
 @example({"port2": 7, "port3": 0})
 def test_each_row_arrives_when_it_is_due(delays):
-    noted, _ = exchanged(tuple(Input(port, delay) for port, delay in delays.items()))
+    noted, _ = exchanged(tuple(InputPort(port, delay) for port, delay in delays.items()))
     assert noted
     assert all(value == stamp for _, stamp, value in noted)
 
 
 def test_who_takes_seldom_is_given_seldom():
-    assert exchanged((Input("port3"),))[1] == {"test/_step_every_25/giver": 5}
-    assert exchanged((Input("port3"), Input("port2")))[1] == {"test/_step_every_5/giver": 25}
-    assert exchanged((Input("port3"), Input("port4")))[1] == {"test/_step/giver": LAST + 1}
+    assert exchanged((InputPort("port3"),))[1] == {"test/_step_every_25/giver": 5}
+    assert exchanged((InputPort("port3"), InputPort("port2")))[1] == {"test/_step_every_5/giver": 25}
+    assert exchanged((InputPort("port3"), InputPort("port4")))[1] == {"test/_step/giver": LAST + 1}

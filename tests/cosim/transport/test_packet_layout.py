@@ -1,9 +1,9 @@
 """The layout that programs of one's own read is that of the bundles."""
 
 from lapwing.cosim.config.serialise import to_json
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.transport.packet_layout import columns, layout
-from lapwing.cosim.transport.packets import Bundles
+from lapwing.cosim.transport.packets import StepPacketCodec
 from lapwing.kernels.row_packing import to_row
 from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.common.ports import MotorCommand
@@ -24,9 +24,9 @@ def test_a_bundle_is_as_long_as_the_layout_says():
     setup = resolve(load("hover"))
     told = layout(setup)
     assert told["setup"] == to_json(setup)
-    graph = Graph(setup, create_all(setup), 64)
+    graph = BlockDiagram(setup, create_all(setup), 64)
     graph.advance(26)
     for name, service in told["services"].items():
         for tick in (24, 25):
             expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
-            assert len(Bundles(setup.services[name].ports).pack(graph, tick)) == expected
+            assert len(StepPacketCodec(setup.services[name].ports).pack(graph, tick)) == expected

@@ -3,10 +3,10 @@
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lapwing.cosim.config.run_config import ServiceSetup, Setup
-from lapwing.cosim.diagram.tick_schedule import Input, Port
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.packet_schedule import EACH_TICK, Way, ticks_at_once, way, ways
+from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, ticks_at_once, way, ways
 from lapwing.services.scene_resolver import load, resolve
 
 LAST = 120  # [tick]
@@ -16,12 +16,12 @@ NAMES = ("plant", "sensors", "autopilot", "trajectory", "another")
 def setup_of(links):
     """Services that take one another's ports: (producer, consumer): delay [ticks]."""
     services = {
-        name: ServiceSetup(
-            None, tuple(Input(p, d) for (p, c), d in links.items() if c == name and p != name), (Port(name, 0.0),)
+        name: ServiceConfig(
+            None, tuple(InputPort(p, d) for (p, c), d in links.items() if c == name and p != name), (Port(name, 0.0),)
         )
         for name in NAMES
     }
-    return Setup("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    return RunConfig("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
 
 
 def newest_needed(setup, producer, consumer, tick):
@@ -73,13 +73,13 @@ def test_only_who_runs_ahead_hands_over_several_ticks_at_once():
     assert {name: ticks_at_once(setup, name) for name in setup.services} == {
         "plant": 1, "sensors": 1, "autopilot": 1, "trajectory": 25,
     }  # fmt: skip
-    assert ways(setup, "plant") == {EACH_TICK, Way(25, 25), Way(1, 25)}
-    assert ways(setup, "trajectory") == {Way(25, 25)}
+    assert ways(setup, "plant") == {EACH_TICK, PacketSchedule(25, 25), PacketSchedule(1, 25)}
+    assert ways(setup, "trajectory") == {PacketSchedule(25, 25)}
     assert ways(setup, "sensors") == ways(setup, "autopilot") == {EACH_TICK}
 
 
 def test_every_way_has_a_key_of_its_own():
-    found = [EACH_TICK, Way(1, 2), Way(1, 25), Way(2, 2), Way(25, 25)]
+    found = [EACH_TICK, PacketSchedule(1, 2), PacketSchedule(1, 25), PacketSchedule(2, 2), PacketSchedule(25, 25)]
     assert EACH_TICK.key == "_step"
     assert len({w.key for w in found}) == len(found)
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lapwing.cosim.diagram.tick_schedule import Input, Port
-from lapwing.cosim.diagram.topic_encoder import Page
-from lapwing.cosim.transport.packets import BundleError, Bundles, pack_batch, unpack_batch
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch, unpack_batch
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
 from tests.cosim.small_graph import graph_of
 
@@ -38,7 +38,7 @@ class User:
     outputs = ()
 
     def __init__(self, *names):
-        self.inputs = tuple(Input(name) for name in names)
+        self.inputs = tuple(InputPort(name) for name in names)
 
     def bind(self, graph):
         """Nothing to be prepared."""
@@ -59,7 +59,7 @@ def filled(tick):
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_a_bundle_holds_the_rows_that_are_due_one_after_the_other(tick, numbers):
-    bundles, giver, taker = Bundles(PORTS), filled(tick), graph("slower", "pair", "slow")
+    bundles, giver, taker = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
     payload = bundles.pack(giver, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
@@ -71,15 +71,15 @@ def test_a_bundle_holds_the_rows_that_are_due_one_after_the_other(tick, numbers)
 
 def test_who_uses_some_of_the_ports_gets_those():
     taker = graph("slow")
-    Bundles(PORTS).unpack(Bundles(PORTS).pack(filled(10), 10), taker, 10)
+    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), taker, 10)
     assert taker.latest("slow", 10) == Single(10.5, True)
     assert not taker.has("pair")
 
 
 def test_a_service_has_no_bundle_where_none_of_its_ports_is_due():
-    assert [tick for tick in range(12) if Bundles(PORTS[1:]).due(tick)] == [0, 5, 10]
-    assert all(Bundles(PORTS).due(tick) for tick in range(12))
-    assert not Bundles(()).due(0)
+    assert [tick for tick in range(12) if StepPacketCodec(PORTS[1:]).due(tick)] == [0, 5, 10]
+    assert all(StepPacketCodec(PORTS).due(tick) for tick in range(12))
+    assert not StepPacketCodec(()).due(0)
 
 
 def run_of(ticks):
@@ -95,7 +95,7 @@ def run_of(ticks):
 def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
     giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
     for ports in (PORTS, PORTS[1:]):
-        single, several = Bundles(ports), Bundles(ports, ticks)
+        single, several = StepPacketCodec(ports), StepPacketCodec(ports, ticks)
         for first in range(0, 15 - ticks, ticks):
             each = [tick for tick in range(first, first + ticks) if single.due(tick)]
             assert several.due(first) == bool(each)
@@ -112,19 +112,19 @@ def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
 
 @pytest.mark.parametrize("size", [0, 64, 72, 81])
 def test_a_bundle_of_several_ticks_of_the_wrong_size_is_refused(size):
-    with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
-        Bundles(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
+    with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
+        StepPacketCodec(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
 
 
 @pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
 def test_a_bundle_of_the_wrong_size_is_refused(size):
-    with pytest.raises(BundleError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):
-        Bundles(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
+    with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):
+        StepPacketCodec(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
 
 
 def page(topic, first, n, size, seed=0):
     random = np.random.default_rng(seed)
-    return Page(topic, np.arange(first, first + n), random.integers(0, 256, (n, size)).astype(np.uint8))
+    return RecordBatch(topic, np.arange(first, first + n), random.integers(0, 256, (n, size)).astype(np.uint8))
 
 
 def records(n):
@@ -132,7 +132,7 @@ def records(n):
     dtype = np.dtype({"names": ["x", "all"], "formats": ["<f8", "V12"], "offsets": [4, 0], "itemsize": 12})
     found = np.zeros(n, dtype)
     found["x"] = np.arange(n)
-    return Page(STATUS, np.arange(0, 5 * n, 5), found)
+    return RecordBatch(STATUS, np.arange(0, 5 * n, 5), found)
 
 
 def test_a_batch_comes_out_as_it_went_in():
@@ -154,10 +154,10 @@ WHOLE = pack_batch([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 27)
 
 @given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (16, 16 + 10 + 20 * (8 + 256))))
 def test_a_batch_cut_short_is_refused(size):
-    with pytest.raises(BundleError, match=rf"^a batch of {size} bytes: "):
+    with pytest.raises(PacketError, match=rf"^a batch of {size} bytes: "):
         unpack_batch(WHOLE[:size])
 
 
 def test_a_batch_of_an_unknown_topic_is_refused():
-    with pytest.raises(BundleError, match=r"^a batch of "):
+    with pytest.raises(PacketError, match=r"^a batch of "):
         unpack_batch(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from lapwing.cosim.transport.publish_watchdog import LOOK, Delivery
+from lapwing.cosim.transport.publish_watchdog import LOOK, PublishWatchdog
 
 PATIENCE = 0.5  # [s]
 
@@ -14,7 +14,7 @@ PATIENCE = 0.5  # [s]
 def delivery(request):
     """One that watches, and what it has said."""
     said = []
-    delivery = Delivery(lambda: said.append(threading.current_thread()), getattr(request, "param", PATIENCE))
+    delivery = PublishWatchdog(lambda: said.append(threading.current_thread()), getattr(request, "param", PATIENCE))
     yield delivery, said
     delivery.close()
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lapwing.dynamics.effects._types import Air, Motion, Rotors, Situation
+from lapwing.dynamics.effects._types import Air, EffectInputs, Motion, Rotors
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
@@ -33,7 +33,7 @@ def situation():
 
         motion = Motion(vector(position), attitude, vector(velocity), vector(omega), vector(speed))
         R = tuple(map(float, rotation.as_matrix().ravel()))
-        return Situation(float(t), motion, R, p.body, p.layout, Air(float(density), vector(wind)), (0.0,) * 3)
+        return EffectInputs(float(t), motion, R, p.body, p.layout, Air(float(density), vector(wind)), (0.0,) * 3)
 
     return build
 

@@ -6,7 +6,7 @@ import pytest
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import Atmosphere
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.battery_thevenin import battery_thevenin, discharge, read
 from lapwing.dynamics.environment import Environment
 
@@ -88,10 +88,10 @@ def test_it_cuts_off_and_starts_again_with_hysteresis(drone, situation, rotors):
     ],
 )
 def test_what_is_out_of_range(drone, table, said):
-    with pytest.raises(KeyedError, match=said):
+    with pytest.raises(ConfigError, match=said):
         make(drone, **table)
 
 
 def test_one_battery_at_a_time(drone):
-    with pytest.raises(KeyedError, match=r"excludes effects.battery, both are a battery model"):
+    with pytest.raises(ConfigError, match=r"excludes effects.battery, both are a battery model"):
         effects.from_scene({"battery": {}, "battery_thevenin": {}}, drone)

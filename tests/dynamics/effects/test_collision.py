@@ -96,8 +96,8 @@ def test_three_that_meet_at_once_keep_their_momentum_and_part():
 
 def test_the_forces_on_two_are_opposite_to_the_bit():
     e = from_scene({"collision": {}}, DRONE)[0]
-    one = interaction.Presence((0.1, 0.2, 0.3), (1.0, 0.3, -0.2), mass=10.4, radius=0.5, restitution=0.4)
-    other = interaction.Presence((0.5, -0.3, 0.6), (-0.7, 0.1, 0.9), mass=1.5, radius=0.4, restitution=0.9)
+    one = interaction.NeighbourState((0.1, 0.2, 0.3), (1.0, 0.3, -0.2), mass=10.4, radius=0.5, restitution=0.4)
+    other = interaction.NeighbourState((0.5, -0.3, 0.6), (-0.7, 0.1, 0.9), mass=1.5, radius=0.4, restitution=0.9)
     force = touch(e, (0.0, 0.0, 0.0), one, (other,), H)
     assert force == tuple(-f for f in touch(e, (0.0, 0.0, 0.0), other, (one,), H))
     assert force[0] < 0.0 < force[1]

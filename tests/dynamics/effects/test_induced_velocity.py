@@ -8,7 +8,7 @@ from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.optimize import brentq
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.induced_velocity import follow, induced_velocity
 from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 
@@ -107,8 +107,8 @@ def test_a_rotor_at_rest(drone, situation, rotors):
 
 
 def test_it_excludes_rotor_inflow_and_a_pitch_too_small(drone):
-    with pytest.raises(KeyedError, match=r"both are a flow through the rotors"):
+    with pytest.raises(ConfigError, match=r"both are a flow through the rotors"):
         effects.from_scene({"rotor_inflow": {}, "induced_velocity": {}}, drone)
     flat = drone.model_copy(update={"propeller": drone.propeller.model_copy(update={"pitch": 0.02})})
-    with pytest.raises(KeyedError, match=r"effects.induced_velocity: the propeller's pitch must be at least"):
+    with pytest.raises(ConfigError, match=r"effects.induced_velocity: the propeller's pitch must be at least"):
         effects.from_scene({"induced_velocity": {}}, flat)

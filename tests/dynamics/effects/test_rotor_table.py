@@ -7,7 +7,7 @@ import pytest
 from effects_helpers import NO_FACTORS, NO_LOADS
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.rotor_table import embed, rotor_table
 
 SPEED, D = 300.0, 0.5588
@@ -77,11 +77,11 @@ def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situatio
     ],
 )
 def test_what_is_wrong_with_a_table_is_one_line(drone, tmp_path, text, said):
-    with pytest.raises(KeyedError, match=said) as caught:
+    with pytest.raises(ConfigError, match=said) as caught:
         make(drone, tmp_path, text)
     assert "\n" not in str(caught.value)
 
 
 def test_it_stands_for_the_other_rotors(drone):
-    with pytest.raises(KeyedError, match=r"effects.rotor_table: stands for effects.rotor_thrust"):
+    with pytest.raises(ConfigError, match=r"effects.rotor_table: stands for effects.rotor_thrust"):
         effects.from_scene({"rotor_thrust": {}, "rotor_table": {}}, drone)

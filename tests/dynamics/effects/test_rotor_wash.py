@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics.effects import from_scene
-from lapwing.dynamics.effects._vehicle_interaction import Presence
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.effects.rotor_wash import blown
 from lapwing.dynamics.vehicles.airframe import load_airframe
 
@@ -21,12 +21,12 @@ INDUCED = math.sqrt(WEIGHT / (2.0 * DENSITY * math.pi * R * R))  # momentum theo
 
 
 def hovering(thrust=(0.0, 0.0, WEIGHT), disc_radius=R):
-    return Presence((1.0, 2.0, 50.0), NO_WIND, thrust, 1.5, DENSITY, disc_radius=disc_radius)
+    return NeighbourState((1.0, 2.0, 50.0), NO_WIND, thrust, 1.5, DENSITY, disc_radius=disc_radius)
 
 
 def wind(offset, *others):
     place = tuple(float(a + b) for a, b in zip((1.0, 2.0, 50.0), offset, strict=True))
-    return np.array(blown(WASH, NO_WIND, Presence(place), others or (hovering(),), 0.004))
+    return np.array(blown(WASH, NO_WIND, NeighbourState(place), others or (hovering(),), 0.004))
 
 
 def test_the_disc_is_as_large_as_those_of_four_rotors():

@@ -8,7 +8,7 @@ from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import wind_dryden
 from lapwing.dynamics.effects._turbulence import intensity
 from lapwing.dynamics.effects._types import Air
@@ -119,5 +119,5 @@ def test_it_is_a_turbulence_with_the_vehicles_span(drone, situation):
     s = situation(turn=(0, 0, math.pi / 2))
     assert wind_dryden_rates.py_func(e, memory, s, Air(1.2, (0.0, 0.0, 0.0))).wind_world == (1.0, 2.0, 3.0)
     assert turning.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))
-    with pytest.raises(KeyedError, match=r"both are a turbulence"):
+    with pytest.raises(ConfigError, match=r"both are a turbulence"):
         effects.from_scene({"wind_dryden": {"wind_speed": 7.0}, "wind_dryden_rates": {"wind_speed": 7.0}}, drone)

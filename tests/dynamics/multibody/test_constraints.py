@@ -7,7 +7,7 @@ from multibody_angles import euler_from_quaternion, quaternion_from_euler
 from lapwing.dynamics.multibody.body_kinematics import displaced, place
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import rows
-from lapwing.dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble
+from lapwing.dynamics.multibody.system import GROUND, Body, DrivingConstraint, Revolute, assemble
 
 RNG = np.random.default_rng(3)
 BODIES = [Body(f"b{k}", 1.0 + k, (1.0, 2.0, 2.5)) for k in range(3)]
@@ -16,7 +16,7 @@ JOINTS = [
     Revolute("chain", 0, 1, (-0.3, 0.2, 0.1), (0.5, 0.0, -0.4), (1, -2, 3), (2, 1, 1)),
     Revolute("back", 2, 1, (0.3, 0.7, 0.1), (0.1, 0.1, 0.2), (0, 0, 1), (1, 0, 0)),
 ]
-DRIVES = [Drive("motor", 2, 0, (1, 1, 0)), Drive("base", 1, GROUND, (0, 1, 2))]
+DRIVES = [DrivingConstraint("motor", 2, 0, (1, 1, 0)), DrivingConstraint("base", 1, GROUND, (0, 1, 2))]
 SYSTEM = assemble(BODIES, JOINTS, DRIVES)
 DRIVE = np.array([[2.0, 0.7], [-1.5, 0.4]])
 

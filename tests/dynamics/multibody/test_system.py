@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lapwing.dynamics.multibody.system import GROUND, Body, Drive, Revolute, assemble, triad
+from lapwing.dynamics.multibody.system import GROUND, Body, DrivingConstraint, Revolute, assemble, triad
 
 BAR = Body("bar", 1.0, (0.1, 0.2, 0.2))
 HINGE = Revolute("hinge", GROUND, 0, (0.0, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
@@ -39,7 +39,7 @@ def test_triad_is_right_handed_and_ends_on_the_axis(axis):
             [],
             "hinge: axis_i must be a direction",
         ),
-        ([BAR], [], [Drive("motor", 0, -1, (0, 0, 0))], "motor: axis_j must be a direction"),
+        ([BAR], [], [DrivingConstraint("motor", 0, -1, (0, 0, 0))], "motor: axis_j must be a direction"),
     ],
 )
 def test_impossible_parts_are_refused(bodies, joints, drives, message):
@@ -48,7 +48,7 @@ def test_impossible_parts_are_refused(bodies, joints, drives, message):
 
 
 def test_a_removed_constraint_is_gone():
-    system = assemble([BAR], [HINGE], [Drive("motor", 0, GROUND, (0, 0, 1))])
+    system = assemble([BAR], [HINGE], [DrivingConstraint("motor", 0, GROUND, (0, 0, 1))])
     assert len(system.row_names()) == 8
     assert system.without("hinge").row_names() == ["motor: omega x", "motor: omega y", "motor: omega z"]
     with pytest.raises(ValueError, match="no joint or drive 'belt'"):

@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.services.autopilot.commander.commander import Commander
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common.autopilot_parameters import table
@@ -14,7 +14,9 @@ DT = 0.004  # [s]
 CONSTANTS = Constants(table(load("hover")), 0.35, 9.8, 0.4, False, True)
 HIGH = EXACT._replace(position_world=(1.0, 2.0, 5.0))
 """An estimate in the air, at rest."""
-VIEW = View(DT, HIGH, 0.0, math.nan, 0, Setpoint((1.0, 2.0, 5.0), (0.0,) * 3, (0.0,) * 3, 0.3, 0.0), 1.0, False)
+VIEW = CommanderInput(
+    DT, HIGH, 0.0, math.nan, 0, Setpoint((1.0, 2.0, 5.0), (0.0,) * 3, (0.0,) * 3, 0.3, 0.0), 1.0, False
+)
 
 
 class Session:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import demand_effects, effectiveness, shares_of, tables, tilted_effectiveness
-from lapwing.services.autopilot.mixer import Demands, mix, saturate
+from lapwing.services.autopilot.mixer import VirtualControls, mix, saturate
 
 TOP, YAW = 10.0, 0.02  # [N], [m]
 HALF = 0.5 * np.pi
@@ -106,7 +106,7 @@ ANY = st.floats(-30.0, 30.0)
 @given(ANY, ANY, ANY, ANY, st.sampled_from([tables(B)[-1] for B in ROTORS.values()]))
 @settings(deadline=None, max_examples=300)
 def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, roll, pitch, yaw, shares):
-    wanted = Demands(collective, roll, pitch, yaw)
+    wanted = VirtualControls(collective, roll, pitch, yaw)
     found = saturate(shares, wanted, TOP)
     thrust = np.array(mix(shares, found))
     assert thrust.min() >= -1e-9

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flights import ENABLED, NAN, command, error, fly, fly_by_sensors, height, inject, place
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import filter_state
 from lapwing.services.autopilot.schema import NEEDED
@@ -80,5 +80,5 @@ def test_the_other_sensor_takes_over(unit):
 
 
 def test_a_reference_that_is_not_carried_is_refused():
-    with pytest.raises(KeyedError, match=r"EKF2_HGT_REF.*\[sensors\.sonar\]"):
+    with pytest.raises(ConfigError, match=r"EKF2_HGT_REF.*\[sensors\.sonar\]"):
         load("hover", [SONAR, "autopilot.estimator=sensors", *[f"sensors.{name}={{}}" for name in NEEDED]])

@@ -25,7 +25,7 @@ from flights import (
     scripted,
 )
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.services.autopilot.failure_injection.failure_state import DELAY, SLOWED
 from lapwing.services.common.failure_types import (
@@ -90,7 +90,9 @@ def received(kind, seconds=4.0, start=1.0):
     scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.trajectory=false", f"run.duration={seconds}"])
     setup = resolve(scene)
     operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(FAILING)]})
-    graph = Graph(setup, create_all(setup, operator), PAGE, [*SENSORS, *(f"{name}.received" for name in SENSORS)])
+    graph = BlockDiagram(
+        setup, create_all(setup, operator), PAGE, [*SENSORS, *(f"{name}.received" for name in SENSORS)]
+    )
     graph.advance(setup.last_tick + 1)
     for name in SENSORS:
         period = graph.ports[name].period

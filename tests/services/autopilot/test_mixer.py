@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import load
-from lapwing.services.autopilot.mixer import Demands, mix, saturate
+from lapwing.services.autopilot.mixer import VirtualControls, mix, saturate
 
 SHARES = build(load("paper"), AIRFRAME).shares[0]
 TOP = 48.0
@@ -28,14 +28,14 @@ def wrench(thrust):
 def test_each_demand_turns_about_its_own_axis_only(axis):
     demands = [0.0, 0.0, 0.0, 0.0]
     demands[1 + axis] = 2.0
-    force, torque = wrench(mix(SHARES, Demands(*demands)))
+    force, torque = wrench(mix(SHARES, VirtualControls(*demands)))
     arm = (AIRFRAME.rotor_y[0], AIRFRAME.rotor_x[0], AIRFRAME.torque_per_thrust)[axis]
     assert force == pytest.approx(0.0, abs=1e-12)
     assert torque == pytest.approx([8.0 * arm if k == axis else 0.0 for k in range(3)], abs=1e-12)
 
 
 def test_lift_turns_nothing():
-    force, torque = wrench(mix(SHARES, Demands(3.0, 0.0, 0.0, 0.0)))
+    force, torque = wrench(mix(SHARES, VirtualControls(3.0, 0.0, 0.0, 0.0)))
     assert force == pytest.approx((0.0, 0.0, 12.0))
     assert torque == pytest.approx(0.0, abs=1e-12)
 
@@ -44,7 +44,7 @@ def test_lift_turns_nothing():
 @settings(deadline=None)
 @example(2.0, -2.0, -2.0, -2.0)  # possible with this yaw only: the collective makes room for the tilt alone
 def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
-    wanted = Demands(collective, roll, pitch, yaw)
+    wanted = VirtualControls(collective, roll, pitch, yaw)
     given_ = saturate(SHARES, wanted, TOP)
     thrust = mix(SHARES, given_)
     assert min(thrust) >= -1e-9
@@ -58,7 +58,7 @@ def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll,
 @given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
 @settings(deadline=None)
 def test_yaw_gets_what_the_others_leave_and_no_less(collective, roll, pitch, yaw):
-    given_ = saturate(SHARES, Demands(collective, roll, pitch, yaw), TOP)
+    given_ = saturate(SHARES, VirtualControls(collective, roll, pitch, yaw), TOP)
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
     bare = mix(SHARES, given_._replace(yaw=0.0))
     shares = [s[3] for s in SHARES]

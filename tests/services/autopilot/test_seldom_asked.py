@@ -3,7 +3,7 @@
 import pytest
 from flights import ENABLED, NAN, RATE, SCENE, command, inject, item
 
-from lapwing.services.autopilot.commander_block import Commanding
+from lapwing.services.autopilot.commander_block import CommanderBlock
 from lapwing.services.common.failure_types import GARBAGE, OFF, SOUND, STUCK, WRONG
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
@@ -87,13 +87,13 @@ def flown(name, monkeypatch, always):
     setup = resolve(load(scene, [*overrides, f"run.duration={seconds}"]))
     asked = []
 
-    def act(self, tick, act=Commanding.act):
+    def act(self, tick, act=CommanderBlock.act):
         asked.append(tick)
         following = act(self, tick)
         return tick + 1 if always else following
 
     with monkeypatch.context() as patch:
-        patch.setattr(Commanding, "act", act)
+        patch.setattr(CommanderBlock, "act", act)
         log = memory_log.fly(setup, operator_of(script, setup.services["autopilot"].parameters.answers_every))
     return log, len(asked)
 

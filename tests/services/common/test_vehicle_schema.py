@@ -6,7 +6,7 @@ import re
 import pytest
 
 from lapwing.cosim.scene import SceneError
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, rotation_matrix
 from lapwing.messages.topics import IMU, TRUTH
 from lapwing.services.common.communication_schema import ticks
@@ -63,14 +63,14 @@ def test_on_a_slope_the_vehicle_starts_at_rest_and_stays():
 def test_a_rate_that_does_not_divide_the_exchange_rate_is_refused():
     scene = load("hover")
     assert ticks(scene, 50, "rates.pose") == 5
-    with pytest.raises(KeyedError, match=r"^rates.pose: expected a rate that divides exchange.rate = 250 Hz"):
+    with pytest.raises(ConfigError, match=r"^rates.pose: expected a rate that divides exchange.rate = 250 Hz"):
         ticks(scene, 33, "rates.pose")
 
 
 def test_a_scene_without_an_airframe_says_so():
     scene = load("os4_motors")
     assert not scene.has("airframe")
-    with pytest.raises(KeyedError, match=r"^vehicle.airframe: missing; expected the name of an airframe"):
+    with pytest.raises(ConfigError, match=r"^vehicle.airframe: missing; expected the name of an airframe"):
         airframe(scene)
 
 

@@ -2,7 +2,7 @@
 
 from adapter_harness import Bench
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
 from lapwing.services.mavlink.adapter import Adapter
@@ -21,7 +21,7 @@ class Flown(Bench):
         setup = resolve(load(scene, [*OPERATED, *overrides]))
         self.waiting, self.stations = [], []
         self._interval_ns, self._ticks = setup.interval_ns, round(self.period * setup.rate)
-        self.graph = Graph(setup, create_all(setup, self._given), PAGE)
+        self.graph = BlockDiagram(setup, create_all(setup, self._given), PAGE)
         self.adapter = Adapter(setup.beside["mavlink"], self.waiting.append)
 
     def _given(self, tick):

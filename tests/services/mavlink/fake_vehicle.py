@@ -24,7 +24,7 @@ from lapwing.messages import (
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
 from lapwing.services.common.autopilot_parameters import Parameter
 from lapwing.services.mavlink.link_options import Options
-from lapwing.services.mavlink.link_server import Hub
+from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
 
@@ -245,7 +245,7 @@ class Running:
         self.vehicle = StandIn()
         scene = load("lapwing/scenes/hover.toml", overrides)
         description = describe(scene)._replace(parameters=PARAMETERS)
-        self.hub = Hub(description, Options(urls, speed=speed, **options), self.vehicle.operate)
+        self.hub = LinkServer(description, Options(urls, speed=speed, **options), self.vehicle.operate)
         self._speed, self._over = speed, False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

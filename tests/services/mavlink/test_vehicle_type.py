@@ -2,7 +2,7 @@ import pytest
 
 from lapwing.services.mavlink.px4_facts import px4_facts
 from lapwing.services.mavlink.telemetry.system_status import heartbeat
-from lapwing.services.mavlink.vehicle_cache import VehicleView
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_description import Rotor, VehicleDescription
 
 
@@ -11,5 +11,5 @@ def test_heartbeat_and_parameters_tell_the_same_kind_of_multirotor(rotors, kind,
     """Numbers as in MAVLink's common.xml and in PX4's airframe reference."""
     description = VehicleDescription(rotors=(Rotor((0.0, 0.0, 0.0), True),) * rotors)
     facts = {fact.name: fact.value({}) for fact in px4_facts(description)[:4]}
-    assert heartbeat(VehicleView(description)).type == facts["MAV_TYPE"] == kind
+    assert heartbeat(VehicleCache(description)).type == facts["MAV_TYPE"] == kind
     assert facts["SYS_AUTOSTART"] == frame

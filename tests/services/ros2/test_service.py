@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lapwing.cosim.log import LogReader
-from lapwing.cosim.processes.run_monitor import WATCHER
+from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
 from lapwing.messages.types import FOLDER
 from lapwing.services.process_table import ROS2, needed
@@ -224,7 +224,7 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
 def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tmp_path, port, graph):
     sets = ["--set", "run.duration=8", "--set", "autopilot.operator=true", "--set", "autopilot.estimator=truth"]
     names = [*needed(resolve(load("groundstation", sets[1::2]))), ROS2]
-    table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, WATCHER]).items())
+    table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, MONITOR]).items())
     common = ["groundstation", *sets, "--set", "success.require=[]", "--peers", table, "--key-prefix", "elsewhere"]
     log = ["--log", str(tmp_path / "a.mcap")]
     graph_at = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}"]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import lapwing
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
 from lapwing.runs.single_process_run import fly_single
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.sensors.registry import module_of
 from lapwing.studies.simulate import fly
@@ -98,7 +98,7 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     assert height["values"][:, 0] == pytest.approx(flight.truth.position[::10, 2])
     assert set(height["sensor"]) == {"height"}
     fly_single(setup, tmp_path / "single.mcap")
-    fly_processes(Participation("mission", setup, {}, "test-own-sensors", log=str(tmp_path / "own.mcap")), Silent())
+    fly_processes(ProcessSpec("mission", setup, {}, "test-own-sensors", log=str(tmp_path / "own.mcap")), Silent())
     logs = [lapwing.read(tmp_path / f"{name}.mcap") for name in ("single", "own")]
     logs.append(lapwing.read(flight.save(tmp_path / "saved.mcap")))
     assert {log.digest for log in logs} == {flight.digest}
@@ -127,12 +127,12 @@ def test_a_preset_and_its_noise(scene):
     ],
 )
 def test_what_is_wrong_is_one_line(scene, overrides, text, said):
-    with pytest.raises(KeyedError) as caught:
+    with pytest.raises(ConfigError) as caught:
         resolve(scene(*overrides, text=text))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_sensor_that_ships_keeps_its_name():
-    with pytest.raises(KeyedError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
+    with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
         module_of("gps", {"module": "own_anemometer"})

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.sensors import registry
 
 
@@ -64,7 +64,7 @@ def test_bad_tables_are_refused_in_one_line(table, words):
     ],
 )
 def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, said):
-    with pytest.raises(KeyedError, match=said):
+    with pytest.raises(ConfigError, match=said):
         registry.parameters(sensor, table, 0.004)
 
 

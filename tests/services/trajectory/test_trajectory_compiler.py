@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lapwing.cosim.scene import SceneError
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load
 from lapwing.services.trajectory import trajectory_compiler
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.polynomial_piece import channel_at, evaluate
-from lapwing.services.trajectory.trajectory_compiler import Compiled
+from lapwing.services.trajectory.trajectory_compiler import CompiledTrajectory
 
 RAMP = {"kind": "ramp", "to": 10.0, "rate": 1.0}
 DELIVERY = [
@@ -28,7 +28,7 @@ DELIVERY = [
 TURN = math.pi / 2 / 0.3
 
 
-def compile(tables: dict, *origin) -> Compiled:
+def compile(tables: dict, *origin) -> CompiledTrajectory:
     """A trajectory from the tables of a scene."""
     return trajectory_compiler.compile(Phases.model_validate(tables), *origin)
 
@@ -110,7 +110,7 @@ def test_everything_but_a_step_joins_continuously(pairs):
     ],
 )
 def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
-    with pytest.raises(KeyedError, match=r"\A[^\n]+\Z") as error:
+    with pytest.raises(ConfigError, match=r"\A[^\n]+\Z") as error:
         compile(spec)
     assert message in str(error.value)
 

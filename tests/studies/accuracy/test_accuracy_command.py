@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lapwing.studies.accuracy import accuracy_command, console_output
-from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, telling
 from lapwing.studies.accuracy.work_precision_plot import draw
@@ -23,12 +23,12 @@ def decay():
         return x
 
     def read(h, x):
-        return Outcome(np.array([0.0, 1.0]), np.array([[1.0], [x]]), 0.0, round(1.0 / h))
+        return SolverRun(np.array([0.0, 1.0]), np.array([[1.0], [x]]), 0.0, round(1.0 / h))
 
     steps = [0.1 / 2**k for k in range(5)]
     ways = [
-        Way("euler", 1, "s", steps, lambda h: lambda: euler(h), read, lambda: None),
-        Way("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
+        SolverMethod("euler", 1, "s", steps, lambda h: lambda: euler(h), read, lambda: None),
+        SolverMethod("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
     ]
     value = {"value": lambda t, y: y[:, 0]}
     return Problem("decay", "s", 1.0, ways, lambda: np.array([np.exp(-1.0)]), "closed form", value)

@@ -3,7 +3,7 @@
 import pytest
 import synthetic_flights
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
@@ -13,7 +13,7 @@ from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
@@ -38,8 +38,8 @@ def test_a_campaign_flies_what_the_single_executor_flies(scene, overrides, tmp_p
     rate = in_memory.setup.rate
     setup = resolve(load(scene, [*overrides, "run.seed=7", f"rates.estimate={rate}"]))
     with LogWriter(tmp_path / "log.mcap", {}, {}) as writer:
-        run_single(Graph(setup, create_all(setup), PAGE), Recording(writer, setup))
-    recorded = Flight.read(tmp_path / "log.mcap")
+        run_single(BlockDiagram(setup, create_all(setup), PAGE), Recording(writer, setup))
+    recorded = FlightData.read(tmp_path / "log.mcap")
     assert synthetic_flights.differences(in_memory, recorded, [t.name.removeprefix("{vehicle}/") for t in TOPICS]) == []
     assert (in_memory.finished, in_memory.landed) == (recorded.finished, recorded.landed)
     assert in_memory.rmse == recorded.rmse

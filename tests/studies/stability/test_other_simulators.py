@@ -9,7 +9,7 @@ import pytest
 from lapwing.cli.study_commands import stability
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.studies.stability import cases, other_simulators
-from lapwing.studies.stability.case_result import Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Plot, Row
 from lapwing.studies.stability.case_runner import one
 from lapwing.studies.stability.cases import toppling
 from lapwing.studies.stability.other_simulators import _ball_feet
@@ -22,7 +22,7 @@ def case(monkeypatch):
     monkeypatch.setattr(
         cases,
         "get",
-        lambda name: SimpleNamespace(HARD="hard", run=lambda: Found(ROWS, Plot("x", "y", [])), __name__=name),
+        lambda name: SimpleNamespace(HARD="hard", run=lambda: CaseResult(ROWS, Plot("x", "y", [])), __name__=name),
     )
 
 

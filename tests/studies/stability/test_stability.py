@@ -9,7 +9,7 @@ import pytest
 
 from lapwing.cli.study_commands import stability
 from lapwing.studies.stability import cases, console_output, other_simulators
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.case_runner import chosen, one
 from lapwing.studies.stability.chart import chart
 
@@ -54,7 +54,7 @@ def made_up(monkeypatch):
 
     def make(*rows):
         plot = Plot("x", "y", [Curve("a", np.arange(3.0), np.array([1.0, np.nan, 2.0]))], 1.5)
-        module = SimpleNamespace(HARD="hard", run=lambda: Found(rows, plot), __name__="made_up")
+        module = SimpleNamespace(HARD="hard", run=lambda: CaseResult(rows, plot), __name__="made_up")
         monkeypatch.setattr(cases, "get", lambda name: module)
         monkeypatch.setattr(cases, "names", lambda: ["made_up"])
 

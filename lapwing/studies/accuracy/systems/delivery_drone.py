@@ -28,7 +28,7 @@ from lapwing.kernels import kernel
 from lapwing.kernels.codegen import implements
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.coordinates import coordinates
-from lapwing.studies.accuracy.problem import Outcome, Problem, Way
+from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.reference import TOLERANCE, turning
 
 AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
@@ -114,23 +114,23 @@ def thrown(p: Any, frame: Any) -> FiveBodies:
     return five_body_stabilisation.together(machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds)
 
 
-def _way(name: str, p: Any, state: Any, volts: tuple) -> Way:
+def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
     def flown(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
         out = np.empty((rows, len(flatten(motion))))
         each = max(1, steps // SAMPLES)
         return lambda: (flight(METHOD.Method(), p, state, volts, DURATION / steps, each, out), out)
 
-    def read(step: float, result: Any) -> Outcome | None:
+    def read(step: float, result: Any) -> SolverRun | None:
         defect, out = result
         if not np.isfinite(out).all():
             return None
         times = np.linspace(0.0, DURATION, SAMPLES + 1)
         motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
-        return Outcome(times, coordinates(motion, out)[:, :18], defect, round(DURATION / step) * METHOD.EVALUATIONS)
+        return SolverRun(times, coordinates(motion, out)[:, :18], defect, round(DURATION / step) * METHOD.EVALUATIONS)
 
     settings = [DURATION / (COARSEST * 2**k) for k in range(HALVINGS)]
-    return Way(name, METHOD.ORDER, "s", settings, lambda h: flown(round(DURATION / h)), read, flown(1, rows=1))
+    return SolverMethod(name, METHOD.ORDER, "s", settings, lambda h: flown(round(DURATION / h)), read, flown(1, rows=1))
 
 
 def inertia(frame: Any, angles: Any) -> np.ndarray:

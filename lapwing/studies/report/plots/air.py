@@ -1,6 +1,6 @@
 """Wind and density of the air over time."""
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, column
 from lapwing.studies.report.style import AXIS_COLOURS, STEERED
@@ -11,7 +11,7 @@ NEEDS = ("truth",)
 MODELS = STEERED
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Wind in the world frame and density; of the two only what the log has."""
     t, wind, density = flight.truth.times, flight.truth.wind, flight.truth.air_density
     if not (wind.any() or density.any()):

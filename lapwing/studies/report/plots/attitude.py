@@ -1,6 +1,6 @@
 """Roll, pitch, yaw over time, and how far they are from what was asked (the paper's Figure 23)."""
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import DEGREES, three_axes
 from lapwing.studies.report.plot import Plot
 
@@ -9,7 +9,7 @@ TITLE = "Attitude"
 NEEDS = ("truth",)
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """One row for each angle."""
     said = "Attitude as roll, pitch and yaw."
     if len(flight.reference):

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import DEGREES, over
 from lapwing.studies.report.plot import Band, Line, NotRecordedError, Panel, Plot
 from lapwing.studies.report.style import STEERED
@@ -17,7 +17,7 @@ MODELS = STEERED
 _COLUMNS = (("position", "m", 1.0), ("velocity", "m/s", 1.0), ("attitude", "°", DEGREES))
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row for each axis."""
     error, sigma = errors(flight), deviations(flight.estimate)
     if not sigma.any():
@@ -49,7 +49,7 @@ def deviations(estimate: TopicView) -> np.ndarray:
     return np.hstack([estimate.position_std, estimate.velocity_std, estimate.attitude_std])
 
 
-def errors(flight: Flight) -> np.ndarray:
+def errors(flight: FlightData) -> np.ndarray:
     """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
     from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
 
@@ -63,7 +63,7 @@ def errors(flight: Flight) -> np.ndarray:
     return np.column_stack([estimated - true[at], (R_true[at].inv() * R_estimate).as_rotvec()])
 
 
-def refusals(flight: Flight) -> str:
+def refusals(flight: FlightData) -> str:
     """How often the measurements of each source were refused, as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected for source in sources)
     said = ", ".join(f"{source} {times}" for source, times in count.most_common())

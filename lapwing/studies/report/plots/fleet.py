@@ -1,6 +1,6 @@
 """The paths of all vehicles of a fleet from above, and how near they come to one another."""
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.plot import Level, Line, Panel, Plot
 from lapwing.studies.report.style import COLOURS
 from lapwing.studies.separation import least_over_time, nearest
@@ -11,7 +11,7 @@ NEEDS = ("truth",)
 FLEET = True
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """The plan view on the left, the least distance of any two over time on the right."""
     marks = []
     for i, (name, truth) in enumerate(flight.fleet.items()):

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot, reference
 from lapwing.studies.report.style import BOUND, COLOURS
@@ -16,7 +16,7 @@ MODELS = ("cooperative_load",)
 INSTANTS = 11  # pictures of the links
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Three panels over time on the left, the view from the side on the right."""
     t = flight.times("bodies")
     places = flight.topic("bodies").position
@@ -61,7 +61,7 @@ def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
     return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
 
 
-def _wanted(flight: Flight, t: np.ndarray) -> np.ndarray:
+def _wanted(flight: FlightData, t: np.ndarray) -> np.ndarray:
     """The load's wanted path [m] at times t, shape (n, 3)."""
     path = np.array(flight.origin.scene["formation"]["path"])
     return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

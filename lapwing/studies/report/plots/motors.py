@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
 from lapwing.studies.report.style import BOUND, COLOURS, STEERED
@@ -15,7 +15,7 @@ MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """One panel for each quantity, one line for each motor."""
     truth, t = flight.truth, flight.truth.times
     if truth.rotor_speed.shape[-1] == 0:
@@ -40,7 +40,7 @@ def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
     )
 
 
-def limits(flight: Flight) -> tuple[tuple[Level | Line, ...], str]:
+def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
     """The limits of the voltage, the stretches in which a motor is at one, and a sentence on them."""
     highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
     if highest is None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
 
 ORDER = 40
@@ -10,7 +10,7 @@ TITLE = "Path"
 NEEDS = ("truth",)
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """The path in 3D on the left, its plan view on the right."""
     if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
         raise NotRecordedError("it never leaves its place")
@@ -19,7 +19,7 @@ def draw(flight: Flight) -> Plot:
     return Plot((space(flight), plan(flight)), said, 4.9, (1.0,), (1.0, 1.0))
 
 
-def space(flight: Flight) -> Panel:
+def space(flight: FlightData) -> Panel:
     """The path in space; the three axes have one scale."""
     x, y, z = flight.truth.position.T
     marks = [Line(x, y, "flown", width=2.0, z=z)]
@@ -29,7 +29,7 @@ def space(flight: Flight) -> Panel:
     return Panel(tuple(marks), "y north [m]", "x east [m]", z_label="z up [m]", timed=False)
 
 
-def plan(flight: Flight) -> Panel:
+def plan(flight: FlightData) -> Panel:
     """What is seen from above."""
     x, y, _ = flight.truth.position.T
     marks = [Line(x, y, "flown", width=2.0)]

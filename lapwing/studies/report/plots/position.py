@@ -1,6 +1,6 @@
 """Position over time, and how far it is from what was asked (the paper's Figure 22)."""
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import three_axes
 from lapwing.studies.report.plot import Plot
 
@@ -9,7 +9,7 @@ TITLE = "Position"
 NEEDS = ("truth",)
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """One row for each axis of the world frame."""
     said = "Position of the body frame in the world frame (ENU), from home."
     return three_axes(flight, 0, flight.truth.position, "m", 1.0, said)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.downsampling import every
 from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
 from lapwing.studies.report.plots.motors import RPM
@@ -14,7 +14,7 @@ NEEDS = ("truth",)
 MODELS = STEERED
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Samples of the first propeller, and the curves k n^2 and k n^3 through them by least squares."""
     speed = _first(flight, "rotor_speed")
     if not (speed.size and np.ptp(speed) > 0.0):
@@ -47,6 +47,6 @@ def coefficient(speed: np.ndarray, value: np.ndarray, power: int) -> float:
     return float(np.sum(law * value) / np.sum(law * law))  # BLAS would wake its threads for this
 
 
-def _first(flight: Flight, field: str) -> np.ndarray:
+def _first(flight: FlightData, field: str) -> np.ndarray:
     """The first rotor's values of a field of VehicleState, shape (n,); empty without rotors."""
     return flight.truth[field][:, :1].reshape(-1)

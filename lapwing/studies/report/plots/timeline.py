@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over, phases, runs
 from lapwing.studies.report.plot import Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
@@ -15,7 +15,7 @@ MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of ev
 WIDTH = 0.004  # of the whole time, of an instant
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """A lane for each thing that can change; lanes of what never happened are left out, and named."""
     status, t = flight.status, flight.status.times
     warning = np.array(BATTERY)[status.battery_warning.clip(max=len(BATTERY) - 1)]
@@ -48,7 +48,7 @@ def _where(flags: np.ndarray, text: str) -> np.ndarray:
     return np.where(flags, text, "")
 
 
-def _instants(flight: Flight, kind: str) -> list[tuple[str, float, float]]:
+def _instants(flight: FlightData, kind: str) -> list[tuple[str, float, float]]:
     """Events of a kind as stretches that are just wide enough to be seen."""
     first, last = over(flight)["span"]
     return [(e.text, e.time, min(last, e.time + WIDTH * (last - first))) for e in flight.events if e.kind == kind]

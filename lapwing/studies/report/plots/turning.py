@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.style import AXIS_COLOURS
@@ -13,7 +13,7 @@ NEEDS = ("truth",)
 MODELS = ("gyrostat",)
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Three rates over time on the left, each pair of them on the right."""
     t, omega = flight.truth.times, flight.truth.angular_velocity
     panels = []

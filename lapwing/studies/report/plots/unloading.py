@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, REFERENCE
@@ -16,7 +16,7 @@ MODELS = ("unloading",)
 INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """The three displacements, door and forces over time, and six instants from the side."""
     crate = flight.origin.scene["unloading"]
     bodies = flight.topic("bodies")

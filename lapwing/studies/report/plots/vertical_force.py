@@ -1,6 +1,6 @@
 """Net vertical force and rotor speeds of a quadrotor that nobody steers (the source's Figure 10)."""
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot, column
 from lapwing.studies.report.plots.motors import RPM
@@ -13,7 +13,7 @@ MODELS = ("os4",)
 DASHES = ("solid", "dash", "dot", "dashdot")  # rotors of one speed lie on each other
 
 
-def draw(flight: Flight) -> Plot:
+def draw(flight: FlightData) -> Plot:
     """Mass times vertical acceleration, and the speed of each rotor."""
     t = flight.truth.times
     force = flight.origin.scene["os4"]["mass"] * flight.truth.acceleration[:, 2]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.motion_3d import Link, Motion, Rotor, Stroke, of_bodies
 from lapwing.studies.report.shapes._outlines import box
 from lapwing.studies.report.style import BOUND
@@ -11,7 +11,7 @@ MODELS = ("cooperative_load",)
 ARM, LOAD = 0.2, 0.12  # [m] the scene has masses only
 
 
-def draw(flight: Flight) -> Motion | None:
+def draw(flight: FlightData) -> Motion | None:
     """The load as a box, the quadrotors as crosses, a line for each link."""
     if not flight.has("bodies"):
         return None

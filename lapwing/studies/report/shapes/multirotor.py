@@ -3,7 +3,7 @@
 import numpy as np
 
 from lapwing.services.common.mesh_schema import Meshes, unpack
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.motion_3d import Body, Link, Motion, Rotor, Stroke, Surface, of_bodies, of_truth
 from lapwing.studies.report.shapes._outlines import box
 from lapwing.studies.report.style import BOUND, COLOURS, QUIET
@@ -14,7 +14,7 @@ GAP = 0.03  # [m] between the arms and the payload
 HULL = "#C3CAD1"  # of a mesh
 
 
-def draw(flight: Flight) -> Motion | None:
+def draw(flight: FlightData) -> Motion | None:
     """The airframe where the truth has it; where five bodies were recorded, each of them; and what hangs on it."""
     airframe = flight.origin.scene.get("airframe", {})
     if "rotors" not in airframe:
@@ -48,7 +48,7 @@ def _surface(scene: dict, centre: np.ndarray) -> Surface | None:
     return Surface(mesh.vertices - centre, mesh.faces, HULL)
 
 
-def _load(flight: Flight, sling: dict) -> Body:
+def _load(flight: FlightData, sling: dict) -> Body:
     edge = (sling["mass"] / DENSITY) ** (1.0 / 3.0)
     return of_bodies(flight, [((Stroke(box(edge, edge, edge), BOUND),), ())])[0]
 
@@ -68,7 +68,7 @@ def _frame(airframe: dict, hubs: np.ndarray, origin: np.ndarray) -> tuple[Stroke
     return tuple(strokes)
 
 
-def _angles(flight: Flight, count: int) -> np.ndarray:
+def _angles(flight: FlightData, count: int) -> np.ndarray:
     """How far each rotor has turned [rad] by the times of the truth, shape (count, n)."""
     speed = flight.truth.rotor_speed
     if speed.ndim != 2 or speed.shape[1] != count:

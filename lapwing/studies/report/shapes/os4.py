@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.motion_3d import Motion, Rotor, Stroke, of_truth
 from lapwing.studies.report.style import COLOURS
 
 MODELS = ("os4",)
 
 
-def draw(flight: Flight) -> Motion | None:
+def draw(flight: FlightData) -> Motion | None:
     """Rotors ahead, right, behind and left, as the source numbers them; they stand still where no speed is told."""
     arm = flight.origin.scene["os4"]["arm"]
     hubs = arm * np.array([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])

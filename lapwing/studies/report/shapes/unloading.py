@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.motion_3d import LEVEL, Body, Motion, Stroke, of_bodies
 from lapwing.studies.report.shapes._outlines import box, circle
 from lapwing.studies.report.style import BOUND, FLOWN, QUIET
@@ -10,7 +10,7 @@ from lapwing.studies.report.style import BOUND, FLOWN, QUIET
 MODELS = ("unloading",)
 
 
-def draw(flight: Flight) -> Motion | None:
+def draw(flight: FlightData) -> Motion | None:
     """The bodies of the log, with the floor and the walls of the crate, which stand."""
     if not flight.has("bodies"):
         return None

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import NEVER, Graph, Service
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.dynamics.integrators import check_start
@@ -16,7 +16,7 @@ from lapwing.services.common.ports import AutopilotStatus
 from lapwing.services.process_table import create
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.systems import cooperative_load, gyrostat
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.flights import finite, flown
 
 HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: refused with time, place and value, never passed on"
@@ -39,7 +39,7 @@ class Steady:
     def __init__(self, *outputs: Port):
         self.outputs = outputs
 
-    def bind(self, graph: Graph) -> None:
+    def bind(self, graph: BlockDiagram) -> None:
         """Nothing to be known."""
 
     def act(self, tick: int) -> int:
@@ -87,7 +87,7 @@ def of_commands(value: float) -> tuple[str, float]:
     """(what becomes of a plant under such a voltage at its 10th tick, the largest number that it told before)."""
     setup = resolve(load("hover", SHORT))
     outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-    graph = Graph(setup, [create(setup, "plant"), Service("case", [Steady(*outputs)], [])], 2 * TICKS)
+    graph = BlockDiagram(setup, [create(setup, "plant"), Service("case", [Steady(*outputs)], [])], 2 * TICKS)
     like = setup.port(ports.ACTUATORS).like
     last = 0
     try:
@@ -122,7 +122,7 @@ def _no_numbers(values: list[float]) -> float:
     return float(sum(not math.isfinite(v) for v in values))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Counts of what was passed on in silence."""
     parameters = [of_parameters(value, key) for key in KEYS for value in ABSURD]
     states = of_states()
@@ -177,4 +177,4 @@ def run() -> Found:
     x = np.arange(len(kinds), dtype=float)
     every = [("parameters", parameters), ("commands", [c for c, _ in commands])]
     curves = [Curve(name, x, np.array([_count(found, k) for k in kinds])) for name, found in every]
-    return Found(rows, Plot("0 refused, 1 reported, 2 flown, 3 silent", "how many", curves, log_y=False))
+    return CaseResult(rows, Plot("0 refused, 1 reported, 2 flown, 3 silent", "how many", curves, log_y=False))

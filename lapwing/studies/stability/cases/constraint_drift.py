@@ -14,7 +14,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, STILL, flight
 from lapwing.studies.accuracy.systems.delivery_drone import thrown as drone_thrown
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.drone import PAPER, delivery_drone, thrown
 
 HARD = "an hour of five bodies held together by 20 constraints: the index-1 equations hold only their second derivative"
@@ -49,7 +49,7 @@ def of_plant(stabilisation: str, seconds: float) -> float:
     return float(flight(METHOD.Method(), p, state, volts, 2e-3, round(seconds / 2e-3), out))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The hinges after every minute of an hour."""
     drift = {name: defects(way) for name, way in WAYS.items()}
     rows = [
@@ -79,4 +79,4 @@ def run() -> Found:
     )
     t = np.arange(1, MINUTES + 1)
     curves = [Curve(name, t, np.maximum(values, 1e-17)) for name, values in drift.items()]
-    return Found(rows, Plot("time [min]", "largest defect", curves, BOUND))
+    return CaseResult(rows, Plot("time [min]", "largest defect", curves, BOUND))

@@ -11,7 +11,7 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.integrate import adapted
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows
 
 HARD = "loads of 0.1 g to 10 kg on links that are parallel, flat, or pass over the top: constraints, energy, momentum"
@@ -107,7 +107,7 @@ def naive(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
         return off, energy_drift(p.load_mass, y[:, 1].transpose(1, 0, 2), y[:, 0, :, 2].T)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Length of the links and energy of each."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     spring = f"links as springs of {SPRING:g} N/m, RK4 at 5 ms"
@@ -126,7 +126,7 @@ def run() -> Found:
             Row(f"{name}.energy", method, change, bound, why, float(energy.max()), spring, lost(naive_energy)),
         ]
         curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, naive_energy)]
-    return Found(found, Plot("time [s]", "change of the energy", curves, ENERGY))
+    return CaseResult(found, Plot("time [s]", "change of the energy", curves, ENERGY))
 
 
 def lost(values: np.ndarray) -> float:

@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.services.common import ports
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "24 h of hover in one go: memory that grows, a flight that slows down"
 LONG = True
@@ -25,7 +25,7 @@ def resident() -> float:
 def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
     """(memory [MB], processor time [s]) after and of each hour; `whole`: every row of the truth is kept."""
     setup = resolve(load("hover", ["run.duration=86400.0", "trajectory.phase.1.duration=86390.0"]))
-    graph = Graph(setup, create_all(setup), 64, {ports.TRUTH} if whole else ())
+    graph = BlockDiagram(setup, create_all(setup), 64, {ports.TRUTH} if whole else ())
     memory, seconds = [], []
     for hour in range(1, hours + 1):
         started = time.process_time()  # of this process alone: others may be busy
@@ -46,7 +46,7 @@ def appending() -> float:
     return seconds[-1] / seconds[0] - 1.0
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Memory and speed, hour by hour."""
     memory, seconds = growth(False, HOURS)
     kept, _ = growth(True, 2)
@@ -73,4 +73,4 @@ def run() -> Found:
         ),
     ]
     hours = np.arange(1.0, HOURS + 1)
-    return Found(rows, Plot("hour", "processor time [s]", [Curve("hover", hours, np.array(seconds))], log_y=False))
+    return CaseResult(rows, Plot("hour", "processor time [s]", [Curve("hover", hours, np.array(seconds))], log_y=False))

@@ -11,7 +11,7 @@ from lapwing.dynamics.terrain import relief
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import at_rest, standing_pose
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
-from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
 from lapwing.studies.stability.cases.slopes import DYNAMIC, energy
 
@@ -79,7 +79,7 @@ def exact(share: float) -> float:
     return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Into a step, over an edge, up from a slope."""
     faces, field = "each face with its own normal, RK4 at 1 ms", "a height field, as deep as the step is high"
     none = "none but round-off: the ground gives nothing"
@@ -95,7 +95,7 @@ def run() -> Found:
             abs(lifted(LIGHT) / exact(LIGHT) - 1.0),
             "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
     ]  # fmt: skip
-    return Found(rows, sweep().plot())
+    return CaseResult(rows, sweep().plot())
 
 
 def naive_fall() -> float:

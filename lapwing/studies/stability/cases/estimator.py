@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import Graph
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.kernels.cell import read
 from lapwing.messages.topics import ESTIMATE, TRUTH
 from lapwing.services.autopilot.estimator.blocks.gps_block import GpsFusion
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.coordinates import matrices
-from lapwing.studies.flight_data import Flight
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "the mission with a gyro bias jump, 60 s without GPS, a magnetometer upside down, all sensors frozen"
 
@@ -58,13 +58,13 @@ def flown(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bo
         gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
     wanted = {wire.port for service in services for wire in service.wires if wire.topic in topics}
-    graph = Graph(setup, services, 64, wanted)
+    graph = BlockDiagram(setup, services, 64, wanted)
     filtering: Any = next(part for service in services for part in service.parts if part.name.endswith("inertial"))
     least = 1.0
     while not graph.ended and graph.tick <= setup.last_tick:
         graph.advance(min(graph.tick + round(1.0 / setup.interval), setup.last_tick + 1))
         least = min(least, definite(_covariance(read(filtering.state))))
-    flight = Flight.of(graph, topics)
+    flight = FlightData.of(graph, topics)
     return _outcome(flight, least)
 
 
@@ -72,7 +72,7 @@ def _covariance(state: Any) -> np.ndarray:
     return next(part.memory.covariance for part in (state, *state) if hasattr(part, "memory"))
 
 
-def _outcome(flight: Flight, least: float) -> Outcome:
+def _outcome(flight: FlightData, least: float) -> Outcome:
     told, truth = flight.estimate, flight.truth
     late = told.times > 5.0  # it has had time to begin
     at = np.searchsorted(truth.times, told.times[late]).clip(max=len(truth.times) - 1)
@@ -110,7 +110,7 @@ def textbook() -> float:
     return least
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Errors against what is claimed, and the covariance."""
     outcomes = {name: flown(faults) for name, faults in FAULTS.items()}
     rows, curves = [], []
@@ -141,4 +141,4 @@ def run() -> Found:
     method = "sequential updates of a symmetric covariance"
     what = "how far the least eigenvalue of the correlations is below zero"
     rows.append(Row("covariance", method, what, 0.0, why, max(0.0, -least), "P = (1 - K H) P", max(0.0, -textbook())))
-    return Found(rows, Plot("time [s]", "error over the claimed deviation", curves, SIGMAS))
+    return CaseResult(rows, Plot("time [s]", "error over the claimed deviation", curves, SIGMAS))

@@ -5,14 +5,14 @@ from fractions import Fraction
 import numpy as np
 
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "24 h at 250 Hz, 21.6 million exchanges: a clock that adds up intervals is no longer on time"
 
 HOURS = 24
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Ticks as integers against a sum of intervals."""
     setup = resolve(load("hover", []))
     per_hour = 3600 * 1_000_000_000 // setup.interval_ns
@@ -33,4 +33,4 @@ def run() -> Found:
     )
     hours = np.arange(1.0, HOURS + 1)
     curves = [Curve("ticks", hours, np.maximum(ours, 1e-17)), Curve("sum", hours, naive)]
-    return Found([row], Plot("simulated time [h]", "error of the clock [s]", curves, row.bound))
+    return CaseResult([row], Plot("simulated time [h]", "error of the clock [s]", curves, row.bound))

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from lapwing.cosim.config.run_config import Setup
-from lapwing.cosim.diagram.tick_schedule import Input
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.tick_schedule import InputPort
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import TRUTH
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import open_loops, stable
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.common.communication_schema import Exchange
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "exchange intervals of 1 to 50 ms, commands late by 0 to 5 exchanges: where the closed loop loses its stability"
 
@@ -36,16 +36,16 @@ def scene(rate: int) -> Scene:
     return load("hover", [f"exchange.rate={rate}", f"solver.step={1.0 / rate / -(-1000 // rate)!r}", *slow, *PUSH])
 
 
-def late(found: Setup, delay: int) -> Setup:
+def late(found: RunConfig, delay: int) -> RunConfig:
     """The set-up with commands that act so many exchanges after the measurement that they are for."""
     plant = found.services["plant"]
-    inputs = tuple(Input(i.port, 1 + delay) for i in plant.inputs)  # 1: from the next tick on is at once
+    inputs = tuple(InputPort(i.port, 1 + delay) for i in plant.inputs)  # 1: from the next tick on is at once
     return found._replace(services={**found.services, "plant": plant._replace(inputs=inputs)})
 
 
 def flies(rate: int, delay: int) -> bool:
     """Whether the push has died away in flight."""
-    flight: Flight = fly(late(resolve(scene(rate)), delay), (TRUTH,))
+    flight: FlightData = fly(late(resolve(scene(rate)), delay), (TRUTH,))
     t, turning = flight.truth.times, np.linalg.norm(flight.truth.angular_velocity, axis=1)
     left = turning[(t > 10.0) & (t < 13.0)]  # nothing of a flight that has crashed
     return not flight.failure and len(left) > 0 and bool(left.max() < QUIET)
@@ -55,7 +55,7 @@ def predicted(rate: int, delay: int) -> bool:
     """Whether Nyquist's criterion calls every loop stable."""
     of = scene(rate)
     frame = known_airframe(of)
-    found = open_loops(build(of[GainSet].plain(), frame), frame, of[Exchange].interval, delay)
+    found = open_loops(build(of[GainSet].plain(), frame), frame, of[Communication].interval, delay)
     return all(stable(loop) for loop in found.values())
 
 
@@ -65,7 +65,7 @@ def longest(works: list[bool]) -> float:
     return 1.0 / RATES[max(broken - 1, 0)]
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The longest interval of each delay, in flight and by analysis."""
     flown = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
     linear = np.array([longest([predicted(rate, d) for rate in RATES]) for d in DELAYS])
@@ -88,4 +88,4 @@ def run() -> Found:
         Curve("by analysis", x, 1e3 * linear),
         Curve("no delay", x, 1e3 * naive),
     ]
-    return Found([row], Plot("delay [exchanges]", "longest stable interval [ms]", curves))
+    return CaseResult([row], Plot("delay [exchanges]", "longest stable interval [ms]", curves))

@@ -8,7 +8,7 @@ from lapwing.dynamics.integrators import get, march
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.reference import turning
 from lapwing.studies.accuracy.systems.gyrostat import SPINNING, START
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.sampled_runs import marched, rows, worst
 
 HARD = "ten hours of gyrostat, 60 000 steps, chaotic: an attitude must stay one, the order its own, the bits the same"
@@ -51,7 +51,7 @@ def accumulated() -> np.ndarray:
     return np.array(flatten(x))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Orthogonality, order, and the same bits however the run is recorded."""
     ours = marched("rkmk4", SPINNING, START, DURATION, STEPS, SAMPLES)
     naive = on_entries()
@@ -91,4 +91,4 @@ def run() -> Found:
         ),
     ]
     curves = [Curve("rkmk4", t, np.maximum(off, 1e-17)), Curve("Euler on entries", t, naive_off)]
-    return Found(figures, Plot("time [min]", "largest entry of R^T R - 1", curves, DIGITS))
+    return CaseResult(figures, Plot("time [min]", "largest entry of R^T R - 1", curves, DIGITS))

@@ -8,7 +8,7 @@ from scipy.special import ellipj, ellipk
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, marched
 
 HARD = "1000 s of tumbling about the intermediate axis (Dzhanibekov): every flip multiplies an error of the energy"
@@ -53,7 +53,7 @@ def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.
     return np.maximum.accumulate(off), energy, drift(to_world(y[:, :9], y[:, 9:12] * INERTIA))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The rates against the closed form, and both invariants."""
     off, energy, momentum = figures("rigid_splitting", EPSILON, STEPS)
     naive_off, naive_energy, naive_momentum = figures("lie_euler", EPSILON, STEPS)
@@ -93,7 +93,7 @@ def run() -> Found:
         ),
     ]
     curves = [Curve("rigid_splitting", t, off), Curve("Lie-Euler", t, naive_off)]
-    return Found(rows, Plot("time [s]", "largest error of the rates so far [rad/s]", curves, 1e-7))
+    return CaseResult(rows, Plot("time [s]", "largest error of the rates so far [rad/s]", curves, 1e-7))
 
 
 def sweep() -> Sweep:

@@ -13,7 +13,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.terrain import relief
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 
 HARD = "landing at 0.3 to 5 m/s on ground of 1e6 N/m a foot, at any phase of a step; rest; a slope; sliding to a stop"
 
@@ -141,7 +141,7 @@ def stick_slip() -> tuple[float, float]:
     return float(ours), abs(v)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Touch, rest, slope and slide."""
     exact = exact_restitution()
     left, chattering = stick_slip()
@@ -204,7 +204,7 @@ def run() -> Found:
             chattering,
         ),
     ]
-    return Found(rows, sweep().plot())
+    return CaseResult(rows, sweep().plot())
 
 
 def sweep() -> Sweep:

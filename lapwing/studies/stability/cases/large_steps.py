@@ -6,7 +6,7 @@ from lapwing.dynamics import integrators
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.studies.accuracy.systems.gyrostat import BLOCKED
-from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows
 
 HARD = "steps at the edge of the stability of each integrator, on a damped spin of rate 1, and beyond it"
@@ -46,7 +46,7 @@ def silent(method: str, step: float) -> float:
     return 1.0
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Just inside the edge, and beyond it."""
     names = methods()
     edges = np.array([edge(name) for name in names])
@@ -79,7 +79,7 @@ def run() -> Found:
         ),
     ]
     walked = sweep()
-    return Found(found, walked.plot())
+    return CaseResult(found, walked.plot())
 
 
 def sweep() -> Sweep:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from lapwing.services.scene_resolver import load
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.stability import flights, jumping_clock
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.cases.estimator import SIGMAS, Outcome, flown
 
 HARD = (
@@ -61,7 +61,7 @@ def with_jumping_clock() -> int:
         )
         if not log.exists():
             raise RuntimeError(f"a run with a jumping clock: {done.stderr.strip()}")
-        jumped = Flight.read(log)
+        jumped = FlightData.read(log)
         ours, theirs = jumped.actuators.motor_voltage, steady.actuators.motor_voltage
         n = min(len(ours), len(theirs))
         unlike = int((ours[:n] != theirs[:n]).any(axis=1).sum()) + abs(len(ours) - len(theirs))
@@ -79,7 +79,7 @@ def worst(found: Outcome) -> float:
     return float(found.ratio[found.well].max(initial=0.0))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Errors against what is claimed, and what is refused."""
     what = "largest error over the claimed deviation, while it says that it is well"
     ours, naive = "corrected at the time of the fix", "a fix counts as measured when it arrives; the whole flight"
@@ -122,7 +122,7 @@ def run() -> Found:
         )
     )
     curves = [Curve(name, o.t, np.maximum(o.ratio, 1e-3)) for name, o in outcomes.items()]
-    return Found(rows, Plot("time [s]", "error over the claimed deviation", curves, SIGMAS))
+    return CaseResult(rows, Plot("time [s]", "error over the claimed deviation", curves, SIGMAS))
 
 
 def sweep() -> Sweep:

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.lie import ratios, so3
 from lapwing.kernels import uncompiled
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "dexp inverse at angles towards 0 and towards its pole at 2 pi; the logarithm of rotations by nearly pi"
 
@@ -69,7 +69,7 @@ def log_errors(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(ours), np.array(naive)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The three limits."""
     gaps = np.geomspace(1e-1, 1e-9, 33)
     small, at_pole, at_pi = ratio_errors(gaps), ratio_errors(2.0 * math.pi - gaps), log_errors(gaps)
@@ -111,4 +111,4 @@ def run() -> Found:
         for where, both in ((" at 0", small), (" at 2 pi", at_pole), (" log at pi", at_pi))
         for name, values in zip(("ours", "naive"), both, strict=True)
     ]
-    return Found(rows, Plot("distance from the singular angle [rad]", "error", curves, BOUND, log_x=True))
+    return CaseResult(rows, Plot("distance from the singular angle [rad]", "error", curves, BOUND, log_x=True))

@@ -6,7 +6,7 @@ import numpy as np
 
 from lapwing.dynamics import integrators
 from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, violation
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone, thrown
 
 HARD = "propellers with a thousandth of their inertia at 1000 rad/s: a mass ratio of 10 to 1e-8, and 0.25 rad a step"
@@ -31,7 +31,7 @@ def defects(way: int, scale: float, speed: float, step: float, looks: int) -> np
     return np.array(found)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The hinges in two seconds."""
     drift = {name: defects(way, SCALE, SPEED, STEP, LOOKS) for name, way in WAYS.items()}
     rows = [
@@ -49,7 +49,7 @@ def run() -> Found:
     ]
     t = EACH * STEP * np.arange(1, LOOKS + 1)
     curves = [Curve(name, t, np.maximum(values, 1e-17)) for name, values in drift.items()]
-    return Found(rows, Plot("time [s]", "largest defect", curves, BOUND))
+    return CaseResult(rows, Plot("time [s]", "largest defect", curves, BOUND))
 
 
 def sweep() -> Sweep:

@@ -13,7 +13,7 @@ from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters
 from lapwing.dynamics.vehicles.released_load import release
 from lapwing.kernels.state_tree import unflatten
 from lapwing.messages.topics import BODIES, LIFT, TRUTH
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.cases.cooperative_load import INERTIA, LENGTH, QUAD, G
 from lapwing.studies.stability.flights import flown
 from lapwing.studies.stability.sampled_runs import rows
@@ -110,7 +110,7 @@ def silent() -> tuple[float, float]:
     return float(not told), float(off < 1e-9)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """At the release and after it, at the top and beyond it."""
     kept, lost, fallen, held = let_go()
     t, found, exact, angle = over_the_top()
@@ -136,4 +136,4 @@ def run() -> Found:
             "none: a flight on cables would have gone another way", quiet, "the length of links is watched", unseen),
     ]  # fmt: skip
     curves = [Curve("tension of both links", t, found), Curve("closed form", t, exact), Curve("slack", t, 0.0 * t)]
-    return Found(figures, Plot("time [s]", "tension [N]", curves, log_y=False))
+    return CaseResult(figures, Plot("time [s]", "tension [N]", curves, log_y=False))

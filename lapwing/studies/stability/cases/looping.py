@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, marched
 
 HARD = "60 s of continuous looping: pitch goes through 90 degrees twice a turn, and the vehicle flies upside down"
@@ -65,7 +65,7 @@ def _coordinates(y: tuple[float, ...]) -> list[float]:
     ]  # fmt: skip
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Angular momentum in the world, which no torque changes."""
     ours = drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES)))
     naive = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
@@ -80,7 +80,7 @@ def run() -> Found:
         "RK4 on Euler angles, 4 ms",
         float(naive.max()),
     )
-    return Found(
+    return CaseResult(
         [row], Plot("time [s]", "change of momentum", [Curve("rkmk4", t, ours), Curve("Euler angles", t, naive)], BOUND)
     )
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lapwing.services.scene_resolver import load
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.flights import flown
 
 HARD = "rotors that follow their voltage within 10 us at a plant step of 1 ms: 36 times beyond RK4's stability"
@@ -38,7 +38,7 @@ def accepted(lag: float) -> float:
     return 1.0
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """A flight with stiff motors, and motors without any lag."""
     t, off = lagging(STIFF)
     naive = unsplit(STIFF, round(INTERVAL / STEP))
@@ -67,7 +67,7 @@ def run() -> Found:
         ),
     ]
     curves = [Curve("split", t, np.maximum(off, 1e-17)), Curve("RK4 at 1 ms", STEP * np.arange(1, 5), naive)]
-    return Found(rows, Plot("time [s]", "rotor speed off its voltage's, relative", curves, ALLOWED))
+    return CaseResult(rows, Plot("time [s]", "rotor speed off its voltage's, relative", curves, ALLOWED))
 
 
 def sweep() -> Sweep:

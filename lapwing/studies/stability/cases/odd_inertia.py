@@ -6,7 +6,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.accuracy.systems.free_rigid_body import closed_form
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, marched
 
 HARD = "a needle (a moment a millionth of the others), a flat plate, a body spherical but for 1e-9"
@@ -56,7 +56,7 @@ def nearly_spherical() -> tuple[float, float]:
     return float(np.abs(ours - exact).max()), float(np.abs(naive - exact).max())
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Energy and momentum of the first two, the rates of the third."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     rows, curves = [], []
@@ -88,7 +88,7 @@ def run() -> Found:
             naive_off,
         )
     )
-    return Found(rows, Plot("time [s]", "change of energy and momentum", curves, BOUND))
+    return CaseResult(rows, Plot("time [s]", "change of energy and momentum", curves, BOUND))
 
 
 def sweep() -> Sweep:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from lapwing.services.scene_resolver import load
-from lapwing.studies.flight_data import Flight
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.flights import finite
 
 HARD = "missions whose vehicle, ground, wind, sensors and exchange are drawn at random over decades"
@@ -44,17 +44,17 @@ def drawn(seed: int) -> list[str]:
     return [f"{key}={value}" for key, value in {**found, **slow}.items()]
 
 
-def flights(seed: int) -> tuple[Flight, Flight] | None:
+def flights(seed: int) -> tuple[FlightData, FlightData] | None:
     """A scene flown twice; None where it does not validate."""
     try:
-        first: Flight = fly(load("delivery_mission", drawn(seed)))
+        first: FlightData = fly(load("delivery_mission", drawn(seed)))
     except ValueError:  # also: too heavy for its rotors
         return None
-    second: Flight = fly(load("delivery_mission", drawn(seed)))
+    second: FlightData = fly(load("delivery_mission", drawn(seed)))
     return first, second
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Flights that end in no number, and those that differ when they are flown again."""
     pairs = [pair for seed in range(COUNT) if (pair := flights(seed))]
     broken = [bool(first.failure) or not finite(first) for first, _ in pairs]
@@ -86,7 +86,9 @@ def run() -> Found:
     ]
     highest = [float(np.abs(first.truth.angular_velocity).max()) for first, _ in pairs]
     x = np.arange(len(pairs), dtype=float)
-    return Found(rows, Plot("scene", "highest turn rate [rad/s]", [Curve("in flight", x, np.array(highest) + 1e-12)]))
+    return CaseResult(
+        rows, Plot("scene", "highest turn rate [rad/s]", [Curve("in flight", x, np.array(highest) + 1e-12)])
+    )
 
 
 def _lag_and_step(seed: int) -> tuple[str, str]:

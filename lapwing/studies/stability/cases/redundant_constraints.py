@@ -21,7 +21,7 @@ from lapwing.dynamics.multibody.initial_conditions import consistent
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system, four_bars
 from lapwing.dynamics.multibody.simulation import simulate
 from lapwing.dynamics.multibody.stabilisation import defects, rows
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone
 
 HARD = "32 rows of rank 24; the Bricard loop, whose count leaves no freedom; a four-bar through its singular position"
@@ -120,7 +120,7 @@ def inconsistent() -> tuple[float, float]:
     return max(defects(system.arrays, closed, moving, none)), max(defects(system.arrays, q, v, none))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Rank, redundancy off the constraints, a singular position and an inconsistent start."""
     t, off, naive_off = singular_position()
     ours_off, fresh = off_by(1e-6)
@@ -167,7 +167,7 @@ def run() -> Found:
         ),
     ]
     curves = [Curve("projection", t, off), Curve("no stabilisation", t, naive_off)]
-    return Found(figures, Plot("time [s]", "error of the crank's tip [m]", curves, POSITION))
+    return CaseResult(figures, Plot("time [s]", "error of the crank's tip [m]", curves, POSITION))
 
 
 def sweep() -> Sweep:

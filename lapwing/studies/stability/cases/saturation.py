@@ -9,7 +9,7 @@ from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.flights import flown
 
 HARD = (
@@ -81,7 +81,7 @@ def tumbling() -> tuple[float, float]:
     return float(np.abs(np.linalg.norm(truth.orientation, axis=1) - 1.0).max()), abs(float(np.linalg.norm(q)) - 1.0)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Overshoot after a loss of thrust, the path of a drop in wind, the attitude of a vehicle that turns over."""
     t, ours = height(True, LOSS)
     _, naive = height(False, LOSS)
@@ -129,7 +129,7 @@ def run() -> Found:
         ),
     ]
     curves = [Curve("integral held", t, ours), Curve("integral goes on", t, naive)]
-    return Found(rows, Plot("time [s]", "height over the setpoint [m]", curves, OVERSHOOT, log_y=False))
+    return CaseResult(rows, Plot("time [s]", "height over the setpoint [m]", curves, OVERSHOOT, log_y=False))
 
 
 def sweep() -> Sweep:

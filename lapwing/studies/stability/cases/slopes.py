@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, multiply
-from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import STEP, G, naive_restitution, run_on, standing
 
 HARD = "slopes up to where feet that are loaded unevenly let go, and beyond; bumps; a touch with one foot first"
@@ -76,7 +76,7 @@ def bumps() -> float:
     return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Sticks, slides, comes down on one foot, stands on bumps."""
     below, beyond = EDGE - MARGIN, 30.0
     a = math.radians(beyond)
@@ -98,7 +98,7 @@ def run() -> Found:
         Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
         Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chattering(5.0)),
     ]
-    return Found(rows, sweep().plot())
+    return CaseResult(rows, sweep().plot())
 
 
 def sweep() -> Sweep:

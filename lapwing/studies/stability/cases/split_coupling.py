@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.flights import flown
 from lapwing.studies.stability.sampled_runs import rows
 
@@ -50,7 +50,7 @@ def off(positions: np.ndarray) -> float:
     return float(np.nanmax(distance))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """In one and in two."""
     one = float(np.linalg.norm(together(1000) - together(2000), axis=1).max())
     why = "the formation flies at 5 m/s: in an exchange of 2.5 ms it moves by 12 mm"
@@ -70,7 +70,7 @@ def run() -> Found:
         for coupling in ("sequential", "parallel")
         for rate in (400, 40, SLOW)
     ]
-    return Found(figures, Plot("time [s]", "distance from the run in one process [m]", curves, ALLOWED))
+    return CaseResult(figures, Plot("time [s]", "distance from the run in one process [m]", curves, ALLOWED))
 
 
 def sweep() -> Sweep:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
 from lapwing.dynamics.vector import scale
-from lapwing.studies.stability.case_result import Curve, Found, Plot, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.cases.landing import DAMPING, DRONE, HEIGHT, STEP, STIFFNESS, G, run_on, standing
 from lapwing.studies.stability.cases.slopes import energy
 
@@ -152,7 +152,7 @@ def push_error(axis: int, topples: Callable[[float], bool], parts: int) -> float
     return abs(threshold(topples, 0.5 * exact, 1.5 * exact, parts) / exact - 1.0)
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """Set down leaning, pushed, and what becomes of the energy."""
     ours, euler = "anchored feet, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
     rest = settled()
@@ -172,7 +172,7 @@ def run() -> Found:
             "none but round-off: the ground gives nothing",
             max(gained(i, a) for i, a in beside), euler, kicked),
     ]  # fmt: skip
-    return Found(rows, course())
+    return CaseResult(rows, course())
 
 
 def course() -> Plot:

@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.dynamics import integrators
 from lapwing.services.plant.models import unloading
 from lapwing.services.scene_resolver import load
-from lapwing.studies.stability.case_result import Curve, Found, Row, Sweep
+from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.flights import flown
 
 HARD = "a pack that rollers push over a door that falls open: contacts that begin, slide, stick and end"
@@ -40,7 +40,7 @@ def naive(step: float) -> float:
     return float(np.linalg.norm(rows[-1][:3] - end(STEPS[0], "solver.accuracy=1e-8")))
 
 
-def run() -> Found:
+def run() -> CaseResult:
     """The end at every step."""
     row = Row(
         "end",
@@ -52,7 +52,7 @@ def run() -> Found:
         "RK4 at 0.5 ms as it is",
         naive(NAIVE),
     )
-    return Found([row], sweep().plot())
+    return CaseResult([row], sweep().plot())
 
 
 def sweep() -> Sweep:

@@ -1,7 +1,7 @@
 """By hand without knowing where: the sticks ask for tilts, a vertical speed and a yaw rate."""
 
 from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.interface import Setpoint
@@ -17,7 +17,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._flight = AltitudeFlight(guidance) if guidance.flying else None
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Fly as the sticks say; when nobody holds them any more, by itself."""
         forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
         if up > 0.0:

@@ -1,7 +1,7 @@
 """Down without knowing where: level but for what leans against the wind, as PX4's mode of this name does."""
 
 from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.modes.land import descent_speed
@@ -20,7 +20,7 @@ class Mode(FlightMode):
         self._flight = AltitudeFlight(guidance)
         self._position_known = 0.0  # [s]
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Sink for one tick."""
         if not guidance.flying:
             return None

@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.leg import Leg
@@ -26,6 +26,6 @@ class Mode(FlightMode):
         if speed > 0.0:
             guidance.speed = speed
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Fly there."""
         self._leg.step(guidance, self._yaw, view.dt)

@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.vector import ZERO, Vec3, norm
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, value
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.leg import towards_roi
@@ -19,7 +19,7 @@ class Mode(FlightMode):
         self._position: Vec3 | None = None
         self._yaw = value(values, 0)
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Brake or stay."""
         if not guidance.flying:
             return

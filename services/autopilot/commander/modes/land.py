@@ -1,7 +1,7 @@
 """Down to the ground, where it is."""
 
 from lapwing.dynamics.vector import ZERO
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import braking_speed
@@ -26,7 +26,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._place: tuple[float, float] | None = None
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Stop where it is, and sink."""
         if not guidance.flying:
             return

@@ -5,7 +5,7 @@ from itertools import islice
 from typing import Any
 
 from lapwing.dynamics.vector import ZERO, Vec3, norm, subtract
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.leg import Leg, Place, passing_speed
@@ -46,7 +46,7 @@ class Mode(FlightMode):
         """Which item."""
         return "complete" if self._number is None else f"item {self._number + 1} of {self._count}"
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Fly the current item, or go on with the next."""
         route = guidance.route
         if not guidance.armed:
@@ -63,7 +63,7 @@ class Mode(FlightMode):
         if self._fly(constants, view, guidance, item):
             route.advance()
 
-    def _after_instant_items(self, constants: Constants, view: View, guidance: Guidance) -> Any:
+    def _after_instant_items(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Any:
         """Do what takes no time; the item that comes then, None at the end."""
         route = guidance.route
         for _ in route.items:
@@ -74,7 +74,7 @@ class Mode(FlightMode):
             route.advance()
         return route.item
 
-    def _stay(self, view: View, guidance: Guidance) -> None:
+    def _stay(self, view: CommanderInput, guidance: Guidance) -> None:
         """The mission is over: hold where its last waypoint is, whose radius may have been wide."""
         smoothing, last = guidance.smoothing, self._last_waypoint
         if last is None or not guidance.flying or norm(subtract(last, smoothing.position)) < ARRIVED:
@@ -124,7 +124,7 @@ class Mode(FlightMode):
             before = after
         return Leg(start, target, passing_speed(start, ahead, guidance.limits))
 
-    def _fly(self, constants: Constants, view: View, guidance: Guidance, item: Any) -> bool:
+    def _fly(self, constants: Constants, view: CommanderInput, guidance: Guidance, item: Any) -> bool:
         """Move the setpoint for one tick; whether the item is done."""
         if item.action in ("land", "return") and not guidance.flying:
             self._time_there += view.dt
@@ -184,7 +184,7 @@ def _place(item: Any, here: Vec3) -> Vec3:
     return x, y, here[2] if item.action in ("land", "loiter_to_alt") else z  # horizontally first
 
 
-def _act(constants: Constants, view: View, guidance: Guidance, item: Any) -> None:
+def _act(constants: Constants, view: CommanderInput, guidance: Guidance, item: Any) -> None:
     """Do what an item asks for that takes no time."""
     place = tuple(item.position)
     if item.action == "speed":

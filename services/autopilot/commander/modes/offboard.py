@@ -6,7 +6,7 @@ import math
 from lapwing.dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale
 from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
@@ -27,7 +27,7 @@ class Mode(FlightMode):
             raise ValueError(f"offboard: no setpoints are coming{refused and f'; the last was refused: {refused}'}")
         self._attitude: AttitudeFlight | None = None
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Towards the setpoint, within the limits."""
         values = guidance.inputs.offboard
         self.motor_voltage = None
@@ -50,7 +50,9 @@ class Mode(FlightMode):
                 guidance.smoothing.turn_at(rate, guidance.limits, view.dt)
         return None
 
-    def _drive(self, constants: Constants, view: View, guidance: Guidance, volts: tuple[float, ...]) -> Setpoint | None:
+    def _drive(
+        self, constants: Constants, view: CommanderInput, guidance: Guidance, volts: tuple[float, ...]
+    ) -> Setpoint | None:
         """Voltages of the motors [V]. The setpoint goes along with the vehicle: others go on from there."""
         self._attitude = None
         turning = any(v > 0.0 for v in volts)
@@ -67,7 +69,7 @@ class Mode(FlightMode):
         return setpoint
 
     def _follow_attitude(
-        self, constants: Constants, view: View, guidance: Guidance, values: tuple[float, ...]
+        self, constants: Constants, view: CommanderInput, guidance: Guidance, values: tuple[float, ...]
     ) -> Setpoint | None:
         """An attitude (w, x, y, z) or body rates [rad/s], a thrust over the maximum or a climb rate [m/s]; NaN: none.
 
@@ -92,7 +94,9 @@ class Mode(FlightMode):
         )
 
 
-def _follow_position(view: View, guidance: Guidance, position: Vec3, velocity: Vec3, acceleration: Vec3) -> None:
+def _follow_position(
+    view: CommanderInput, guidance: Guidance, position: Vec3, velocity: Vec3, acceleration: Vec3
+) -> None:
     """Move the setpoint by what is given of position [m], velocity [m/s] and acceleration [m/s^2]; NaN: not given."""
     smoothing, limits = guidance.smoothing, guidance.limits
     approach = smoothing.velocity_to(fill_in(smoothing.position, position), limits)

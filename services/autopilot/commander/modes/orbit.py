@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
@@ -33,7 +33,7 @@ class Mode(FlightMode):
         self._behaviour = TO_CENTRE if math.isnan(behaviour) or behaviour == UNCHANGED else int(behaviour)
         self._turns_left = turns if turns > 0.0 else math.inf
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Fly to the circle, and along it."""
         smoothing, limits = guidance.smoothing, guidance.limits
         x, y, _z = smoothing.position

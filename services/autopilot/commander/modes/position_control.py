@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.vector import ZERO, Vec3, norm
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 
@@ -17,7 +17,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._position: Vec3 | None = None
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Fly as the sticks say; hold the position when they are in the middle."""
         forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
         if not guidance.armed:

@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.vector import norm, subtract
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.geofence_routing import Point, way_round
 from lapwing.services.autopilot.commander.guidance import Guidance
@@ -39,7 +39,7 @@ class Mode(FlightMode):
         """Phase of the return: climb, home (across), wait (over the landing place)."""
         return _WAIT if self._index == len(self._corners) else _CRUISE if self._index else _CLIMB
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """One corner after the other, then land."""
         if not guidance.flying:
             return

@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight, stick_thrust
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.interface import Setpoint
@@ -20,7 +20,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._flight: AttitudeFlight | None = None
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> Setpoint | None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Fly as the sticks say; when nobody holds them any more, by itself."""
         forward, left, up, turn = (guidance.inputs.stick(k) for k in range(4))
         thrust = stick_thrust(constants, up)
@@ -36,7 +36,7 @@ class Mode(FlightMode):
         return self._flight.setpoint(constants, view, guidance, rate, thrust, 0.0)
 
     def _turn(
-        self, view: View, guidance: Guidance, forward: float, left: float, turn: float, flight: AttitudeFlight
+        self, view: CommanderInput, guidance: Guidance, forward: float, left: float, turn: float, flight: AttitudeFlight
     ) -> float:
         """Turn the attitude on by a tick; its yaw rate [rad/s]."""
         tilt, rate = guidance.manual_tilt, turn * math.radians(guidance.parameters["MPC_MAN_Y_MAX"])

@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.autopilot.commander.commander_input import Constants, View
+from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, value
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.route import MAXIMUM_TAKEOFF_HEIGHT
@@ -28,7 +28,7 @@ class Mode(FlightMode):
         """The height that it climbs to."""
         return f"to {self._height:g} m"
 
-    def step(self, constants: Constants, view: View, guidance: Guidance) -> None:
+    def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Climb; the setpoint starts from the ground as soon as the motors are armed."""
         if not guidance.armed:
             return

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
-from lapwing.kernels import ByClass, leaf
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
+from lapwing.kernels import DispatchTable, leaf
 from lapwing.kernels.codegen import implements
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator, State
@@ -41,7 +41,7 @@ def _flow(p: Estimator, x: State, r: OpticalFlowReading) -> State:
     return estimator.update_flow(p, x, r.flow, r.rate, r.distance, r.variance, r.valid)
 
 
-UPDATES = ByClass()
+UPDATES = DispatchTable()
 """The compiled update of the filter by the class of a reading."""
 UPDATES[BarometerReading] = _barometer
 UPDATES[MagnetometerReading] = _magnetometer
@@ -61,10 +61,10 @@ def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
 
 @leaf
 def step(
-    p: Correction, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+    p: Correction, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct by the reading of the tick."""
     x = s.filter
     if s.begun:
         x = update(p.filter, x, inputs[0].value)
-    return NavigationState(s.begun, x), (), GO_ON
+    return NavigationState(s.begun, x), (), CONTINUE

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
@@ -19,7 +19,7 @@ class GpsFusion(NamedTuple):
 
 @leaf
 def step(
-    p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+    p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct by the reading of the tick."""
     r, x = inputs[0].value, s.filter
@@ -29,4 +29,4 @@ def step(
         x = estimator.update_gps(p.filter, x, r.latitude_deg, r.longitude_deg, r.height, doubted, p.age, r.valid)
         variance = r.velocity_variance if r.valid else -1.0
         x = estimator.update_gps_velocity(p.filter, x, r.velocity_world, variance, p.age, variance >= 0.0)
-    return NavigationState(s.begun, x), (), GO_ON
+    return NavigationState(s.begun, x), (), CONTINUE

@@ -2,21 +2,21 @@
 
 from typing import Any, NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, LOOK, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import leaf
-from lapwing.services.autopilot.commander_wakeup import Attention, attention_due
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
 from lapwing.services.common.ports import StateEstimate
 
 
 class TrueEstimate(NamedTuple):
     """What calls the commander."""
 
-    attention: Attention
+    attention: WakeupParameters
 
 
 @leaf
-def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tuple[Any, tuple[StateEstimate], int]:
+def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The true state at `tick`; it has no state of its own."""
     truth, battery, flight = inputs
     x = truth.value
@@ -25,4 +25,4 @@ def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[Received, ...]) -> tu
         ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
     )  # fmt: skip
     due = attention_due(p.attention, tick, 0, battery, flight)
-    return s, (e,), LOOK if due else GO_ON
+    return s, (e,), WAKE_PYTHON if due else CONTINUE

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, norm
 from lapwing.kernels import leaf
 from lapwing.services.autopilot import estimator
@@ -25,7 +25,7 @@ class InertialNavigation(NamedTuple):
 
 @leaf
 def step(
-    p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+    p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
     """Begin once the vehicle is level and the compass has been read; then predict to `tick`."""
     imu, magnetometer, flight = inputs
@@ -45,4 +45,4 @@ def step(
         on_ground = not flight.due or (flight.value.stage == ON_GROUND and tick >= flight.value.still_from)
         if on_ground and tick % p.standstill_every == 0:
             x = estimator.update_standstill(p.filter, x, omega_variance, force_variance)
-    return NavigationState(begun, x), (), GO_ON
+    return NavigationState(begun, x), (), CONTINUE

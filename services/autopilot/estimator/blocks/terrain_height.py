@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from lapwing.cosim.diagram.compiled_block import GO_ON, Received
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import leaf
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
@@ -18,7 +18,7 @@ class GroundReference(NamedTuple):
 
 @leaf
 def step(
-    p: GroundReference, s: NavigationState, tick: int, inputs: tuple[Received, ...]
+    p: GroundReference, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct by the reading of the tick."""
     r, x = inputs[0].value, s.filter
@@ -26,4 +26,4 @@ def step(
         if r.valid and not math.isinf(r.range):
             estimator.follow_ground(p.filter, x)
         x = estimator.update_sonar(p.filter, x, r.range, r.variance, r.valid)
-    return NavigationState(s.begun, x), (), GO_ON
+    return NavigationState(s.begun, x), (), CONTINUE

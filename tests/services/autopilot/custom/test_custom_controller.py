@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from lapwing.cosim.log import LogReader
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
 from lapwing.runs.resimulate import refly
 from lapwing.runs.single_process_run import fly_single
-from lapwing.services.process_main import Participation
+from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.simulate import fly
 
@@ -135,7 +135,7 @@ def test_a_log_is_flown_again_without_the_file_once_its_code_may_be_run(scene, t
 
 def test_the_process_of_the_autopilot_runs_the_text_of_the_set_up_to_the_same_bits(scene, tmp_path):
     own, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
-    given = Participation("mission", resolve(own), {}, "test-own-controller", log=str(log))
+    given = ProcessSpec("mission", resolve(own), {}, "test-own-controller", log=str(log))
     (tmp_path / "own_python.py").unlink()
     fly_processes(given, Silent())
     with LogReader(log) as read:
@@ -190,7 +190,7 @@ def test_a_command_that_is_not_finite_is_refused(scene):
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_line_with_the_key(scene, module, text, name, overrides, said):
-    with pytest.raises(KeyedError) as caught:
+    with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
     assert line.startswith("--set autopilot.controller")
@@ -202,10 +202,10 @@ def test_a_module_that_is_not_there_is_reported_with_the_line_of_the_scene(tmp_p
     path = tmp_path / "hover.toml"
     path.write_text(HOVER.read_text().replace('gains = "tuned"', 'controller = "nobody_has_this:C"'))
     with pytest.raises(
-        KeyedError, match=r"hover.toml:\d+: autopilot.controller: no module nobody_has_this; expected .*"
+        ConfigError, match=r"hover.toml:\d+: autopilot.controller: no module nobody_has_this; expected .*"
     ):
         load(path)
-    with pytest.raises(KeyedError, match='"module:Name"'):
+    with pytest.raises(ConfigError, match='"module:Name"'):
         load(HOVER, ["autopilot.controller=my_module"])
-    with pytest.raises(KeyedError, match="nobody to take them"):
+    with pytest.raises(ConfigError, match="nobody to take them"):
         load(HOVER, ["autopilot.controller_options.a=1.0"])

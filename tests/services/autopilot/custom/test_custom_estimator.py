@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lapwing.dynamics.config_error import KeyedError
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.simulate import fly
 
@@ -68,11 +68,15 @@ def test_a_reading_is_shown_once_and_the_estimate_holds_between_steps(scene):
 
 
 def test_what_is_wrong_is_one_line(scene):
-    with pytest.raises(KeyedError, match=r"autopilot.estimator: own_estimator:DeadReckoning: TypeError: step returned"):
+    with pytest.raises(
+        ConfigError, match=r"autopilot.estimator: own_estimator:DeadReckoning: TypeError: step returned"
+    ):
         resolve(scene(DEAD_RECKONING.replace("return State", "return print or State"), "DeadReckoning"))
-    with pytest.raises(KeyedError, match=r"autopilot.estimator_options: TypeError: .* unexpected keyword argument 'x'"):
+    with pytest.raises(
+        ConfigError, match=r"autopilot.estimator_options: TypeError: .* unexpected keyword argument 'x'"
+    ):
         resolve(scene(DEAD_RECKONING, "DeadReckoning", "autopilot.estimator_options.x=1.0"))
-    with pytest.raises(KeyedError, match="unknown estimator 'sensor'; did you mean sensors"):
+    with pytest.raises(ConfigError, match="unknown estimator 'sensor'; did you mean sensors"):
         load("hover", ["autopilot.estimator=sensor"])
     text = DEAD_RECKONING.replace("        x, y", "        if time > 1.0: 1 / 0\n        x, y")
     said = "estimator own_estimator:DeadReckoning: ZeroDivisionError: division by zero"
