@@ -4,27 +4,28 @@ import threading
 from collections import Counter
 from contextlib import contextmanager
 
-import cosim.process
 import pytest
-from cosim.bus import ZenohBus
-from cosim.errors import LockStepError
-from cosim.keys import ALIVE_KEY, HEARD_KEY
-from cosim.participants import Participants
-from cosim.private import private_endpoints
-from cosim.process import Process
-from cosim.setup import Setup
+
+import lapwing.cosim.executors.participant
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.access.publisher_ids import PublisherIds
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.executors.participant import Participant
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, HEARD_KEY
 
 PREFIX = "test-leave"
-SETUP = Setup("", "", 1, 1, 250, 4_000_000, "sequential", "drone1", {}, {}, {})
+SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "sequential", "drone1", {}, {}, {})
 
 
 @contextmanager
 def joined(monkeypatch, external=()):
     """A process that has joined, and the session of the only other participant, which has said that it is there."""
-    monkeypatch.setattr(cosim.process.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(cosim.process, "on_compile", lambda told: None)
+    monkeypatch.setattr(lapwing.cosim.executors.participant.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda told: None)
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
-        process = Process("plant", SETUP, bus, Participants(PREFIX, external=external), ["plant", "other"])
+        process = Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"])
         with ZenohBus(connect=[endpoints["plant"]]) as other:
             other.declare_alive(f"{PREFIX}/{ALIVE_KEY}/other")
             process.join()
@@ -32,7 +33,7 @@ def joined(monkeypatch, external=()):
 
 
 def test_who_does_not_confirm_is_named(monkeypatch):
-    monkeypatch.setattr(cosim.process, "CONFIRMED", 0.1)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "CONFIRMED", 0.1)
     with (
         joined(monkeypatch) as (process, _),
         pytest.raises(LockStepError, match=r"^plant: other did not confirm its last"),
@@ -60,6 +61,6 @@ def test_who_has_left_is_not_waited_for(monkeypatch):
 
 
 def test_a_program_of_another_author_confirms_by_leaving_or_is_late(monkeypatch):
-    monkeypatch.setattr(cosim.process, "FOREIGN", 0.1)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "FOREIGN", 0.1)
     with joined(monkeypatch, external=("other",)) as (process, _):
         process.leave(lambda: None)

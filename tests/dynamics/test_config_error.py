@@ -16,8 +16,8 @@ from lapwing.dynamics.config_error import ConfigError
         (ConfigError("", "excludes b"), "excludes b"),
         (ConfigError.unknown("a", "effect", "wnd", ["wind", "rain"]), "a: unknown effect 'wnd'; did you mean wind? "
          "expected one of rain, wind"),
-        (ConfigError.unknown("a", "effect", "x", ["wind", "rain"]), "a: unknown effect 'x'; expected one of rain,
-        wind"),
+        (ConfigError.unknown("a", "effect", "x", ["wind", "rain"]),
+         "a: unknown effect 'x'; expected one of rain, wind"),
     ],
 )  # fmt: skip
 def test_the_line(error, text):
