@@ -47,8 +47,7 @@ def own(name, cycles):
     bus = Idle()
     process = SimpleNamespace(
         setup=setup, name=name, bus=bus, participants=PublisherIds("bench"), key_prefix="bench",
-        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), restarts=False,
-        journal=None, bundles_ahead=True,
+        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), bundles_ahead=True,
     )  # fmt: skip
     service = Service(name, [Constant(name, 2 * cycles)], plant_wires(setup, NONE) if name == "plant" else [])
     graph = BlockDiagram(setup, [service], 2 * PAGE)

@@ -45,8 +45,6 @@ class ProcessSpec(NamedTuple):
     external: dict[str, str] | None = None  # endpoints of services that are programs of somebody else's, by name
     keys: str = ""  # path of a folder of certificates
     realtime: bool = False  # services of the lock step run in the scheduler's real-time class
-    restarts: bool = False  # some service of the run is started again where it is killed
-    journal: int = -1  # open file of this service's journal, if it is one of them
     with_parent: bool = False  # ends when standard input closes
 
 
@@ -89,7 +87,6 @@ def take_part(given: ProcessSpec) -> None:
     from lapwing.cosim.executors.participant import Participant, Stopped
     from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.transport.bus import ZenohBus, mesh
-    from lapwing.cosim.transport.input_journal import Journal
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 
@@ -101,9 +98,8 @@ def take_part(given: ProcessSpec) -> None:
         security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
     else:
         security = settings(setup, given.name, given.key_prefix, given.keys)
-    # All wait for one another later (`Participant.join`); only one that is started again asks others before
-    awaits = given.journal >= 0
-    with ZenohBus([*listen, *given.open], connect, entry.mode, participants.mark(given.name), security, awaits) as bus:
+    endpoints, gid = [*listen, *given.open], participants.mark(given.name)
+    with ZenohBus(endpoints, connect, entry.mode, gid, security, awaits=False) as bus:
         watched = MONITOR in given.peers and not given.with_parent
         others = [*process_table.needed(setup, given.external or ()), *([MONITOR] if MONITOR in given.peers else [])]
         if given.with_parent and process_table.ROUTER in given.peers:
@@ -111,8 +107,7 @@ def take_part(given: ProcessSpec) -> None:
         # all that one launcher has started have the same set-up; a program of somebody else's may have another
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
-        journal = Journal(given.name, given.journal) if given.journal >= 0 else None
-        process = Participant(given.name, setup, bus, participants, others, *pace, given.restarts, journal)
+        process = Participant(given.name, setup, bus, participants, others, *pace)
         if given.with_parent:
             process.end_with_parent(given.peers[given.name])
         elif watched:
@@ -145,20 +140,12 @@ def import_ahead(names: Iterable[str]) -> None:
 
 def _heard(process: Any) -> dict[str, Any]:
     """The operator commands that have come on the bus for each vehicle, from the processes that give any."""
-    from lapwing.cosim.transport.input_journal import NOTHING
     from lapwing.services.common.operator_inbox import OPERATOR_KEY, OperatorInbox
     from lapwing.services.process_table import MAVLINK, ROS2
 
     get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
 
-    def come() -> tuple[int, bytes]:
-        return get(0.0) or NOTHING
-
-    def arrived() -> tuple[int, bytes] | None:
-        found = process.journal.take(come) if process.journal else come()
-        return None if found == NOTHING else found
-
-    mailbox = OperatorInbox(process.setup.vehicles, arrived)
+    mailbox = OperatorInbox(process.setup.vehicles, lambda: get(0.0))
     return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
 
 

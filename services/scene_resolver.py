@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cache
 from operator import index
 from pathlib import Path
@@ -110,11 +110,10 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             with vehicle.located():
                 members.append(_resolve(vehicle, plans))
         with scene.located():
-            names = dict.fromkeys(name for member in members for name in member.services)
-            return multi_vehicle.joined(_acquainted(members, "vehicle.{}."), _restarts_listed(scene, names))
+            return multi_vehicle.joined(_acquainted(members, "vehicle.{}."), dict(scene.resolved))
     with scene.located():
         (setup,) = _acquainted([_resolve(scene, plans)], "")
-        return setup._replace(resolved=_restarts_listed(scene, setup.services))
+        return setup
 
 
 def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
@@ -162,17 +161,3 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
         beside,
         dict(scene.resolved),
     )
-
-
-def _restarts_listed(scene: Scene, services: Collection[str]) -> dict[str, Any]:
-    """What a scene of these services resolves to, with a list of those that are started again.
-
-    Raises:
-        SceneError: one of them is none of these services.
-    """
-    wanted = scene[Run].restart
-    names = (list(services) if wanted else []) if isinstance(wanted, bool) else list(wanted)
-    if unknown := [name for name in names if name not in services]:
-        raise SceneError("run.restart", f"got {', '.join(unknown)}", f"services of this scene: {', '.join(services)}")
-    run = {**scene.resolved[Run.TABLE], "restart": names}
-    return {**scene.resolved, Run.TABLE: run}

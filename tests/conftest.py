@@ -2,10 +2,14 @@
 
 import resource
 
+import hypothesis
 import pytest
 
 _PEAK = "peak_memory_mb"
 _peaks = pytest.StashKey[dict[str, float]]()
+
+hypothesis.settings.register_profile("lapwing", deadline=None)  # examples compile kernels, on a busy machine
+hypothesis.settings.load_profile("lapwing")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -138,8 +138,6 @@ def run(
         paced = mavlink or view or realtime or ros2 is not None
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if paced else None)
         if table is not None:
-            if loaded[Run].restart:
-                raise ValueError("run.restart: `lapwing run` starts again what it has started; leave out --peers")
             check_complete(table, [*needed(setup, elsewhere(table)), MONITOR])
         check_distinct({"SCENE": scene, "--log": log, "--json": json, "--report": report})
         path = log_path(loaded, log, exists=table is not None)

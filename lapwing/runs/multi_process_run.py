@@ -1,10 +1,7 @@
 """A run with every service in a process of its own."""
 
 import os
-import tempfile
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
-from pathlib import Path
 from typing import IO
 
 from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
@@ -13,14 +10,12 @@ from lapwing.cosim.diagram.multi_vehicle import leading
 from lapwing.cosim.processes.child_process import Child
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.launcher import launch
-from lapwing.cosim.processes.restart_policy import Restarts
 from lapwing.cosim.processes.run_monitor import RunMonitor
 from lapwing.cosim.transport.key_prefix import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Stopwatch
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
-from lapwing.services.common.run_schema import Run
 from lapwing.services.process_main import ProcessSpec, hand_over
 
 
@@ -49,9 +44,6 @@ def fly_processes(
     setup, given = given.setup, given._replace(secret=new_secret())
     clock = Clock(observer, setup)
     external = given.external or {}
-    again = restarted(setup)
-    if again and external:
-        raise ValueError(f"run.restart: {', '.join(external)}: a program of your own has no bundles to give again")
     names = [*process_table.needed(setup, external), *([process_table.ROUTER] if given.open else [])]
     core = shared_core(setup)
 
@@ -62,22 +54,17 @@ def fly_processes(
             core=core if name in setup.services else None,
             open=given.open if name == process_table.ROUTER else (),
             with_parent=True,
-            restarts=bool(again),
-            journal=journals.get(name, -1),
         )
         hand_over(own, stream)
 
     participants = PublisherIds(given.key_prefix, given.secret, tuple(external))
-    with Stop() as stop, ExitStack() as stack:
-        journals = {name: stack.enter_context(_journal(given.log)).fileno() for name in again}
-        restarts = Restarts(journals, observer.say)
+    with Stop() as stop:
 
         def ended(watch: RunMonitor) -> bool:
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
-        services = setup.services
-        said = launch(names, give, participants, ended, beside, external, restarts, early, services)
+        said = launch(names, give, participants, ended, beside, external, early, setup.services)
         for name, words in said.items():
             for line in words.splitlines():
                 observer.say(f"{name}: {line}")
@@ -85,19 +72,6 @@ def fly_processes(
     if clock.refused:
         observer.say(f"refused: {clock.refused} messages that no participant of this run has sent")
     return clock.elapsed
-
-
-def restarted(setup: RunConfig) -> tuple[str, ...]:
-    """The services that are started again where they are killed."""
-    return tuple(setup.resolved[Run.TABLE].get("restart", ()))
-
-
-def _journal(log: str) -> IO[bytes]:
-    """A file beside the log that has no name and is gone with the last process that has it open."""
-    try:
-        return tempfile.TemporaryFile(dir=Path(log).parent, prefix="lapwing-")
-    except OSError as error:
-        raise ValueError(f"no journal for run.restart beside {log}: {error.strerror}") from None
 
 
 class Clock:

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from lapwing.cosim.config.provenance import DIVERGED, FAILURE, RESTARTS
+from lapwing.cosim.config.provenance import DIVERGED, FAILURE
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.log import LogReader
@@ -26,7 +26,7 @@ from lapwing.messages.topics import (
     of_all,
 )
 from lapwing.studies import tracking
-from lapwing.studies.flight_events import Event, events, ordered, restarts, slack
+from lapwing.studies.flight_events import Event, events, slack
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.flight_topics import FlightTopics
 from lapwing.studies.outcome import FlightOutcome, judge
@@ -236,8 +236,6 @@ class FlightData(FlightTopics):
         load = self.origin.scene.get("cooperative_load")
         if load and self.has("bodies") and self.has("lift"):  # nobody steers: no other kind of event is told
             found += slack(self.topic("bodies"), self.topic("lift"), load)
-        if RESTARTS in self.metadata:
-            found = ordered([*found, *restarts(self.metadata[RESTARTS])])
         return found
 
     @property

@@ -1,7 +1,5 @@
-"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, slack links, saturation, contact; and
-which services were started again."""
+"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, slack links, saturation, contact."""
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -58,12 +56,6 @@ def events(
 def ordered(found: Iterable[Event]) -> list[Event]:
     """Events in their order."""
     return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
-
-
-def restarts(told: str) -> list[Event]:
-    """Where services were started again, from what the log's metadata tells of it
-    (`lapwing.cosim.processes.restart_policy`)."""
-    return [Event(round(time, 9), "restart", text) for time, text in json.loads(told)]
 
 
 def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:

@@ -11,7 +11,6 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "restart": Kind(serious=True),
     "fault": Kind(serious=True),
     "warning": Kind(serious=True),
     "failsafe": Kind(serious=True),
@@ -23,5 +22,5 @@ KINDS = {
     "motors": Kind(afterwards=True),
     "battery": Kind(),
 }
-"""By name: services started again, faults, doubts about the models, failsafes, modes and phases, arming, contact with
+"""By name: faults, doubts about the models, failsafes, modes and phases, arming, contact with
 the ground, slack links, motors at a limit, charge."""

@@ -4,11 +4,10 @@ import importlib.resources
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 import lapwing.scenes
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.dynamics.config_error import ConfigError
 
 SHIPPED = Path(str(importlib.resources.files(lapwing.scenes)))  # folder of the scenes that ship
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
@@ -26,16 +25,7 @@ class Run(SceneTable):
     seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
     duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
     settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
-    restart: bool | Names = ()  # services that are started again where they are killed; true: all of the lock step
     speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
-
-    @field_validator("restart", mode="before")
-    @classmethod
-    def _all_or_names(cls, value: object) -> object:
-        names = isinstance(value, list | tuple) and all(isinstance(name, str) for name in value)
-        if not (names or isinstance(value, bool)):
-            raise ConfigError("", f"got {value!r}", "true, false or a list of services")
-        return value
 
 
 def title(scene: Path) -> str:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.provenance import RESTARTS, WAITED, attachments, failure, metadata
-from lapwing.cosim.diagram.topic_encoder import RecordBatch, later
+from lapwing.cosim.config.provenance import WAITED, attachments, failure, metadata
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.executors.deadlines import Lateness, entries, lateness
 from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
 from lapwing.cosim.executors.participant import Participant, Stopped
@@ -19,11 +19,8 @@ from lapwing.cosim.transport.bus_keys import (
     DEADLINES_KEY,
     DIVERGED_KEY,
     ENDED_KEY,
-    HANDED_KEY,
     LOGGED_KEY,
-    RESTARTED_KEY,
 )
-from lapwing.cosim.transport.input_journal import LogProgress
 from lapwing.cosim.transport.packets import unpack_batch
 
 TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
@@ -37,9 +34,6 @@ def run(process: Participant, given: Any) -> None:
     for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY):
         senders |= process.participants.senders(key, setup.services)
     pending = Pending(setup.services)
-    if process.restarts:
-        senders |= process.participants.senders(RESTARTED_KEY, [MONITOR])
-        process.bus.answer(f"{process.key_prefix}/{HANDED_KEY}/{process.name}", pending.progress)
     news = process.bus.receive(senders)
     about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
     progress = LogProgressPublisher(process.bus, process.key_prefix, process.name)
@@ -52,9 +46,6 @@ def run(process: Participant, given: Any) -> None:
                 head, name = key.split("/")[-2:]
                 if head == DEADLINES_KEY:
                     late[name] = lateness(payload.decode(errors="replace"))
-                    continue
-                if head == RESTARTED_KEY:
-                    writer.metadata[RESTARTS] = payload.decode(errors="replace")
                     continue
                 if head != BATCH_KEY:
                     if payload:  # an end without a reason is that of the run
@@ -109,17 +100,13 @@ class Pending:
             return
         start, stop, pages = unpack_batch(payload)
         self._check(name, start)
-        self._pages += later(pages, self._stop[name])  # who was started again may give some a second time
-        self._stop[name] = max(stop, self._stop[name])
+        self._pages += pages
+        self._stop[name] = stop
 
     def _check(self, name: str, tick: int) -> None:
         if tick > self._stop[name]:
             first = self._stop[name]
             raise LockStepError(f"recorder: the messages of {name} of the ticks {first} to {tick - 1} are lost")
-
-    def progress(self, name: str) -> bytes:
-        """How far a service is, as it asks after it was started again."""
-        return LogProgress(self._stop[name], self.written).pack()
 
     def complete(self) -> list[RecordBatch]:
         """The pages of the ticks that are complete now."""

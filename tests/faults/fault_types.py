@@ -14,7 +14,6 @@ FROZEN = 30.0  # [s] after which a launcher that was frozen is let go on
 
 
 FULL = "full disk"
-RESTARTED = ("restart", "restart frozen")  # of services that are to be started again: killed, and stopped
 INTERRUPT = "Ctrl-C"  # at any moment; where the seed is odd nothing is compiled yet
 
 
@@ -92,7 +91,5 @@ KINDS = {
     "pause": Kind(pause, _flies_on),
     "starve": Kind(starve, _flies_on),
     FULL: Kind(nothing, _no_space),
-    RESTARTED[0]: Kind(kill, _flies_on),
-    RESTARTED[1]: Kind(freeze, _flies_on),
     INTERRUPT: Kind(interrupt, _interrupted),
 }

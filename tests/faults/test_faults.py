@@ -17,8 +17,6 @@ FEW = {
     "a service waits for a frozen one that goes on": Trial(0, "hover", "pause", 0.0, 4.0),
     "frozen before it has joined": Trial(0, "hover", "freeze", 0.5, 0.2),
     "the launcher stays frozen": Trial(0, "hover", "freeze", 1.0, 4.0),
-    "the sensors are killed and started again": Trial(0, "delivery_mission", "restart", 0.7, 6.0),
-    "the plant is stopped and started again": Trial(0, "cooperative_load", "restart frozen", 0.99, 4.0),
     "interrupted while it starts": Trial(0, "gyrostat_attitude", "Ctrl-C", 1.0, 0.4),
     "interrupted while it compiles": Trial(1, "gyrostat_attitude", "Ctrl-C", 1.0, 3.0),
     "whoever watches is cut off for good, with much unsent": Trial(4042, "delivery_mission", "cut off", 0.99, 1.7),

@@ -1,6 +1,5 @@
 """One run with one fault, and what is wrong with its end."""
 
-import json
 import os
 import random
 import shutil
@@ -15,12 +14,11 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import lapwing.studies.simulate
 from lapwing.cosim.log import LogReader
 from lapwing.services.process_table import needed
 from lapwing.services.scene_resolver import load, resolve
 from tests.faults import campaign, leak_checks, network_partition
-from tests.faults.fault_types import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER, RESTARTED
+from tests.faults.fault_types import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER
 from tests.participants import participants
 
 SCENES = {  # overrides that make a flight of a few seconds
@@ -60,7 +58,7 @@ def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
     chance = random.Random(seed)
     every = [*KINDS, *network_partition.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
     kind = chance.choice(kinds or every)
-    launcher = kind not in (FULL, *RESTARTED, *campaign.KINDS) and chance.random() < 0.2
+    launcher = kind not in (FULL, *campaign.KINDS) and chance.random() < 0.2
     place = 1.0 if kind == INTERRUPT or launcher else chance.random()
     scenes = ["hover"] if kind in campaign.KINDS else sorted(SCENES)
     return Trial(seed, chance.choice(scenes), kind, place, chance.uniform(0.2, LATEST))
@@ -92,10 +90,7 @@ def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
 
 
 def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
-    overrides = list(SCENES[trial.scene])
-    if trial.kind in RESTARTED:
-        overrides.append(f"run.restart={json.dumps(list(undisturbed(trial.scene).services))}")
-    sets = [part for override in overrides for part in ("--set", override)]
+    sets = [part for override in SCENES[trial.scene] for part in ("--set", override)]
     command = [sys.executable, "-m", "lapwing", "run", trial.scene, *sets, "--speed", "1", "--log", str(log)]
     at_once = trial.kind == INTERRUPT
     cold = {"LAPWING_CACHE": str(folder / "cache")} if at_once and trial.seed % 2 else {}
@@ -113,15 +108,13 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
         children = participants(launcher.pid)
         everybody = {**children, LAUNCHER: launcher.pid}
         names = [name for name in sorted(children) if name in _needed(trial.scene)]  # others are there at first
-        if trial.kind in RESTARTED:
-            names = [name for name in names if name in undisturbed(trial.scene).services]
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
         late = launcher.poll() is not None
         taken = leak_checks.ports(leak_checks.of_trial(folder))
         if trial.kind == FULL:
             victim = "recorder"
             _fill(log.with_name("filler"))
-        elif trial.kind not in RESTARTED or victim != LAUNCHER:  # all that can be started again have ended
+        else:
             KINDS[trial.kind].strike(everybody[victim])
         struck = time.monotonic()
         if (victim, trial.kind) == (LAUNCHER, "freeze"):
@@ -140,8 +133,6 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
     code = launcher.returncode
     wrong += _wrong_end(trial, victim, code, text, late)
     wrong += _wrong_log(trial, victim, log, text, late)
-    if trial.kind in RESTARTED and not wrong:
-        wrong += _wrong_digest(trial.scene, log)
     if stuck := [path.name for path in folder.glob("lapwing-*")]:
         wrong.append(f"left behind: {', '.join(stuck)}")
     return Outcome(victim, code, text.strip(), seconds, wrong)
@@ -179,26 +170,6 @@ def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> l
 def _needed(scene: str) -> list[str]:
     """The processes of the run of a scene of a trial."""
     return needed(resolve(load(scene, SCENES[scene])))
-
-
-class Undisturbed(NamedTuple):
-    """A run to which nothing is done."""
-
-    services: tuple[str, ...]
-    digest: str
-
-
-@cache
-def undisturbed(scene: str) -> Undisturbed:
-    """The run of a scene of a trial."""
-    flight = lapwing.studies.simulate.fly(load(scene, SCENES[scene]))
-    return Undisturbed(tuple(flight.setup.services), flight.digest)
-
-
-def _wrong_digest(scene: str, log: Path) -> list[str]:
-    with LogReader(log) as read:
-        found, wanted = read.digest(), undisturbed(scene).digest
-    return [] if found == wanted else [f"digest {found}, expected {wanted}"]
 
 
 def _fill(path: Path) -> None:

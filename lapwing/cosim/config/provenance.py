@@ -13,7 +13,6 @@ SETUP_FILE = "setup.json"
 FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended before its time: why, and whether it diverged
 
 WAITED = "waited_for_disk"  # key of a run that the disk has held up: for how long
-RESTARTS = "restarts"  # key of a run some of whose services were started again (lapwing.cosim.processes.launcher)
 
 
 def metadata(setup: RunConfig, mode: str) -> dict[str, str]:

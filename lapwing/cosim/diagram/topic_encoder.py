@@ -5,7 +5,7 @@ message that fixes its texts and the lengths of its sequences. Where texts chang
 in the service's table of texts, and a page falls into parts of the same texts.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -47,16 +47,6 @@ class RecordBatch(NamedTuple):
     topic: Topic
     ticks: np.ndarray  # (n,) int64
     payloads: np.ndarray  # (n,) records of the message
-
-
-def later(pages: Iterable[RecordBatch], first: int) -> list[RecordBatch]:
-    """What pages hold of the ticks from `first` on."""
-    found = []
-    for page in pages:
-        k = int(np.searchsorted(page.ticks, first))
-        if k < len(page.ticks):
-            found.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]) if k else page)
-    return found
 
 
 def encode(

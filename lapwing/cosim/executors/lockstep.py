@@ -38,11 +38,6 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     givers = sources(process, graph)
     outlets = PacketSender(process, service, graph)
     backlog = LogBackpressure(process, recorder) if owns_time else None
-    linger = process.linger_with(recorder) if process.restarts else None
-    if backlog and process.restarts:
-        backlog.resume(0)  # nobody may be left behind by more than what is held for him
-    if process.journal:
-        _catch_up(process, graph, givers, outlets, backlog, recorder)
     process.join()
     outlets.look()
     if process.core is not None:
@@ -54,7 +49,7 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     allowed = setup.interval / process.speed if process.speed is not None else None
     at_once = ticks_at_once(setup, process.name) if process.bundles_ahead else 1
     deadlines = Deadlines()
-    started = time.perf_counter() - graph.tick * (allowed or 0.0)
+    started = time.perf_counter()
     try:
         while not graph.ended:
             if process.stopping:
@@ -82,8 +77,6 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
         if allowed is not None:
             process.say_last(DEADLINES_KEY, deadlines.told())
         _leave(process, outlets, graph.tick)
-    if linger:  # somebody may be started again who has missed the last bundles
-        linger()
 
 
 def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
@@ -91,30 +84,6 @@ def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
     outlets.end(stop)
     process.confirm()
     process.leave(lambda: outlets.say_end(stop))
-
-
-def _catch_up(
-    process: Participant,
-    graph: BlockDiagram,
-    givers: list[PacketReceiver],
-    outlets: PacketSender,
-    backlog: LogBackpressure | None,
-    recorder: str,
-) -> None:
-    """Step once more through what the service had been given before it was killed; errors as of `run_lockstep`."""
-    assert process.journal
-    for tick in process.journal.recall():
-        if tick == 0:
-            process.await_participant(recorder)
-            recorded = outlets.resume(recorder)
-            if backlog:
-                backlog.resume(recorded)
-        if process.stopping:
-            raise Stopped
-        for giver in givers:
-            giver.take(tick)
-        graph.advance(tick + 1)
-        outlets.repeat(tick)
 
 
 class _Rows:

@@ -49,10 +49,6 @@ class LogBackpressure:
         self._recorded: int | None = None
         self._ahead = max(LEAST, AHEAD // len(process.setup.vehicles))
 
-    def resume(self, recorded: int) -> None:
-        """All before this tick is recorded: hold the run from the first progress on that is not told any more."""
-        self._recorded = recorded
-
     def hold(self, tick: int) -> None:
         """Return when `tick` may be stepped.
 

@@ -23,7 +23,6 @@ from lapwing.cosim.transport.bus_keys import (
     SETUP_KEY,
     WAITING_KEY,
 )
-from lapwing.cosim.transport.input_journal import Journal
 from lapwing.cosim.transport.session_settings import LEASE_MS
 from lapwing.cosim.transport.tcp_timeout import limit_silence
 from lapwing.kernels import on_compile
@@ -33,7 +32,6 @@ POLL = 0.1  # [s] between two looks at whether to stop
 PATIENCE = 1.0  # [s] of waiting after which a service says what it waits for
 JOIN_TIMEOUT = 600.0  # [s] the others get to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] a participant gets to tell its set-up
-ASK_TIMEOUT = 1.0  # [s] one gets to tell what another has missed
 CONFIRMED = 60.0  # [s] the others get to confirm a last message; a launcher, which knows who starves, is stricter
 INTERRUPTED = 1.0  # [s] the same where this process was asked to end
 FOREIGN = 2.0  # [s] a program of somebody else's gets to leave after the end
@@ -63,8 +61,6 @@ class Participant:
         core: int | None = None,
         compares: Sequence[str] = (),
         realtime: bool = False,
-        restarts: bool = False,
-        journal: Journal | None = None,
     ):
         """A participant that is about to join.
 
@@ -78,10 +74,7 @@ class Participant:
             core: the core that all services of a sequential lock step share, None to leave it to the system.
             compares: those of the others who may have another set-up, which is to be found out at joining.
             realtime: whether it is to run in the scheduler's real-time class.
-            restarts: whether some service of the run is started again where it is killed.
-            journal: of this service, where it is one of them.
         """
-        self.restarts, self.journal = restarts, journal
         self.compares, self.realtime = compares, realtime
         self.name, self.setup, self.bus = name, setup, bus
         self.participants, self.key_prefix = participants, participants.key_prefix
@@ -103,8 +96,8 @@ class Participant:
     def bundles_ahead(self) -> bool:
         """Whether a service that runs ahead hands over several ticks at once
         (`lapwing.cosim.transport.packet_schedule`); a program of somebody
-        else's takes one at a time, as do services that may be started again, and those of several hosts."""
-        return not (self.restarts or self.participants.external or self.compares)
+        else's takes one at a time, as do those of several hosts."""
+        return not (self.participants.external or self.compares)
 
     def _stop(self, *_: object) -> None:
         self.stopping = True
@@ -221,26 +214,6 @@ class Participant:
         for key in (HEARD_KEY, LOGGED_KEY):
             self.bus.watch_alive(f"{self.key_prefix}/{key}/*", confirmed)
 
-    def ask(self, key: str, name: str, words: str) -> bytes | None:
-        """What the participant `name` answers to these words on a key of the lock step, None where it does not."""
-        return self.bus.ask(f"{self.key_prefix}/{key}/{name}", ASK_TIMEOUT, words, self.participants.mark(name))
-
-    def await_participant(self, name: str) -> None:
-        """Wait until another participant is there. Stopped, LockStepError: as of `join`."""
-        self._await([name], lambda: None)
-
-    def linger_with(self, name: str) -> Callable[[], None]:
-        """What waits until the participant `name` has left; to be called before it can have."""
-        left = threading.Event()
-        there = f"{self.key_prefix}/{ALIVE_KEY}/{name}"
-        self.bus.watch_alive(there, lambda _, alive: None if alive else left.set())
-
-        def wait() -> None:
-            while not (self.stopping or left.wait(BRIEF)):
-                pass
-
-        return wait
-
     def key(self, topic: Topic) -> str:
         """The Zenoh key of a topic in this run."""
         return topic.zenoh_key(self.setup.vehicle, self.key_prefix)
@@ -258,7 +231,7 @@ class Participant:
         """
         self._follow_others()
         packed = pack(self.setup)
-        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", lambda _: packed)
+        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", packed)
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
         self._await([other for other in self.others if other != self.name], meanwhile)
         limit_silence(LEASE_MS)

@@ -21,20 +21,12 @@ class Child(NamedTuple):
     said: IO[bytes]  # all that it has written to its standard output and error
 
 
-def start(name: str, inherited: tuple[int, ...] = (), said: IO[bytes] | None = None) -> Child:
-    """A child that takes part as `name`, once that has been written to its standard input.
-
-    Args:
-        name: of the participant.
-        inherited: open files that it is given.
-        said: what a former process of this name has written, to be gone on with.
-    """
-    said = said or tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
+def start(name: str) -> Child:
+    """Start a participant in a new interpreter; it waits for its specification on standard input."""
+    said = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
     # -P: nothing is imported from the working directory
     command = [sys.executable, "-P", "-m", PARTICIPANT, name]
-    process = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=said, stderr=said, start_new_session=True, pass_fds=inherited
-    )
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=said, stderr=said, start_new_session=True)
     return Child(process, said)
 
 

@@ -13,7 +13,6 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, dismiss, start
 from lapwing.cosim.processes.cpu_starvation import Starvation, waited
 from lapwing.cosim.processes.forked_process import Forked
-from lapwing.cosim.processes.restart_policy import Restarts
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, STALL, RunMonitor
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus import ZenohBus, mesh
@@ -33,7 +32,6 @@ def launch(
     observe: Callable[[RunMonitor], bool],
     beside: Iterable[str] = (),
     external: Mapping[str, str] = MappingProxyType({}),
-    restarts: Restarts | None = None,
     started: dict[str, Child] | None = None,
     services: Iterable[str] = (),
 ) -> dict[str, str]:
@@ -46,7 +44,6 @@ def launch(
         observe: called about five times a second; says whether to stop.
         beside: processes without which the run goes on.
         external: endpoints of those among `names` that somebody else starts; everybody connects to them.
-        restarts: who is started again where it is killed or stopped; None: nobody.
         started: processes that are there already (`started_early`); those that are not needed are ended.
         services: those that hand over messages.
 
@@ -57,7 +54,6 @@ def launch(
     beside = list(beside)
     everybody = [name for name in [*beside, *names] if name not in external]  # a ground station waits for its link
     children: dict[str, subprocess.Popen | Forked] = {}
-    restarts = restarts or Restarts({}, lambda line: None)
     errors: dict[str, IO[bytes]] = {}
     with private_endpoints([MONITOR, *everybody]) as own, ExitStack() as stack:
         stack.callback(_close, children, errors)
@@ -65,10 +61,7 @@ def launch(
 
         def begin(some: list[str]) -> None:
             for name in some:
-                if started and name in started and not restarts.journal(name):
-                    children[name], errors[name] = started.pop(name)
-                else:
-                    children[name], errors[name] = start(name, restarts.journal(name), errors.get(name))
+                children[name], errors[name] = started.pop(name) if started and name in started else start(name)
             for name in some:
                 stream = children[name].stdin
                 assert stream is not None
@@ -84,7 +77,7 @@ def launch(
                 begin(ready)
                 begin([name for name in everybody if name not in ready])
                 dismiss(started or {})
-                _follow(watch, children, set(names), set(external), observe, errors, restarts, begin)
+                _follow(watch, children, set(names), set(external), observe, errors)
                 _await({name: children[name] for name in beside if name in watch.confirmed}, SHUTDOWN_TIMEOUT)
             finally:
                 early = {
@@ -108,8 +101,6 @@ def _follow(
     external: set[str],
     observe: Callable[[RunMonitor], bool],
     errors: dict[str, IO[bytes]],
-    restarts: Restarts,
-    begin: Callable[[list[str]], None],
 ) -> None:
     ended_at = None
     stopped: dict[str, float] = {}  # since when
@@ -122,9 +113,6 @@ def _follow(
                 raise ValueError(f"{name}{_last_words(errors[name])}")
         for name, child in children.items():
             code = child.poll()
-            if code is not None and restarts.begin(name, code, watch):
-                begin([name])
-                continue
             if code is None or (code != 0 and (watch.diverged or _diverges(watch))):
                 continue
             if code != 0 or (not watch.ended and ended_at is None and not _grace(watch)):
@@ -135,11 +123,7 @@ def _follow(
         starvation.look({name: child.pid for name, child in children.items()}, time.monotonic() - watch.last_news)
         culprit = watch.frozen(needed, starvation.of) if needed <= watch.present else None
         if stopped and (culprit or time.monotonic() - min(stopped.values()) > STALL):
-            if not restarts.may(stopped):
-                raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")
-            for name in stopped:
-                restarts.stop(name, children[name])
-            continue
+            raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")
         if culprit:
             if not _let_go(everybody, needed):
                 raise RunFailed(culprit)
@@ -148,9 +132,6 @@ def _follow(
             watch.last_news, ended_at = time.monotonic(), None
         if observe(watch):
             return
-        late = {name for name, child in children.items() if child.poll() != 0}
-        if late < needed and late <= restarts.begun - watch.present:
-            break  # killed when it had handed over all: of the others nobody is left to join
         if watch.ended:
             ended_at = ended_at or time.monotonic()
             if time.monotonic() - ended_at > STALL:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from lapwing.cosim.access.publisher_ids import PublisherIds
-from lapwing.cosim.diagram.topic_encoder import RecordBatch, later
+from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.executors.log_backpressure import waits_for_disk
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
@@ -63,7 +63,6 @@ class RunMonitor:
         self.gone: set[str] = set()
         self.time_ns = 0  # up to which everybody who has spoken has come
         self._times: dict[str, int] = {}
-        self._stops: dict[str, int] = {}  # tick before which each has handed over all
         self.began: float | None = None  # [s] of the monotonic clock, at the first batch
         self.wall = 0.0  # [s] from the first batch to the newest
         self.ended = False  # somebody has handed over the last tick
@@ -127,9 +126,7 @@ class RunMonitor:
         self.wall = self.last_news - self.began
         self._times[name] = max(time_ns, self._times.get(name, 0))
         self.time_ns = min(self._times.values())
-        _, stop, pages = unpack_batch(payload)
-        pages = later(pages, self._stops.get(name, 0))  # who was started again may give some a second time
-        self._stops[name] = max(stop, self._stops.get(name, 0))
+        _, _, pages = unpack_batch(payload)
         for page in pages:
             self.newest[page.topic] = page.payloads[-1].tobytes()
         if self.listen:
@@ -147,12 +144,6 @@ class RunMonitor:
     def _declare(self, key: str) -> None:
         """Confirm last messages, to whoever waits for that before it leaves."""
         self._bus.declare_alive(f"{self._key_prefix}/{key}/{MONITOR}")
-
-    def forget(self, name: str) -> None:
-        """A participant is being started again: it is not there until it says so."""
-        self.present.discard(name)
-        self.gone.discard(name)
-        self.waiting.pop(name, None)
 
     def publish(self, key: str, time_ns: int, payload: bytes) -> None:
         """Say something to the run's viewers, on a key behind the run's prefix."""

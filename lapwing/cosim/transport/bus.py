@@ -171,35 +171,20 @@ class ZenohBus:
         handler = zenoh.handlers.Callback(handle, indirect=False)
         self._held.append(self._session.liveliness().declare_subscriber(key_expression, handler, history=True))
 
-    def answer(self, key: str, answer: Callable[[str], bytes]) -> None:
-        """Give `answer(words)` to everybody who asks for `key` with these words; it is called from another thread.
-
-        Where it raises a ValueError or a KeyError, the words are a stranger's, and are counted as refused.
-        """
+    def answer(self, key: str, payload: bytes) -> None:
+        """Reply with `payload` to every query for `key`."""
 
         def reply(query: zenoh.Query) -> None:
-            try:
-                found = answer(str(query.parameters))
-            except (KeyError, ValueError):
-                self.refused += 1
-                return
-            query.reply(key, found, attachment=pack(0, 0, self._mark))
+            query.reply(key, payload, attachment=pack(0, 0, self._mark))
 
         # In a thread of its own: on Zenoh's only one, a reply of several fragments would wait for itself
         handler: Any = zenoh.handlers.Callback(reply, indirect=True)
         self._held.append(self._session.declare_queryable(key, handler))
 
-    def ask(self, key: str, timeout: float, words: str = "", mark: bytes | None = None) -> bytes | None:
-        """What somebody answers to `key`, None after `timeout` seconds.
-
-        Args:
-            key: Zenoh key.
-            timeout: [s].
-            words: what is asked, without "=", ";" and "#".
-            mark: that the answer must carry, None for any.
-        """
-        for reply in self._session.get(f"{key}?{words}" if words else key, timeout=timeout):
-            if reply.ok is not None and mark in (None, _mark_of(reply.ok)):
+    def ask(self, key: str, timeout: float) -> bytes | None:
+        """Return the first reply to a query for `key`, None after `timeout` seconds."""
+        for reply in self._session.get(key, timeout=timeout):
+            if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         return None
 
@@ -254,12 +239,6 @@ def _message(sample: zenoh.Sample) -> Message | None:
     if not payload and sample.kind != zenoh.SampleKind.PUT:
         return None
     return time_ns, mark, payload
-
-
-def _mark_of(sample: zenoh.Sample) -> bytes:
-    """The mark of a message; none where it has no sound attachment."""
-    message = _message(sample)
-    return message[1] if message else b""
 
 
 def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:

@@ -13,8 +13,5 @@ COMPILING_KEY = "_compiling"  # somebody compiles kernels
 RECORDED_KEY = "_recorded"  # how far the log is; an empty message: it is complete
 HEARD_KEY = "_heard"  # a token: somebody has received the last message of every service that it takes messages from
 LOGGED_KEY = "_logged"  # a token: somebody has received the last message of the recorder
-RESTARTED_KEY = "_restarted"  # of whoever watches: that a service was killed and is started again
-HELD_KEY = "_held"  # the newest bundles of a service, to those who have missed some and ask
-HANDED_KEY = "_handed"  # how far the log is, to a service that asks
 
 ENCODER = "_messages"  # ending of the name of a process that makes the messages of a program of somebody else's

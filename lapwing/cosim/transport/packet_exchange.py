@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import due
-from lapwing.cosim.executors.log_backpressure import AHEAD
 from lapwing.cosim.executors.participant import PATIENCE, POLL, Participant
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.bus_keys import BATCH_KEY, HANDED_KEY, HELD_KEY, WAITING_KEY
-from lapwing.cosim.transport.input_journal import Held, LogProgress, Refilled
+from lapwing.cosim.transport.bus_keys import BATCH_KEY, WAITING_KEY
 from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, way, ways
 from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch
 from lapwing.cosim.transport.publish_watchdog import PublishWatchdog
@@ -18,7 +16,6 @@ from lapwing.kernels import uncompiled
 from lapwing.messages.topics import Topic
 
 BATCH = 0.1  # [s] of wall time between two batches
-HELD = 2 * AHEAD  # bundles: the plant is ahead of the log by AHEAD ticks, the trajectory of the plant by its lead
 PAGE = 1024  # ticks after which a batch is handed over in any case
 
 _due = uncompiled(due)
@@ -38,7 +35,6 @@ class PacketReceiver:
         self._bundles = StepPacketCodec(self._way.ports(process.setup.services[name].ports), self._way.ticks)
         ((key, mark),) = process.participants.senders(self._way.key, [name]).items()
         self._inbox = process.bus.inbox(key, mark)
-        self._refilled = Refilled(self._inbox.get, lambda words: process.ask(HELD_KEY, name, words))
         self._needs = {(period, delay) for _, period, delay in taken}
         self._newest = -1  # tick up to which bundles are taken
         self._known = 0  # tick before which nothing more is needed
@@ -58,7 +54,9 @@ class PacketReceiver:
             while not self._bundles.due(stamp):
                 stamp += self._way.every
             due_ns = stamp * self._process.setup.interval_ns
-            time_ns, payload = self._next(due_ns, needed)
+            time_ns, payload = self._inbox.get(POLL) or self._process.patient(
+                self._inbox.get, lambda: self._describe(needed)
+            )
             if not payload:
                 raise EndOfRun(self._name)
             if time_ns != due_ns:
@@ -70,20 +68,6 @@ class PacketReceiver:
             self._newest = stamp + self._way.every - 1
         self._known = min([(self._newest // period + 1) * period + delay for period, delay in self._needs])
         return self._known
-
-    def _next(self, due_ns: int, needed: int) -> tuple[int, bytes]:
-        """Time and payload of the next bundle, or of what comes in its place."""
-        process, get = self._process, self._inbox.get
-        if not process.restarts:
-            return get(POLL) or process.patient(get, lambda: self._describe(needed))
-
-        def refilled(timeout: float) -> tuple[int, bytes] | None:
-            return self._refilled.get(timeout, due_ns)
-
-        def wait() -> tuple[int, bytes]:
-            return refilled(POLL) or process.patient(refilled, lambda: self._describe(needed))
-
-        return process.journal.take(wait) if process.journal else wait()
 
     def _describe(self, tick: int) -> str:
         ports = [port for port, period, delay in self._taken if tick % period == 0]
@@ -116,7 +100,7 @@ class PacketSender:
     def __init__(self, process: Participant, service: Service, graph: BlockDiagram, hands_over: bool = True):
         """Declare the publishers; the bundles are somebody else's where it does not hand over."""
         key_prefix, bus = process.key_prefix, process.bus
-        self._process, self._service, self._graph = process, service, graph
+        self._process, self._graph = process, graph
         self._outlets = []
         if hands_over:
             for way in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
@@ -132,37 +116,6 @@ class PacketSender:
         self._interval_ns = process.setup.interval_ns
         bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
         self._delivery = PublishWatchdog(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
-        self._journal, self._held = process.journal, Held(HELD) if process.restarts else None
-        if self._held:
-            bus.answer(f"{key_prefix}/{HELD_KEY}/{service.name}", self._held.since)
-
-    def resume(self, recorder: str) -> int:
-        """Hand over to the recorder what it has not got; the tick before which all that it has is complete."""
-        there = LogProgress.unpack(
-            self._process.ask(HANDED_KEY, recorder, self._service.name) or LogProgress(0, 0).pack()
-        )
-        self._handed = there.handed
-        return there.recorded
-
-    def repeat(self, tick: int) -> None:
-        """Go once more through a tick whose bundle was published; only those who have missed it will hear of it."""
-        for outlet in self._outlets:
-            self._next(outlet)
-        if tick < self._handed:
-            self._service.messages.clear()
-        elif tick + 1 - self._handed >= PAGE:
-            self._hand_over(tick + 1)
-
-    def _next(self, outlet: _Outlet) -> bytes:
-        """The next bundle, empty if there is none; it is in the journal and held before it is published."""
-        first = outlet.given
-        bundle = outlet.bundles.pack(self._graph, first) if outlet.bundles.due(first) else b""
-        if self._journal:
-            self._journal.write(first, bundle)
-        if self._held and bundle:
-            self._held.add(bundle, first * self._interval_ns)
-        outlet.given += outlet.way.every
-        return bundle
 
     def look(self) -> None:
         """See which topics somebody listens to."""
@@ -173,8 +126,9 @@ class PacketSender:
         with self._delivery:
             for outlet in self._outlets:
                 while (given := outlet.given) + outlet.way.ticks <= stop:
-                    if bundle := self._next(outlet):
-                        outlet.put(bundle, given * self._interval_ns)
+                    if outlet.bundles.due(given):
+                        outlet.put(outlet.bundles.pack(self._graph, given), given * self._interval_ns)
+                    outlet.given += outlet.way.every
             if self._listened:
                 for page in self._graph.pages(first, stop, self._listened, keep=True):
                     for at, payload in zip(page.ticks, page.payloads, strict=True):
@@ -200,8 +154,6 @@ class PacketSender:
         self._delivery.close()
         self._hand_over(stop)
         self._process.tell_of_refused()
-        if self._held:
-            self._held.add(b"", stop * self._interval_ns)
         self.say_end(stop)
 
     def say_end(self, stop: int) -> None:

@@ -81,8 +81,8 @@ def exchanged(inputs):
 
     def process(name):
         return SimpleNamespace(
-            setup=setup, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test", journal=None,
-            tell_of_refused=lambda: None, key=str, restarts=False, bundles_ahead=True, abandoned="",
+            setup=setup, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test",
+            tell_of_refused=lambda: None, key=str, bundles_ahead=True, abandoned="",
         )  # fmt: skip
 
     giver, taker = Service("giver", [Counts(ports)], []), Service("taker", [Takes(inputs)], [])

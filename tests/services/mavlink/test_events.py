@@ -307,7 +307,7 @@ def test_all_that_the_autopilot_knows_has_its_number():
 
 
 def test_every_kind_that_can_be_told_of_a_flight_has_an_event():
-    not_of_the_link = {"restart", "warning", "phase", "slack"}  # of the run, the models, a scene's trajectory, a load
+    not_of_the_link = {"warning", "phase", "slack"}  # of the run, the models, a scene's trajectory, a load
     assert {d.kind for d in definitions().values()} == set(KINDS) - not_of_the_link
 
 
