@@ -8,7 +8,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, check_report, check_writable
+from lapwing.cli.output_paths import check_distinct, claim, claim_folder, claim_report
 from lapwing.cli.preflight import decided
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ def campaign(
         if cluster is not None and workers is not None:
             raise ValueError("--workers: a cluster has its own; expected without --cluster")
         check_distinct({"SCENE": scene, "--sweep": sweep, "--json": json, "--report": report})
-        check_writable(json)
-        check_report("--report", report)
+        claim(json)
+        claim_report("--report", report)
         screen, varied = console(), {}
         for text in vary or []:
             key, equals, drawn = (part.strip() for part in text.partition("="))
@@ -99,6 +99,7 @@ def campaign(
         first = _reference(screen, given)
         about = manifest(given, first)
         folder = begin(out or default_path(about), given, about)
+        claim_folder(folder.path, shared=shard is not None)
         part = _part(shard, len(folder.shards))
         _fly(screen, folder, first, _workers(screen, cluster, workers, folder), until_ci, part)
         if shard is not None and folder.missing():
@@ -126,7 +127,7 @@ def compare(
     from lapwing.studies.terminal import console
 
     with user_errors():
-        check_writable(json)
+        claim(json)
         found = study.compare(one, other)
         study.show(console(), found)
         if json:

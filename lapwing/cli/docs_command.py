@@ -8,7 +8,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
-from lapwing.cli.output_paths import check_writable
+from lapwing.cli.output_paths import claim
 
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="write it to a file instead of showing it")]
 docs = typer.Typer(help="Pages and editor schemas made from the code.", rich_markup_mode=None)
@@ -59,5 +59,5 @@ def _put(text: str, out: Path | None) -> None:
     if out is None:
         typer.echo(text, nl=False)
         return
-    check_writable(out)
+    claim(out)
     out.write_text(text, encoding="utf-8")

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 
 import typer
 
+from lapwing.cli.output_paths import release_claims
 from lapwing.cli.stdout_guard import OutputError
 
 USER_ERROR = 2
@@ -29,6 +30,8 @@ def user_errors() -> Iterator[None]:
         if error.closed:  # nobody reads any more: end as any program does that is sent SIGPIPE
             raise SystemExit(128 + signal.SIGPIPE) from None
         fail(str(error), 1)
+    finally:
+        release_claims()
 
 
 def fail(message: str, code: int, cause: BaseException | None = None) -> None:

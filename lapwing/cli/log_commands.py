@@ -7,7 +7,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import DIFFERENT, fail, user_errors
-from lapwing.cli.output_paths import check_distinct, check_writable
+from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_folder
 
 if TYPE_CHECKING:
     from lapwing.studies.logs.log_comparison import Comparison
@@ -76,7 +76,7 @@ def recover(
     with user_errors():
         target = out or log.with_name(f"{log.stem}_recovered.mcap")
         check_distinct({"FILE": log, "--out": target})
-        check_writable(target)
+        check_log(target)
         found = save(log, target)
         for line in found.damaged:
             typer.echo(f"left out: {line}")
@@ -99,7 +99,7 @@ def export(
         if not (parquet or csv or mat):
             raise ValueError("export: expected --parquet FOLDER, --csv FOLDER or --mat FILE")
         check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
-        check_writable(mat)
+        claim(mat)
         with LogReader(log) as read:
             found = tables.tables(read, topics.split(",") if topics is not None else None)
         for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
@@ -108,6 +108,7 @@ def export(
             try:
                 if folder is not mat:
                     folder.mkdir(exist_ok=True)
+                    claim_folder(folder)
                 for path in write(found, folder):
                     typer.echo(path)
             except OSError as fault:

@@ -22,7 +22,7 @@ from lapwing.cli.options import (
     Speed,
     parse_speed,
 )
-from lapwing.cli.output_paths import check_writable
+from lapwing.cli.output_paths import check_log
 
 if TYPE_CHECKING:
     from lapwing.services.mavlink.link_options import Options
@@ -97,7 +97,7 @@ def replay(
             raise ValueError("--record and --loop exclude each other: a log has an end")
         if record and record.resolve() == log.resolve():
             raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
-        check_writable(record)
+        check_log(record)
         check_published("--listen", listen, insecure)
         check_links(mavlink, mavlink_key)
         if foxglove is not None:

@@ -1,98 +1,58 @@
-"""Files that commands write: refused before the work, not after it."""
+"""Files that commands write: checked, reserved and locked before the work starts."""
 
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from lapwing.cosim.scene import Scene
+from lapwing.cosim.output_lock import OutputLock, is_locked
 
-
-def log_path(scene: "Scene", given: Path | None, exists: bool) -> Path:
-    """Where the log goes; a path that cannot be written is refused now, not after the flight."""
-    import time
-
-    stamp = time.strftime("%Y-%m-%dT%H-%M-%S")
-    path = given or Path("recordings") / f"{scene.name}_{stamp}.mcap"
-    if not exists:
-        with left_as_it_was(path):
-            check_writable(path)
-    return path
+_claims = ExitStack()  # locks of the running command's outputs
 
 
-@contextmanager
-def left_as_it_was(log: Path) -> Iterator[None]:
-    """Make the folder of recordings where it is missing; leave neither it nor an empty log when a run is refused."""
-    new_log, new_folder = not log.exists(), log.parent == Path("recordings") and not log.parent.exists()
-    refused = False
-    try:
-        if new_folder:
-            log.parent.mkdir()
-        yield
-    except OSError as error:
-        raise ValueError(f"{log}: cannot be written: {(error.strerror or str(error)).lower()}") from None
-    except ValueError:
-        refused = not _has_flown(log)
-        raise
-    finally:
-        if new_log and refused:
-            log.unlink(missing_ok=True)
-        if new_folder and log.parent.is_dir() and not any(log.parent.iterdir()):
-            log.parent.rmdir()
+def release_claims() -> None:
+    """Release the locks of all outputs and remove the outputs that are still empty."""
+    _claims.close()
 
 
-def _has_flown(log: Path) -> bool:
-    """Whether a log holds anything of a flight."""
-    from lapwing.cosim.log import LogReader
+def claim(path: Path | None) -> None:
+    """Create and lock a file until the command ends, so that no other process writes it.
 
-    try:
-        with LogReader(log) as read:
-            return bool(read.deterministic_topics())
-    except ValueError:
-        return False
-
-
-def written(path: Path) -> int | None:
-    """When a file was written last [ns]; None where it is not there."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return None
-
-
-def check_distinct(paths: dict[str, Path | None]) -> None:
-    """Refuse two options that name the same file."""
-    names: dict[Path, str] = {}
-    for option, path in paths.items():
-        if path is not None and (other := names.setdefault(path.resolve(), option)) != option:
-            raise ValueError(f"{option} {path}: is the same file as {other}; choose another")
-
-
-def check_writable(path: Path | None) -> None:
-    """Refuse a file that cannot be written, before anything is done for it."""
+    Raises:
+        ValueError: it cannot be written, or another process writes it.
+    """
     if path is None:
         return
-    if path.is_dir():
-        raise ValueError(f"{path}: is a folder; expected the name of a file to write")
-    there = path.exists()
-    try:
-        path.open("ab").close()
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
-    if not there:
-        path.unlink()
+    _create(path)
+    with _write_errors(path):
+        _claims.callback(OutputLock(path).close)
 
 
-def check_plot(path: Path | None) -> None:
-    """Refuse a picture that is no .png, .svg or .pdf, or cannot be written."""
+def claim_folder(path: Path, shared: bool = False) -> None:
+    """Lock an existing folder until the command ends.
+
+    Args:
+        path: the folder.
+        shared: allow other commands that claim it as shared.
+
+    Raises:
+        ValueError: another process writes it.
+    """
+    with _write_errors(path):
+        _claims.callback(OutputLock(path, shared).close)
+
+
+def claim_plot(path: Path | None) -> None:
+    """Claim a picture; raise ValueError unless it is a .png, .svg or .pdf file that can be written."""
     if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
-        raise ValueError(f"--plot {path}: expected a name that ends in .png, .svg or .pdf")
-    check_writable(path)
+        raise ValueError(f"--plot {path}: unknown format; use a name that ends in .png, .svg or .pdf")
+    claim(path)
 
 
-def check_report(option: str, path: Path | None) -> None:
-    """Refuse a report that cannot be written, or whose name has an ending that no report has."""
+def claim_report(option: str, path: Path | None) -> None:
+    """Claim a report; raise ValueError unless its format is known and it can be written."""
     if path is not None:
         from lapwing.studies.report import check_format
 
@@ -100,4 +60,105 @@ def check_report(option: str, path: Path | None) -> None:
             check_format(path)
         except ValueError as error:
             raise ValueError(f"{option} {error}") from None
-    check_writable(path)
+    claim(path)
+
+
+def check_log(path: Path | None) -> None:
+    """Raise ValueError if a log cannot be written or another process writes it; its writer locks it."""
+    if path is None:
+        return
+    _create(path)
+    with _write_errors(path):
+        OutputLock(path).close()
+
+
+def reserve_log(scene: str) -> Path:
+    """Create an empty log in `recordings` with a name that no other run has, and return its path."""
+    folder = Path("recordings")
+    if not folder.exists():
+        with _write_errors(folder):
+            folder.mkdir(exist_ok=True)
+        _claims.callback(_remove_empty, folder)
+    stem = f"{scene}_{time.strftime('%Y-%m-%dT%H-%M-%S')}"
+    for number in count(1):
+        path = folder / f"{stem}{f'_{number}' if number > 1 else ''}.mcap"
+        try:
+            with _write_errors(path):
+                path.open("xb").close()
+        except FileExistsError:
+            continue
+        _claims.callback(_remove_empty, path)
+        return path
+    raise AssertionError
+
+
+@contextmanager
+def remove_on_failure(log: Path) -> Iterator[None]:
+    """Remove a log that was missing or empty before, if the run fails before its first message."""
+    is_new = not log.exists() or log.stat().st_size == 0
+    try:
+        yield
+    except OSError as error:
+        raise ValueError(f"{log}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+    except ValueError:
+        if is_new and not is_locked(log) and not _has_messages(log):
+            log.unlink(missing_ok=True)
+        raise
+
+
+def modification_time(path: Path) -> int | None:
+    """Return the time of the last write [ns], or None if there is no such file."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return None
+
+
+def check_distinct(paths: dict[str, Path | None]) -> None:
+    """Raise ValueError if two options name the same file."""
+    names: dict[Path, str] = {}
+    for option, path in paths.items():
+        if path is not None and (other := names.setdefault(path.resolve(), option)) != option:
+            raise ValueError(f"{option} {path}: is the same file as {other}; choose another")
+
+
+def _create(path: Path) -> None:
+    """Create a file unless it exists; the end of the command removes it if it is still empty."""
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder; expected the name of a file to write")
+    is_new = not path.exists()
+    with _write_errors(path):
+        path.open("ab").close()
+    if is_new:
+        _claims.callback(partial(_remove_empty, path))
+
+
+def _remove_empty(path: Path) -> None:
+    """Remove a file or folder that is empty and that no other process writes."""
+    if path.is_dir():
+        if not any(path.iterdir()):
+            path.rmdir()
+    elif path.exists() and path.stat().st_size == 0 and not is_locked(path):
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _write_errors(path: Path) -> Iterator[None]:
+    """Turn an OSError into a ValueError that names the path."""
+    try:
+        yield
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+
+
+def _has_messages(log: Path) -> bool:
+    """Return True if a log has deterministic messages."""
+    from lapwing.cosim.log import LogReader
+
+    try:
+        with LogReader(log) as reader:
+            return bool(reader.deterministic_topics())
+    except ValueError:
+        return False

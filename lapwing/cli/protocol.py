@@ -8,7 +8,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_writable
+from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import decided
 
 
@@ -26,8 +26,8 @@ def protocol(
     from lapwing.services.scene_resolver import resolve
 
     with user_errors():
-        check_writable(json)
-        check_writable(plot)
+        claim(json)
+        claim(plot)
         setup = resolve(decided(scene, set_ or []))
         found = layout(setup)
         if plot:

@@ -29,7 +29,15 @@ from lapwing.cli.options import (
     Speed,
     parse_speed,
 )
-from lapwing.cli.output_paths import check_distinct, check_report, check_writable, left_as_it_was, log_path, written
+from lapwing.cli.output_paths import (
+    check_distinct,
+    check_log,
+    claim,
+    claim_report,
+    modification_time,
+    remove_on_failure,
+    reserve_log,
+)
 from lapwing.cli.preflight import decided, warn_of_gains
 from lapwing.cosim.processes.child_process import Child, started_early
 
@@ -139,10 +147,13 @@ def run(
         speed = speed or (str(loaded[Run].speed) if loaded[Run].speed else "1" if paced else None)
         if table is not None:
             check_complete(table, [*needed(setup, elsewhere(table)), MONITOR])
-        check_distinct({"SCENE": scene, "--log": log, "--json": json, "--report": report})
-        path = log_path(loaded, log, exists=table is not None)
-        check_writable(json)
-        check_report("--report", report)
+        path = log or reserve_log(loaded.name)
+        page = report or path.with_suffix(".html")
+        check_distinct({"SCENE": scene, "--log": path, "--json": json, "--report": page})
+        if table is None:
+            check_log(path)
+        claim_report("--report", page)
+        claim(json)
         given = ProcessSpec(
             name=MONITOR,
             setup=setup,
@@ -166,13 +177,13 @@ def run(
         if realtime and (reason := why_not()):
             given = given._replace(realtime=False)
             typer.echo(f"lapwing: --realtime: no real-time class: {reason}", err=True)
-        before = written(path)
+        before = modification_time(path)
 
         def conclude(elapsed: "Elapsed | None") -> "list[Flight]":
             from lapwing.cli import run_summary  # not before the flight, whose start would wait for it
             from lapwing.runs.log_events import add_events
 
-            mine = elapsed is not None or written(path) != before
+            mine = elapsed is not None or modification_time(path) != before
             flights = run_summary.fleet(path) if mine else []
             for flown in flights:
                 if flown.digest and not flown.has("events"):  # the log has its end
@@ -230,7 +241,7 @@ def _fly(given: "ProcessSpec", log: Path, view: bool, early: dict[str, Child]) -
     from lapwing.studies.terminal import console
 
     setup = given.setup
-    with left_as_it_was(log), Display(console(), setup.duration) as display:
+    with remove_on_failure(log), Display(console(), setup.duration) as display:
         if given.mode == "single":
             from lapwing.runs.single_process_run import fly_single
 

@@ -113,13 +113,13 @@ def report(
     ] = None,
 ) -> None:
     """Write a report of a log, or of two laid over each other: a page for a browser, or plots on paper."""
-    from lapwing.cli.output_paths import check_distinct, check_report
+    from lapwing.cli.output_paths import check_distinct, claim_report
     from lapwing.flight import Flight
     from lapwing.studies.flight_data import SHOWN
 
     with user_errors():
         check_distinct({"FILE": log, "the second FILE": other, "--out": out})
-        check_report("--out", out)
+        claim_report("--out", out or log.with_suffix(".html"))
         beside = Flight.read(other, vehicle, SHOWN) if other else None
         typer.echo(Flight.read(log, vehicle, SHOWN).report(out, beside))
 

@@ -12,7 +12,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, check_plot, check_writable
+from lapwing.cli.output_paths import check_distinct, claim, claim_plot
 from lapwing.studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def _study(
         module: has `show(console, found)`, `write_json(path, found)` and `plot(path, found)`.
     """
     check_distinct({name: subject, "--json": json, "--plot": plot})
-    check_writable(json)
-    check_plot(plot)
+    claim(json)
+    claim_plot(plot)
     found = find()
     module.show(console, found)
     if json:
@@ -143,8 +143,8 @@ def stability(
         check_distinct({"--json": json, "--report": report})
         if report and report.suffix != ".html":
             raise ValueError(f"--report {report}: expected a name that ends in .html")
-        check_writable(json)
-        check_writable(report)
+        claim(json)
+        claim(report)
         stands = stability_command.run(case, long, sweep, json, report)
     if not stands:
         raise SystemExit(1)
@@ -187,7 +187,7 @@ def tune(
         for option, path, ending in (("--out", out, ".toml"), ("--report", report, ".html")):
             if path and path.suffix != ending:
                 raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
-            check_writable(path)
+            claim(path)
         wanted, screen = Bandwidths(altitude, yaw, attitude, position), console()
         with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=gain_refinement.CANDIDATES)

@@ -202,7 +202,7 @@ FULL = Path("/dev/full")
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
-@pytest.mark.parametrize("arguments", [["scenes"], ["--help"], ["check", HOVER]])
+@pytest.mark.parametrize("arguments", [["scenes"], ["--help"], ["check", "hover"]])
 def test_output_to_a_full_device_is_one_line_and_no_traceback(arguments):
     with FULL.open("w") as full:
         command = [sys.executable, "-m", "lapwing", *arguments]
@@ -212,9 +212,9 @@ def test_output_to_a_full_device_is_one_line_and_no_traceback(arguments):
 
 
 def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
-    lapwing.fly(HOVER, {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
+    lapwing.fly("hover", {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
     log = tmp_path / "log.mcap"
-    command = [sys.executable, "-m", "lapwing", "run", HOVER, "--set", "run.duration=1", "--mode", "single"]
+    command = [sys.executable, "-m", "lapwing", "run", "hover", "--set", "run.duration=1", "--mode", "single"]
     with FULL.open("w") as full:
         result = subprocess.run(
             [*command, "--log", str(log)], stdout=full, stderr=subprocess.PIPE, text=True, check=False
@@ -227,9 +227,9 @@ def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_flight_in_processes_whose_standard_files_are_closed_is_flown(tmp_path, closed):
-    lapwing.fly(HOVER, {"run.duration": 0.1})
+    lapwing.fly("hover", {"run.duration": 0.1})
     log, report = tmp_path / "log.mcap", tmp_path / "report.html"
-    words = f"-m lapwing run {HOVER} --set run.duration=1 --log {log} --report {report} {closed}"
+    words = f"-m lapwing run hover --set run.duration=1 --log {log} --report {report} {closed}"
     result = subprocess.run(f"{sys.executable} {words}", shell=True, capture_output=True, text=True, check=False)
     assert (result.returncode, "Traceback" in result.stderr) == (0, False)
     assert log.exists()

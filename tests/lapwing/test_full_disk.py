@@ -11,7 +11,7 @@ from lapwing.cosim.log import LogReader
 
 pytestmark = pytest.mark.long
 
-SCENE = Path.cwd() / "scenes" / "hover.toml"
+SCENE = Path.cwd() / "lapwing/scenes/hover.toml"
 RUN = """
 import os, resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -15,6 +15,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from lapwing.cosim.log.chunk import WrittenTopic, arrange, rows_of
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC, Container
+from lapwing.cosim.output_lock import lock_descriptor
 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, where the summary begins, where its offsets do, checksum
 _DATA_END = 13  # [bytes] of the record before the summary
@@ -38,6 +39,7 @@ def append(path: Path, topic: str, message: Any, messages: Sequence[tuple[int, b
         with path.open("rb") as file:
             summary = make_reader(file).get_summary()
         with path.open("r+b", buffering=0) as file:
+            lock_descriptor(file.fileno(), path)
             _append(path, file, summary, topic, message, messages)
     except (McapError, struct.error) as fault:
         raise ValueError(f"{path}: has no end to which a topic could be added: {fault}") from None

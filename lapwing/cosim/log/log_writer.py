@@ -11,6 +11,7 @@ from mcap.records import Channel, Schema
 
 from lapwing.cosim.log.chunk import Rows, WrittenTopic, add_to_digest, arrange, rows, rows_of
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC, METADATA, METADATA_END, Container
+from lapwing.cosim.output_lock import open_locked
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
 
@@ -37,7 +38,8 @@ class LogWriter:
         waiting: called twice a second while a chunk has to wait for the one before to be written.
 
     Raises:
-        ValueError: the file cannot be written (also from `write`, `write_page`, `flush` and `close`).
+        ValueError: another process is writing the file, or it cannot be written (then also from `write`,
+            `write_page`, `flush` and `close`).
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class LogWriter:
         self._size = 0
         self._pending: Future | None = None
         try:
-            self._file = open(self.path, "wb", buffering=0)  # noqa: SIM115 (closed in close)
+            self._file = open_locked(self.path)
             self._container = Container(self._file)
             self._container.add_metadata(METADATA, self.metadata)
             for name, data in attachments.items():

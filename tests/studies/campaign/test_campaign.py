@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import lapwing.studies.campaign.folder
-import lapwing.studies.campaign.run_table
 from lapwing.cli.main import app
+from lapwing.studies.campaign import folder as folder_module
 from lapwing.studies.campaign import local, run_table
 from lapwing.studies.campaign.campaign_comparison import compare
 from lapwing.studies.campaign.distributions import choice, normal, uniform
@@ -110,7 +109,7 @@ def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_
 
 
 def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
-    make = lapwing.studies.campaign.folder._make
+    make = folder_module._make
 
     def twice(path, about):
         make(path, about | other)  # another machine is a little faster
@@ -146,7 +145,7 @@ def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
 
 
 def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkeypatch):
-    write = lapwing.studies.campaign.run_table.write_csv
+    write = run_table.write_csv
 
     def full(path, *arguments):
         if "00002" in path.name:

@@ -1,0 +1,84 @@
+"""Advisory locks (flock) that keep two processes from writing the same log, file or folder."""
+
+import fcntl
+import os
+import stat
+from errno import EWOULDBLOCK
+from io import FileIO
+from pathlib import Path
+
+
+class OutputLock:
+    """Lock of a file or folder until `close`, or until the process ends.
+
+    Args:
+        path: existing file or folder.
+        shared: allow other shared locks on it.
+
+    Raises:
+        ValueError: another process holds a lock on it.
+        OSError: it cannot be opened for writing.
+    """
+
+    def __init__(self, path: Path, shared: bool = False) -> None:
+        self.path = path
+        flags = os.O_RDONLY if path.is_dir() else os.O_WRONLY | os.O_NONBLOCK
+        self._descriptor = os.open(path, flags)
+        try:
+            lock_descriptor(self._descriptor, path, shared)
+        except ValueError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Release the lock."""
+        os.close(self._descriptor)
+
+
+def lock_descriptor(descriptor: int, path: Path, shared: bool = False) -> None:
+    """Lock an open file or folder until it is closed; do nothing for devices and on file systems without locks.
+
+    Raises:
+        ValueError: another process holds a lock on it.
+    """
+    mode = os.fstat(descriptor).st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        return
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno == EWOULDBLOCK:
+            raise ValueError(f"{path}: another process is writing it; choose another name, or wait for it") from None
+
+
+def is_locked(path: Path) -> bool:
+    """Return True if another process is writing the file."""
+    try:
+        OutputLock(path).close()
+    except ValueError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def open_locked(path: Path) -> FileIO:
+    """Create or empty a file and open it for writing, locked and without a buffer.
+
+    Raises:
+        ValueError: another process is writing it.
+        OSError: it cannot be written.
+    """
+    file = open(path, "r+b", buffering=0, opener=_open_or_create)  # noqa: SIM115 (returned)
+    try:
+        lock_descriptor(file.fileno(), path)
+        if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            file.truncate()
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _open_or_create(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_CREAT, 0o666)
