@@ -65,11 +65,15 @@ class LogWriter:
         self._pending: Future | None = None
         try:
             self._file = open_locked(self.path)
+        except OSError as fault:
+            raise self._error(fault) from None
+        try:
             self._container = Container(self._file)
             self._container.add_metadata(METADATA, self.metadata)
             for name, data in attachments.items():
                 self._container.add_attachment(name, data)
         except OSError as fault:
+            self._file.close()
             raise self._error(fault) from None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="log")
         self._due = time.monotonic()  # the first message makes a chunk of its own: even a short log is readable
