@@ -24,7 +24,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.executors.lockstep import pin, run_lockstep
 from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus, mesh
-from lapwing.kernels.row_packing import to_row
+from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common import ports
 from lapwing.services.common.ports import MotorCommand, Reference, TrueState
 from lapwing.services.plant.encoders import PlantWiring
@@ -52,7 +52,7 @@ class Constant:
 
     def __init__(self, name, cycles):
         self.name, self.inputs, self.outputs = name, *PARTS[name]
-        self.rows = [(port.name, to_row(port.like)) for port in self.outputs]
+        self.rows = [(port.name, pack_row(port.like)) for port in self.outputs]
         self.cycles, self.stamps = cycles, []
 
     def bind(self, graph):

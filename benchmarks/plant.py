@@ -24,7 +24,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.dynamics.vehicles.newton_euler import angular_acceleration
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 HERE = Path(__file__).parent
 DRONE = load_airframe(HERE.parent / "lapwing/scenes/vehicles/delivery_drone.toml")
@@ -83,7 +83,7 @@ def measure(tables, height, command, n):
     return taken(lambda: exchanges(RK4, p, KEY, state, command, H, n, STEPS // n)).min()
 
 
-@leaf
+@always_inline
 def bare_rate(drive, t, m):
     p, v = drive
     layout, speed = p.layout, m.rotor_speed

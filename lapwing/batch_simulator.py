@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._types import Motion
-from lapwing.kernels.row_packing import to_row, width
+from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.motor import RPM
@@ -84,19 +84,19 @@ class Batch:
         first = _plant(load(base, drawn.given(0)))
         self._core, self.n, self.interval = first.core, n, first.core.interval
         self._like = simd_batch.member(first.core.vehicle, first.start.vehicle)
-        self._motion = width(self._like.motion)
+        self._motion = row_width(self._like.motion)
         self._blocks = simd_batch.blocks(n, self._like)
         members = len(self._blocks) * simd_batch.WIDTH  # those beyond n fill the last block
         name = base[Vehicle].name
         self._keys = np.array([noise_key(drawn.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
         self._ticks = np.zeros(members, np.int64)
-        self._fresh = np.empty((members, width(self._like)))  # rows of the members before their first step
-        self._fresh[:] = to_row(self._like)
+        self._fresh = np.empty((members, row_width(self._like)))  # rows of the members before their first step
+        self._fresh[:] = pack_row(self._like)
         for k in range(1, n) if drawn.keys else ():
             plant = _plant(load(base, drawn.given(k)))
             if _kinds(plant.core) != _kinds(first.core):
                 raise ValueError(f"member {k}: has other effects or another solver than member 0")
-            self._fresh[k] = to_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
+            self._fresh[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
         self._place(np.arange(members))
         self._pool = ThreadPoolExecutor(cpu_count())
         self._scene = base

@@ -11,7 +11,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.scene import KeyOrigin, Overrides, Scene, SceneError
-from lapwing.kernels.row_packing import to_row, width
+from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, ControllerInput
 from lapwing.services.common import ports
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
@@ -51,10 +51,10 @@ def _sound(setpoint: Reference) -> Reference:
     """A setpoint with numbers where they are expected; ValueError for anything else."""
     try:
         found = Reference(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
-        row = to_row(found)
+        row = pack_row(found)
     except (TypeError, ValueError):
         row = np.empty(0)
-    if not isinstance(setpoint, Reference) or len(row) != width(Reference()) or not np.isfinite(row).all():
+    if not isinstance(setpoint, Reference) or len(row) != row_width(Reference()) or not np.isfinite(row).all():
         raise ValueError(f"setpoint: expected a Reference of finite numbers, got {setpoint!r}")
     return found
 

@@ -8,9 +8,9 @@ import helics
 
 from benchmarks.federations import PATIENCE, pin
 from benchmarks.lockstep import PARTS
-from lapwing.kernels.row_packing import width
+from lapwing.kernels.row_packing import row_width
 
-WIDTH = {port.name: 8 * width(port.like) for _, outputs in PARTS.values() for port in outputs}  # [bytes]
+WIDTH = {port.name: 8 * row_width(port.like) for _, outputs in PARTS.values() for port in outputs}  # [bytes]
 OFFSET = {"plant": 0.0, "sensors": 0.25, "trajectory": 0.25, "autopilot": 0.5}  # [s] of its step within one of 1 s
 
 

@@ -9,7 +9,7 @@ import mosaik_api_v3
 
 from benchmarks.federations import PATIENCE, pin
 from benchmarks.lockstep import PARTS
-from lapwing.kernels.row_packing import to_row
+from lapwing.kernels.row_packing import pack_row
 
 MODULE = "benchmarks.federations.mosaik_federation"
 LATER = ("plant", "trajectory")  # take what was given at a tick before
@@ -24,7 +24,7 @@ class Simulator(mosaik_api_v3.Simulator):
         attributes = [*(i.port for i in self.inputs), *(p.name for p in self.outputs)]
         model = {"public": True, "params": [], "attrs": attributes}
         super().__init__({"type": "time-based", "models": {"Service": model}})
-        self.values = {p.name: to_row(p.like).tolist() for p in self.outputs}
+        self.values = {p.name: pack_row(p.like).tolist() for p in self.outputs}
         self.stamps = []
 
     def init(self, sid, time_resolution=1.0, **sim_params):
@@ -54,7 +54,7 @@ def scenario(cycles, port):
         for name, (inputs, _) in PARTS.items():
             for i in inputs:
                 giver, given = source[i.port]
-                first = {"time_shifted": True, "initial_data": {i.port: to_row(given.like).tolist()}}
+                first = {"time_shifted": True, "initial_data": {i.port: pack_row(given.like).tolist()}}
                 world.connect(entities[giver], entities[name], i.port, **(first if name in LATER else {}))
         world.run(until=cycles, print_progress=False)
 

@@ -55,7 +55,7 @@ from types import SimpleNamespace
 
 import lapwing
 import pytest
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 
 
 @pytest.fixture(autouse=True)
@@ -74,7 +74,7 @@ def test_the_force_is_against_the_airspeed():
     s = SimpleNamespace(
         motion=SimpleNamespace(velocity_world=(1.0, 0.0, 0.0)), air=SimpleNamespace(wind_world=(0.0, 2.0, 0.0))
     )
-    force_world, torque_body = uncompiled({name})({cls}(0.5), (), s, None)
+    force_world, torque_body = python_function({name})({cls}(0.5), (), s, None)
     assert force_world == (-0.5, 1.0, 0.0)
     assert torque_body == (0.0, 0.0, 0.0)
 

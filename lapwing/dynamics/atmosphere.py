@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 GRAVITY = 9.80665  # [m/s^2] g_0
 EARTH_RADIUS = 6_356_766.0  # [m] by which geometric altitude becomes geopotential
@@ -27,18 +27,18 @@ class Atmosphere(NamedTuple):
     temperature_offset: Annotated[float, Ge(-60), Le(60)] = 0.0  # [K] from the standard's 15 degC at sea level
 
 
-@leaf
+@always_inline
 def _geopotential(altitude):
     return EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude)
 
 
-@leaf
+@always_inline
 def temperature(a, altitude):
     """[K] at an altitude [m] above the sea."""
     return SEA_LEVEL_TEMPERATURE + a.temperature_offset - LAPSE_RATE * min(_geopotential(altitude), TROPOPAUSE)
 
 
-@leaf
+@always_inline
 def pressure(a, altitude):
     """[Pa] at an altitude [m] above the sea."""
     height, ground = _geopotential(altitude), SEA_LEVEL_TEMPERATURE + a.temperature_offset
@@ -49,13 +49,13 @@ def pressure(a, altitude):
     return found
 
 
-@leaf
+@always_inline
 def density(a, altitude):
     """[kg/m^3] at an altitude [m] above the sea."""
     return pressure(a, altitude) / (GAS_CONSTANT * temperature(a, altitude))
 
 
-@leaf
+@always_inline
 def density_slope(a, altitude):
     """Change of density with altitude [kg/m^4]."""
     lapse = LAPSE_RATE if _geopotential(altitude) < TROPOPAUSE else 0.0
@@ -63,7 +63,7 @@ def density_slope(a, altitude):
     return density(a, altitude) * (lapse - GRAVITY / GAS_CONSTANT) * weaker * weaker / temperature(a, altitude)
 
 
-@leaf
+@always_inline
 def pressure_altitude(a, pressure_now):
     """Altitude [m] above the sea at which `pressure` gives this pressure [Pa]."""
     ground = SEA_LEVEL_TEMPERATURE + a.temperature_offset

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 SEMI_MAJOR = 6378137.0  # [m]
 FLATTENING = 1.0 / 298.257223563
@@ -25,7 +25,7 @@ class Home(NamedTuple):
     height: Annotated[float, Gt(-500.0), Le(9000.0)] = 280.0  # [m], over the ellipsoid; also taken as the altitude
 
 
-@leaf
+@always_inline
 def geodetic_to_ecef(latitude_deg, longitude_deg, height):
     """Earth-centred, Earth-fixed coordinates [m] of a point (theory.md, eq. (3.4))."""
     latitude, longitude = math.radians(latitude_deg), math.radians(longitude_deg)
@@ -38,7 +38,7 @@ def geodetic_to_ecef(latitude_deg, longitude_deg, height):
     )
 
 
-@leaf
+@always_inline
 def ecef_to_geodetic(r):
     """Latitude [deg], longitude [deg], height [m] of a point near the Earth's surface (theory.md, eq. (3.5))."""
     rho = math.hypot(r[0], r[1])
@@ -55,7 +55,7 @@ def ecef_to_geodetic(r):
     return math.degrees(latitude), math.degrees(math.atan2(r[1], r[0])), height
 
 
-@leaf
+@always_inline
 def _axes(home):
     latitude, longitude = math.radians(home.latitude_deg), math.radians(home.longitude_deg)
     return math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)

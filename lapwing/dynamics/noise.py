@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 Key = tuple[int, int]  # two words of 32 bits
 
@@ -38,7 +38,7 @@ def stream_key(seed: int, vehicle: str, stream: str) -> Key:
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:], "little")
 
 
-@leaf
+@always_inline
 def philox(c0, c1, c2, c3, k0, k1):
     """Philox 4x32-10: four random words of 32 bits from a counter of four and a key of two (all as uint64)."""
     for _ in range(10):
@@ -50,14 +50,14 @@ def philox(c0, c1, c2, c3, k0, k1):
     return c0, c1, c2, c3
 
 
-@leaf
+@always_inline
 def words(key, tick, lane):
     """The four random words of 32 bits at (tick, lane), as uint64."""
     t = np.uint64(tick)
     return philox(t & _MASK, t >> _SHIFT, np.uint64(lane), np.uint64(0), np.uint64(key[0]), np.uint64(key[1]))
 
 
-@leaf
+@always_inline
 def _unit(word):
     """Centre of the word's cell in (0, 1): symmetric about 1/2, never 0 or 1."""
     return (np.float64(word) + 0.5) * _TWO_TO_MINUS_32
@@ -76,7 +76,7 @@ def uniform(key, tick, lane):
     return _unit(words(key, tick, lane)[0])
 
 
-@leaf
+@always_inline
 def _log(x):
     """Natural logarithm of a positive normal number: exponent and mantissa, then 2 artanh((m - 1)/(m + 1))."""
     m, e = math.frexp(x)  # m in [1/2, 1)
@@ -91,7 +91,7 @@ def _log(x):
     return e * _LN_2 + 2.0 * s * series
 
 
-@leaf
+@always_inline
 def _polynomial(x, c):
     value = c[7]
     for i in (6, 5, 4, 3, 2, 1, 0):

@@ -21,9 +21,9 @@ from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
 from lapwing.dynamics.vehicles import multirotor_stepper
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
-from lapwing.kernels import kernel, leaf, vectorised
-from lapwing.kernels.codegen import define, each_index, implements
-from lapwing.kernels.row_packing import construction, leaves, to_row, width
+from lapwing.kernels import always_inline, kernel, vectorise_loops
+from lapwing.kernels.codegen import compile_source, map_index, overload_for
+from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
 
 WIDTH = 16  # members in a block
 
@@ -47,15 +47,15 @@ def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
 
 def blocks(members: int, like: Member) -> np.ndarray:
     """Memory for so many members, shape (blocks, columns, WIDTH)."""
-    return np.zeros((-(-members // WIDTH), width(like), WIDTH))
+    return np.zeros((-(-members // WIDTH), row_width(like), WIDTH))
 
 
 def put(memory: np.ndarray, index: int, value: Member) -> None:
     """Give a member its numbers."""
-    memory[index // WIDTH, :, index % WIDTH] = to_row(value)
+    memory[index // WIDTH, :, index % WIDTH] = pack_row(value)
 
 
-@vectorised
+@vectorise_loops
 def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count):
     """Advance the members of the blocks `first` to before `last` by `count` exchange intervals.
 
@@ -93,25 +93,25 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
                 _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
 
 
-@leaf
+@always_inline
 def _parts(like, memory, at, h):
     return multirotor_stepper.parts(take(like, memory, at).parameters.layout, h)
 
 
-@leaf
+@always_inline
 def _command(commands, member, i):
     return commands[member, i]
 
 
-@leaf
+@always_inline
 def _begin(like, memory, at, key, tick, commands, member, interval):
     m = take(like, memory, at)
-    asked = each_index(_command, m.voltage, commands, member)
+    asked = map_index(_command, m.voltage, commands, member)
     drive = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), asked, interval)
     give((m.motion, drive.memory, drive.body, drive.voltage, tick * interval), memory, at)
 
 
-@leaf
+@always_inline
 def _all_asleep(like, memory, base, h):
     """Can no member of a block be reached by an effect that sleeps?"""
     awake = 0
@@ -122,7 +122,7 @@ def _all_asleep(like, memory, base, h):
     return awake == 0
 
 
-@leaf
+@always_inline
 def _airborne_step(method, like, memory, at, i, h):
     m = take(like, memory, at)
     drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
@@ -164,10 +164,10 @@ def take(like: Any, memory: np.ndarray, at: int) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(take, inline=True)
+@overload_for(take, inline=True)
 def _take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
     result, names = construction(like, lambda column: f"peek(memory, at + {column * WIDTH})")
-    return define("take(like, memory, at)", {"peek": _peek, **names}, f"return {result}")
+    return compile_source("take(like, memory, at)", {"peek": _peek, **names}, f"return {result}")
 
 
 def give(tree: Any, memory: np.ndarray, at: int) -> None:
@@ -175,7 +175,7 @@ def give(tree: Any, memory: np.ndarray, at: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(give, inline=True)
+@overload_for(give, inline=True)
 def _give(tree: types.Type, memory: types.Type, at: types.Type) -> Callable:
     lines = [f"poke(memory, at + {k * WIDTH}, {path})" for k, path in enumerate(leaves(tree, "tree"))]
-    return define("give(tree, memory, at)", {"poke": _poke}, *lines, "return None")
+    return compile_source("give(tree, memory, at)", {"poke": _poke}, *lines, "return None")

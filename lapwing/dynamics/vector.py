@@ -5,7 +5,7 @@ A vector is `(x, y, z)`; a matrix is nine floats in row order.
 
 import math
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 Vec3 = tuple[float, float, float]
 Mat3 = tuple[float, float, float, float, float, float, float, float, float]
@@ -15,55 +15,55 @@ NOTHING: Vec3 = (-0.0, -0.0, -0.0)  # adding it changes no number, not even the 
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-@leaf
+@always_inline
 def add(a, b):
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@leaf
+@always_inline
 def subtract(a, b):
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@leaf
+@always_inline
 def scale(s, a):
     """s a for a scalar s."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@leaf
+@always_inline
 def multiply(a, b):
     """Element by element."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
-@leaf
+@always_inline
 def divide(a, b):
     """Element by element."""
     return (a[0] / b[0], a[1] / b[1], a[2] / b[2])
 
 
-@leaf
+@always_inline
 def dot(a, b):
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@leaf
+@always_inline
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@leaf
+@always_inline
 def norm(a):
     """Euclidean length."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@leaf
+@always_inline
 def apply(m, a):
     """m a for a 3x3 matrix m in row order."""
     return (
@@ -73,7 +73,7 @@ def apply(m, a):
     )
 
 
-@leaf
+@always_inline
 def apply_transposed(m, a):
     """transpose(m) a for a 3x3 matrix m in row order."""
     return (
@@ -83,7 +83,7 @@ def apply_transposed(m, a):
     )
 
 
-@leaf
+@always_inline
 def matmul(m, n):
     """m n for 3x3 matrices in row order."""
     return (
@@ -99,13 +99,13 @@ def matmul(m, n):
     )
 
 
-@leaf
+@always_inline
 def transpose(m):
     """Transpose of a 3x3 matrix in row order."""
     return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
 
 
-@leaf
+@always_inline
 def pair(_, a, b):
     """(a, b), for `each` of two tuples."""
     return a, b

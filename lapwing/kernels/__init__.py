@@ -12,7 +12,15 @@ by name: put kernels and classes into modules.
 
 from lapwing.kernels.compiler.cache import Statistics, on_compile, statistics
 from lapwing.kernels.compiler.cache_files import root as cache_folder
-from lapwing.kernels.compiler.decorators import apart, kernel, leaf, uncompiled, uncounted, unkept, vectorised
+from lapwing.kernels.compiler.decorators import (
+    always_inline,
+    kernel,
+    no_refcount,
+    noinline,
+    python_function,
+    uncached,
+    vectorise_loops,
+)
 from lapwing.kernels.compiler.dispatch_table import DispatchTable
 from lapwing.kernels.compiler.pipeline import Pipeline
 from lapwing.kernels.compiler.source_digest import digest as source_digest
@@ -23,16 +31,16 @@ __all__ = [
     "DispatchTable",
     "Pipeline",
     "Statistics",
-    "apart",
+    "always_inline",
     "cache_folder",
     "forget_sources",
     "kernel",
-    "leaf",
+    "no_refcount",
+    "noinline",
     "on_compile",
+    "python_function",
     "source_digest",
     "statistics",
-    "uncompiled",
-    "uncounted",
-    "unkept",
-    "vectorised",
+    "uncached",
+    "vectorise_loops",
 ]

@@ -13,10 +13,10 @@ from numba.core import types
 from numba.core.targetconfig import ConfigStack
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from lapwing.kernels import unkept
+from lapwing.kernels import uncached
 
 
-def define(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
+def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
     """A function from source text.
 
     Args:
@@ -29,7 +29,9 @@ def define(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
     return scope[signature.partition("(")[0]]
 
 
-def generated(signature: str, generate: Callable[..., Callable], doc: str, *, inline: bool = False) -> Callable:
+def generated_overload(
+    signature: str, generate: Callable[..., Callable], doc: str, *, inline: bool = False
+) -> Callable:
     """A function for compiled code that `generate` makes anew for every combination of argument types.
 
     Called from Python, the same generated code runs uncompiled: slow, for tests and set-up.
@@ -51,7 +53,7 @@ def generated(signature: str, generate: Callable[..., Callable], doc: str, *, in
     return function
 
 
-def implements(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
+def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
     """Decorates what takes the numba types of a function's arguments and gives its implementation in compiled code.
 
     That is a function of the same arguments, or better, where there is one, a kernel: nothing more to compile.
@@ -80,7 +82,7 @@ def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> 
             flags = ConfigStack().top().copy()
             flags.forceinline = flags.forceinline or inline
             if (args, flags.forceinline) not in chosen:
-                chosen[args, flags.forceinline] = unkept(choose(*args))
+                chosen[args, flags.forceinline] = uncached(choose(*args))
             kernel = types.Dispatcher(chosen[args, flags.forceinline])
             with ConfigStack().enter(flags):
                 signature = kernel.get_call_type(self.context, args, {})
@@ -93,47 +95,49 @@ def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> 
     infer_global(function, types.Function(Implementation))
 
 
-def each(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
+def map_tuple(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
     """(function(common, a[0], b[0]), function(common, a[1], b[1]), ...) for tuples of equal length."""
     return tuple(function(common, x, y) for x, y in zip(a, b, strict=True))
 
 
-@implements(each, inline=True)
-def _each(function, common, a, b):
+@overload_for(map_tuple, inline=True)
+def _map_tuple(function, common, a, b):
     calls = "".join(f"function(common, a[{i}], b[{i}]), " for i in range(len(a)))
-    return define("each(function, common, a, b)", {}, f"return ({calls})")
+    return compile_source("map_tuple(function, common, a, b)", {}, f"return ({calls})")
 
 
-def fold(function: Callable, common: Any, value: Any, a: tuple, b: tuple) -> Any:
+def reduce_tuple(function: Callable, common: Any, value: Any, a: tuple, b: tuple) -> Any:
     """The value after value = function(common, value, a[0], b[0]), then with a[1] and b[1], and so on."""
     for x, y in zip(a, b, strict=True):
         value = function(common, value, x, y)
     return value
 
 
-@implements(fold, inline=True)
-def _fold(function, common, value, a, b):
+@overload_for(reduce_tuple, inline=True)
+def _reduce_tuple(function, common, value, a, b):
     calls = [f"value = function(common, value, a[{i}], b[{i}])" for i in range(len(a))]
-    return define("fold(function, common, value, a, b)", {}, *calls, "return value")
+    return compile_source("reduce_tuple(function, common, value, a, b)", {}, *calls, "return value")
 
 
-def any_of(found: tuple) -> bool:
+def any_in_tuple(found: tuple) -> bool:
     """Whether any entry of a tuple is true."""
     return any(found)
 
 
-@implements(any_of, inline=True)
-def _any_of(found):
-    return define("any_of(found)", {}, f"return {' or '.join(f'found[{i}]' for i in range(len(found))) or 'False'}")
+@overload_for(any_in_tuple, inline=True)
+def _any_in_tuple(found):
+    return compile_source(
+        "any_in_tuple(found)", {}, f"return {' or '.join(f'found[{i}]' for i in range(len(found))) or 'False'}"
+    )
 
 
-def each_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
+def map_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
     """(function(*arguments, 0), function(*arguments, 1), ...), one for each entry of the tuple `count`."""
     return tuple(function(*arguments, i) for i in range(len(count)))
 
 
-@implements(each_index)
-def _each_index(function, count, *arguments):
+@overload_for(map_index)
+def _map_index(function, count, *arguments):
     given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
     calls = "".join(f"function({given}{i}), " for i in range(len(count)))
-    return define("each_index(function, count, *arguments)", {}, f"return ({calls})")
+    return compile_source("map_index(function, count, *arguments)", {}, f"return ({calls})")

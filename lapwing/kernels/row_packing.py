@@ -20,15 +20,15 @@ from numba.core import cgutils, types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from lapwing.kernels.codegen import define
+from lapwing.kernels.codegen import compile_source
 
 
-def width(tree: Any) -> int:
+def row_width(tree: Any) -> int:
     """Columns that a tree takes."""
-    return sum(map(width, tree)) if isinstance(tree, tuple) else 1
+    return sum(map(row_width, tree)) if isinstance(tree, tuple) else 1
 
 
-def to_row(tree: Any) -> np.ndarray:
+def pack_row(tree: Any) -> np.ndarray:
     """The numbers of a tree, shape (width,)."""
     flat: list[float] = []
 
@@ -43,10 +43,10 @@ def to_row(tree: Any) -> np.ndarray:
     return np.array(flat)
 
 
-def reader(like: Any) -> Callable[[np.ndarray], Any]:
+def row_unpacker(like: Any) -> Callable[[np.ndarray], Any]:
     """A function from a row (width,) to the tree of the shape and types of `like` whose numbers stand in it."""
     result, names = construction(numba.typeof(like), lambda column: f"numbers[{column}]")
-    read = define("read(numbers)", names, f"return {result}")
+    read = compile_source("read(numbers)", names, f"return {result}")
     return lambda row: read(row.tolist())
 
 

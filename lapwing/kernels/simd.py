@@ -17,8 +17,8 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import define, generated
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, generated_overload
 from lapwing.kernels.state_tree import NUMBERS, unroll
 
 FLOAT, INDEX = ir.DoubleType(), ir.IntType(32)
@@ -42,7 +42,7 @@ class _Model(models.PrimitiveModel):
         super().__init__(dmm, fe_type, VECTOR)
 
 
-def _spread(builder: Any, value: Any) -> Any:
+def _splat(builder: Any, value: Any) -> Any:
     """The vector that holds a float in every lane; a vector as it is."""
     if value.type == VECTOR:
         return value
@@ -62,7 +62,7 @@ def _binary(operation: Any, instruction: str) -> None:
 
         @lower_builtin(operation, *pair)
         def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return getattr(builder, instruction)(*(_spread(builder, a) for a in args))
+            return getattr(builder, instruction)(*(_splat(builder, a) for a in args))
 
 
 for _operation, _instruction in (
@@ -83,7 +83,7 @@ def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 @intrinsic
-def lanes(context, a, b, c, d):
+def pack4(context, a, b, c, d):
     """Four floats side by side."""
 
     def made(context, builder, sig, args):
@@ -96,13 +96,13 @@ def lanes(context, a, b, c, d):
 
 
 @intrinsic
-def spread(context, x):
+def splat(context, x):
     """One float in every lane."""
-    return signature(LANES, types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
+    return signature(LANES, types.float64), lambda context, builder, sig, args: _splat(builder, args[0])
 
 
 @intrinsic
-def apart(context, x):
+def unpack4(context, x):
     """The four floats of x as a tuple."""
 
     def taken(context, builder, sig, args):
@@ -113,7 +113,7 @@ def apart(context, x):
 
 
 @intrinsic
-def root(context, x):
+def sqrt(context, x):
     """The square root of every lane."""
 
     def taken(context, builder, sig, args):
@@ -124,20 +124,20 @@ def root(context, x):
 
 
 @intrinsic
-def where(context, flag, a, b):
+def select(context, flag, a, b):
     """Lane by lane a where flag is above zero, else b; a and b lanes or floats."""
 
     def chosen(context, builder, sig, args):
         zero = ir.Constant(VECTOR, [0.0] * 4)
-        return builder.select(builder.fcmp_ordered(">", args[0], zero), *(_spread(builder, a) for a in args[1:]))
+        return builder.select(builder.fcmp_ordered(">", args[0], zero), *(_splat(builder, a) for a in args[1:]))
 
     return signature(LANES, LANES, a, b), chosen
 
 
-@leaf
-def choose(flag, a, b):
+@always_inline
+def select_vector(flag, a, b):
     """The vector a where flag is above zero, else b."""
-    return (where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]))
+    return (select(flag, a[0], b[0]), select(flag, a[1], b[1]), select(flag, a[2], b[2]))
 
 
 @intrinsic
@@ -178,39 +178,39 @@ def store(context, array, start, x):
     return signature(types.none, array, types.intp, LANES), put
 
 
-@leaf
-def total(x):
+@always_inline
+def horizontal_sum(x):
     """The sum of the four lanes."""
-    a, b, c, d = apart(x)
+    a, b, c, d = unpack4(x)
     return (a + b) + (c + d)
 
 
-def _beside(four: Any) -> Callable:
-    paths, names = tuple(f"four[{k}]" for k in range(4)), {"lanes": lanes}
-    expression = unroll(four.types[0], paths, lambda found, p, _: None if found else f"lanes({', '.join(p)})", names)
-    return define("beside(four)", names, f"return {expression}")
+def _interleave(four: Any) -> Callable:
+    paths, names = tuple(f"four[{k}]" for k in range(4)), {"pack4": pack4}
+    expression = unroll(four.types[0], paths, lambda found, p, _: None if found else f"pack4({', '.join(p)})", names)
+    return compile_source("interleave(four)", names, f"return {expression}")
 
 
-beside = generated(
-    "beside(four)",
-    _beside,
+interleave = generated_overload(
+    "interleave(four)",
+    _interleave,
     "The tree of lanes whose lane k holds the numbers of the k-th of four trees of one shape.",
     inline=True,
 )
 
 
-def _separate(tree: Any) -> Callable:
-    names: dict[str, Any] = {"apart": apart}
+def _deinterleave(tree: Any) -> Callable:
+    names: dict[str, Any] = {"unpack4": unpack4}
     parts = [
-        unroll(tree, ("tree",), lambda found, p, _, k=k: None if found else f"apart({p[0]})[{k}]", names)
+        unroll(tree, ("tree",), lambda found, p, _, k=k: None if found else f"unpack4({p[0]})[{k}]", names)
         for k in range(4)
     ]
-    return define("separate(tree)", names, f"return ({', '.join(parts)})")
+    return compile_source("deinterleave(tree)", names, f"return ({', '.join(parts)})")
 
 
-separate = generated(
-    "separate(tree)",
-    _separate,
-    "The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `beside`.",
+deinterleave = generated_overload(
+    "deinterleave(tree)",
+    _deinterleave,
+    "The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `interleave`.",
     inline=True,
 )

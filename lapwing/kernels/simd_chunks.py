@@ -3,32 +3,32 @@
 from collections.abc import Callable
 from typing import Any
 
-from lapwing.kernels.codegen import define, generated
+from lapwing.kernels.codegen import compile_source, generated_overload
 
 
-def _in_fours(values: Any, filling: Any) -> Callable:
+def _chunk4(values: Any, filling: Any) -> Callable:
     n = len(values)
     members = [f"values[{i}]" if i < n else "filling" for i in range(-(-n // 4) * 4)]
     groups = "".join(f"({', '.join(members[i : i + 4])}), " for i in range(0, len(members), 4))
-    return define("in_fours(values, filling)", {}, f"return ({groups})")
+    return compile_source("chunk4(values, filling)", {}, f"return ({groups})")
 
 
-in_fours = generated(
-    "in_fours(values, filling)",
-    _in_fours,
+chunk4 = generated_overload(
+    "chunk4(values, filling)",
+    _chunk4,
     "The members of a tuple as a tuple of groups of four, the last one filled up.",
     inline=True,
 )
 
 
-def _one_by_one(groups: Any, values: Any) -> Callable:
+def _unchunk4(groups: Any, values: Any) -> Callable:
     members = "".join(f"groups[{i // 4}][{i % 4}], " for i in range(len(values)))
-    return define("one_by_one(groups, values)", {}, f"return ({members})")
+    return compile_source("unchunk4(groups, values)", {}, f"return ({members})")
 
 
-one_by_one = generated(
-    "one_by_one(groups, values)",
-    _one_by_one,
-    "The members of groups of four, without the filling, as many as there are `values`; the inverse of `in_fours`.",
+unchunk4 = generated_overload(
+    "unchunk4(groups, values)",
+    _unchunk4,
+    "The members of groups of four, without the filling, as many as there are `values`; the inverse of `chunk4`.",
     inline=True,
 )

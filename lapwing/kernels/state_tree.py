@@ -17,7 +17,7 @@ from numba.core import types
 from numba.core.errors import TypingError
 
 from lapwing.kernels import DispatchTable
-from lapwing.kernels.codegen import define, generated
+from lapwing.kernels.codegen import compile_source, generated_overload
 
 
 class Manifold(NamedTuple):
@@ -74,9 +74,9 @@ def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable
     def generate(*argument_types):
         names: dict[str, Any] = {}
         expression = body(argument_types[position], names)
-        return define(signature, names, f"return {expression}")
+        return compile_source(signature, names, f"return {expression}")
 
-    return generated(signature, generate, doc)
+    return generated_overload(signature, generate, doc)
 
 
 def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float: str) -> Callable:
@@ -135,8 +135,8 @@ def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
     return f"max(0.0, {', '.join(found)})"
 
 
-def _apart(tree: types.Type, names: dict[str, Any]) -> str:
-    names["of_part"] = apart
+def _relative_difference(tree: types.Type, names: dict[str, Any]) -> str:
+    names["of_part"] = relative_difference
     found = []
     for i, part in enumerate(tree.types):  # calls for tuples: the same ones come again and again
         if isinstance(part, types.BaseTuple):
@@ -182,8 +182,8 @@ error_ratio = _operation(
     "error_ratio(x, e)", "x", _error_ratio,
     "Largest component of a tangent e at x, floats relative to 1 + |x|, manifold leaves absolute (rad, rad/s).",
 )  # fmt: skip
-apart = _operation(
-    "apart(x, y)", "x", _apart,
+relative_difference = _operation(
+    "relative_difference(x, y)", "x", _relative_difference,
     "The largest difference between stored numbers of two states, relative to 1 + |x|; not of those that are NaN.",
 )  # fmt: skip
 finite = _operation("finite(x)", "x", _finite, "True if no number of a state or tangent is NaN or infinite.")

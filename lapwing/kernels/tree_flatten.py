@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.kernels.codegen import define
+from lapwing.kernels.codegen import compile_source
 from lapwing.kernels.type_fingerprint import UnknownError, structure
 
 _BY_TYPE = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
@@ -78,4 +78,4 @@ def _written(example: Any) -> Any:
 
     walk(example, "value")
     given = [f"({''.join(f'{name}, ' for name in names)})" for names in (tuples, parts)]
-    return define("flatten(value)", {}, *lines, f"return {', '.join(given)}")
+    return compile_source("flatten(value)", {}, *lines, f"return {', '.join(given)}")

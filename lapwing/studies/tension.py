@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.studies.topic_view import TopicView
 
 GAP = 0.05  # [s] between two stretches of pushing that are told as one
@@ -44,7 +44,7 @@ def told(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> np.ndar
     """`tension` of a flight, from the topics "bodies", the load first, and "lift"."""
     n = min(len(bodies), len(lift))
     x, y, z, w = np.moveaxis(bodies.orientation[:n, 1:], 2, 0)
-    matrix = uncompiled(rotation_matrix)((w, x, y, z))
+    matrix = python_function(rotation_matrix)((w, x, y, z))
     force = np.asarray(lift.thrust)[:n, :, None] * np.stack([matrix[2], matrix[5], matrix[8]], axis=2)
     return tension(bodies.position[:n], bodies.velocity[:n], force, load)
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 TURN = 2.0 * np.pi
 AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
@@ -73,7 +73,7 @@ def strided(values: np.ndarray) -> np.ndarray:
     return found
 
 
-@leaf
+@always_inline
 def _turn(wanted: float, flown: float) -> float:
     """The shortest way from one angle to another [rad]."""
     turn = wanted - flown
@@ -153,7 +153,7 @@ def _reach(wanted: Any, position: Any, armed: Any) -> tuple[float, float]:
 Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown; that was wanted
 
 
-@leaf
+@always_inline
 def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
     """Extremes with another x."""
     return (
@@ -161,13 +161,13 @@ def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
     )  # fmt: skip
 
 
-@leaf
+@always_inline
 def _beyond(known: Extremes) -> float:
     """How far what was flown reaches beyond what was wanted."""
     return _greater(known[0] - known[2], known[1] - known[3])
 
 
-@leaf
+@always_inline
 def _greater(a: float, b: float) -> float:
     """The greater number, of two that are numbers."""
     return a if a > b else b

@@ -4,7 +4,7 @@
 import math
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Smoothing(NamedTuple):
@@ -29,7 +29,7 @@ class Angle(NamedTuple):
 AT_REST = Angle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@leaf
+@always_inline
 def advance(p: Smoothing, s: Angle, target: float, dt: float) -> Angle:
     """The state one tick of dt [s] on, towards `target` [rad]: dt times bandwidth must stay well below 1."""
     acceleration = p.bandwidth * (p.bandwidth * (target - s.demand) - 2.0 * p.damping * s.demand_rate)

@@ -4,16 +4,16 @@ import math
 
 from lapwing.dynamics.lie.quaternion import Quaternion, conjugate, from_roll_pitch_yaw, log, multiply, rotate
 from lapwing.dynamics.vector import Vec3, subtract
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
-@leaf
+@always_inline
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi] [rad]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
 
 
-@leaf
+@always_inline
 def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
     """Rates of roll, pitch and yaw [rad/s] from the body rates (theory.md, eq. (4.17)); pitch away from +-pi/2."""
     s, c = math.sin(roll), math.cos(roll)
@@ -21,7 +21,7 @@ def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
     return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
 
 
-@leaf
+@always_inline
 def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
     """Inverse of `angle_rates`: omega_body of the rates of roll, pitch and yaw."""
     s, c = math.sin(roll), math.cos(roll)
@@ -29,7 +29,7 @@ def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
     return (rates[0] - math.sin(pitch) * rates[2], c * rates[1] + s * turn, c * turn - s * rates[1])
 
 
-@leaf
+@always_inline
 def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
     """Reference minus measured (roll, pitch, yaw) [rad], and its derivative [rad/s]: the cascade of the paper."""
     rates = angle_rates(angles[0], angles[1], omega_body)
@@ -37,7 +37,7 @@ def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, 
     return (roll, pitch, wrap(yaw)), subtract(rates_reference, rates)
 
 
-@leaf
+@always_inline
 def error_on_so3(
     attitude: Quaternion, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3
 ) -> tuple[Vec3, Vec3]:

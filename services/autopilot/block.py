@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf, uncompiled
+from lapwing.kernels import always_inline, python_function
 from lapwing.services.autopilot import control, interface, motor_failure
 from lapwing.services.autopilot.commander_wakeup import battery_warning
 from lapwing.services.autopilot.land_detector import FLYING, ON_GROUND
@@ -54,10 +54,10 @@ class ControllerState(NamedTuple):
 
 def start(p: Controller) -> ControllerState:
     """Before the first tick."""
-    return ControllerState(control.START, uncompiled(motor_failure.start)(p.watch), 0, float("nan"))
+    return ControllerState(control.START, python_function(motor_failure.start)(p.watch), 0, float("nan"))
 
 
-@leaf
+@always_inline
 def setpoint_of(wanted: Reference) -> interface.Setpoint:
     """What the control law is asked for."""
     return interface.Setpoint(
@@ -65,13 +65,13 @@ def setpoint_of(wanted: Reference) -> interface.Setpoint:
     )
 
 
-@leaf
+@always_inline
 def estimate_of(e: StateEstimate) -> interface.Estimate:
     """What the control law believes."""
     return interface.Estimate(e.position_world, e.attitude, e.velocity_world, e.omega_body)
 
 
-@leaf
+@always_inline
 def outcome(
     p: Controller,
     watched: motor_failure.State,
@@ -112,7 +112,7 @@ def outcome(
     )
 
 
-@leaf
+@always_inline
 def step(
     p: Controller, s: ControllerState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[ControllerState, tuple, int]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3, subtract
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
 from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
 from lapwing.services.autopilot.interface import Command, Estimate, Setpoint
@@ -62,20 +62,20 @@ class State(NamedTuple):
 START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
-@leaf
+@always_inline
 def sign(x: float) -> float:
     """-1.0, 0.0 or 1.0."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
-@leaf
+@always_inline
 def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
     """Components along the heading and to its left of a vector in world axes (theory.md, eq. (4.11))."""
     s, c = math.sin(yaw), math.cos(yaw)
     return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
 
 
-@leaf
+@always_inline
 def tilt_targets(
     p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
 ) -> tuple[float, float]:
@@ -90,7 +90,7 @@ def tilt_targets(
     return tilt_x, tilt_y
 
 
-@leaf
+@always_inline
 def collective_demand(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.autopilot.allocation import demand_effects, effectiveness, in_wakes, tables, tilted_effectiveness
 from lapwing.services.autopilot.angle_reference import Smoothing
 from lapwing.services.autopilot.control import Parameters
@@ -59,7 +59,7 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
 
     Raises ValueError where the airframe cannot hover, or not in balance.
     """
-    thrust_max = uncompiled(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
+    thrust_max = python_function(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
     weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
     share, needed = shares(airframe), hover_thrust(airframe)
     if thrust_max <= needed:

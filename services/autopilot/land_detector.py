@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot.interface import Estimate, Setpoint
 
 ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
@@ -24,7 +24,7 @@ class LandedState(NamedTuple):
 INITIAL_STAGE = LandedState(ON_GROUND, 0.0)
 
 
-@leaf
+@always_inline
 def advance_stage(
     stage: LandedState, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float
 ) -> LandedState:

@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.interface import PerRotor
 
 Share = tuple[float, float, float, float]  # of a rotor in the demands: collective, roll, pitch, yaw
@@ -20,52 +20,52 @@ class VirtualControls(NamedTuple):
     yaw: float  # positive turns about body z (to the left)
 
 
-@leaf
+@always_inline
 def _nothing(_: float, share: Share, other: Share) -> float:
     return 0.0
 
 
-@leaf
+@always_inline
 def at_rest(shares: Shares) -> PerRotor:
     """No thrust [N] of any rotor."""
-    return each(_nothing, 0.0, shares, shares)
+    return map_tuple(_nothing, 0.0, shares, shares)
 
 
-@leaf
+@always_inline
 def shares_in_force(tables: tuple[Shares, ...], failed: int) -> Shares:
     """The shares with a rotor failed, by its number from 1; those with all rotors where there are no others."""
     return tables[failed if failed < len(tables) else 0]
 
 
-@leaf
+@always_inline
 def _thrust(q: VirtualControls, share: Share, _: Share) -> float:
     return share[0] * q.collective + share[1] * q.roll + share[2] * q.pitch + share[3] * q.yaw
 
 
-@leaf
+@always_inline
 def mix(shares: Shares, q: VirtualControls) -> PerRotor:
     """The rotors' thrusts [N] of demands q without saturation."""
-    return each(_thrust, q, shares, shares)
+    return map_tuple(_thrust, q, shares, shares)
 
 
-@leaf
+@always_inline
 def clamp(x: float, low: float, high: float) -> float:
     """The nearest value to x in [low, high]."""
     return min(max(x, low), high)
 
 
-@leaf
+@always_inline
 def _clamped(highest: float, value: float, _: float) -> float:
     return clamp(value, 0.0, highest)
 
 
-@leaf
+@always_inline
 def possible(values: PerRotor, highest: float) -> PerRotor:
     """The nearest values within 0..highest, thrusts [N] or voltages [V]."""
-    return each(_clamped, highest, values, values)
+    return map_tuple(_clamped, highest, values, values)
 
 
-@leaf
+@always_inline
 def saturate(shares: Shares, q: VirtualControls, thrust_max: float) -> VirtualControls:
     """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 

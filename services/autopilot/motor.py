@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.interface import PerRotor
 
 RPM = 30.0 / math.pi  # revolutions per minute of 1 rad/s
@@ -19,25 +19,25 @@ class Motor(NamedTuple):
     time_constant: float  # of the first-order lag of the speed [s]
 
 
-@leaf
+@always_inline
 def voltage(motor: Motor, thrust: float) -> float:
     """The voltage [V] that holds the speed of a thrust [N] >= 0."""
     propeller = math.sqrt(thrust / motor.thrust_coefficient)
     return RPM * propeller / (motor.gear_ratio * motor.speed_constant)
 
 
-@leaf
+@always_inline
 def _voltage(motor: Motor, thrust: float, _: float) -> float:
     return voltage(motor, thrust)
 
 
-@leaf
+@always_inline
 def voltages(motor: Motor, thrust: PerRotor) -> PerRotor:
     """The voltages [V] that hold the speeds of thrusts [N] >= 0."""
-    return each(_voltage, motor, thrust, thrust)
+    return map_tuple(_voltage, motor, thrust, thrust)
 
 
-@leaf
+@always_inline
 def thrust_at(motor: Motor, volts: float) -> float:
     """The steady thrust [N] at a voltage [V]; inverse of `voltage`."""
     propeller = motor.speed_constant * volts * motor.gear_ratio / RPM

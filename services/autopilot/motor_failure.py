@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, rotor_effectiveness
 from lapwing.services.autopilot.interface import PerRotor
 
@@ -52,31 +52,31 @@ def build(airframe: Airframe) -> Parameters:
     return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, a.mass * a.gravity / lift(a))
 
 
-@leaf
+@always_inline
 def _none(_: float, x: float, y: float) -> float:
     return 0.0
 
 
-@leaf
+@always_inline
 def start(p: Parameters) -> State:
     """Before a flight."""
-    none = each(_none, 0.0, p.roll_arm, p.pitch_arm)
+    none = map_tuple(_none, 0.0, p.roll_arm, p.pitch_arm)
     return State(none, none, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
 
 
-@leaf
+@always_inline
 def _follow(share: float, root: float, asked: float) -> float:
     return root + share * (math.sqrt(asked) - root)
 
 
-@leaf
+@always_inline
 def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
     """Angular acceleration [rad/s^2] about x and y that rotor k should give."""
     thrust = max(root[k] * root[k], LEAST * p.hovering)
     return p.roll_arm[k] * thrust / p.inertia_body[0], p.pitch_arm[k] * thrust / p.inertia_body[1]
 
 
-@leaf
+@always_inline
 def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> int:
     """Number of the rotor, from 1, whose lack of thrust explains the disturbance; 0 if none does."""
     x, y = disturbance
@@ -90,7 +90,7 @@ def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> 
     return found
 
 
-@leaf
+@always_inline
 def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: PerRotor) -> State:
     """The watch after a tick of dt [s].
 
@@ -103,7 +103,7 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
         asked: thrusts of the rotors that are asked for from now on [N].
     """
     share = 1.0 - math.exp(-dt / p.time_constant)
-    root = each(_follow, share, s.root, s.asked)
+    root = map_tuple(_follow, share, s.root, s.asked)
     ix, iy, iz = p.inertia_body
     wx, wy, wz = omega_body
     ax, ay = (iy - iz) * wy * wz / ix, (iz - ix) * wz * wx / iy

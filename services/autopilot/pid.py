@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Pid(NamedTuple):
@@ -13,7 +13,7 @@ class Pid(NamedTuple):
     d: float  # [u s/e]
 
 
-@leaf
+@always_inline
 def integrate(gains: Pid, integral: float, error: float, cut: float, dt: float) -> float:
     """The integral of the error [e s] after dt [s], held while it would push further into saturation.
 
@@ -22,7 +22,7 @@ def integrate(gains: Pid, integral: float, error: float, cut: float, dt: float) 
     return integral if gains.i * error * cut > 0.0 else integral + dt * error
 
 
-@leaf
+@always_inline
 def output(gains: Pid, integral: float, error: float, error_rate: float) -> float:
     """P error + I integral + D error_rate [u]."""
     return gains.p * error + gains.i * integral + gains.d * error_rate

@@ -25,13 +25,13 @@ given none; the types are those of `lapwing.services.common.ports`. The vehicle 
 import math
 from typing import Any
 
-from lapwing.kernels.row_packing import to_row, width
+from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.common.controller_api import VehicleModel
 from lapwing.services.common.ports import StateEstimate
 
 __all__ = ["StateEstimate", "VehicleModel", "checked_estimate"]
 
-WIDTH = width(StateEstimate())
+WIDTH = row_width(StateEstimate())
 
 
 def checked_estimate(found: Any) -> StateEstimate:
@@ -44,7 +44,7 @@ def checked_estimate(found: Any) -> StateEstimate:
     if not isinstance(found, StateEstimate):
         raise TypeError(f"step returned {type(found).__name__}, expected StateEstimate")
     made = StateEstimate(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in found))  # type: ignore[arg-type]
-    row = to_row(made)
+    row = pack_row(made)
     if len(row) != WIDTH:
         raise TypeError(f"step returned an estimate of {len(row)} numbers, expected {WIDTH}")
     if not all(map(math.isfinite, row)):

@@ -21,7 +21,7 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.ground_equilibrium import Pose, standing_pose
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.common import mesh_schema
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.named_tables import NamedTables
@@ -169,7 +169,7 @@ def thrust_coefficient(scene: Scene) -> float:
         return rotor.thrust
     if "air_density" not in scene[Effects].tables:
         return STANDARD_DENSITY * rotor.thrust
-    return float(uncompiled(density)(around.atmosphere, around.home.height)) * rotor.thrust
+    return float(python_function(density)(around.atmosphere, around.home.height)) * rotor.thrust
 
 
 def wake_slopes(scene: Scene) -> WakeSlopes:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 from lapwing.dynamics import geodesy
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.mavlink.dialect import mavlink
 
-enu_to_geodetic = uncompiled(geodesy.enu_to_geodetic)  # the link's process runs nothing compiled
-geodetic_to_enu = uncompiled(geodesy.geodetic_to_enu)
+enu_to_geodetic = python_function(geodesy.enu_to_geodetic)  # the link's process runs nothing compiled
+geodetic_to_enu = python_function(geodesy.geodetic_to_enu)
 
 NOT_GIVEN = 0x7FFFFFFF  # a coordinate that is not given, in messages of whole numbers
 

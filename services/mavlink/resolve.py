@@ -5,7 +5,7 @@ from lapwing.dynamics.atmosphere import FREEZING, temperature
 from lapwing.dynamics.effects import battery
 from lapwing.dynamics.effects.battery_thevenin import BatteryThevenin
 from lapwing.dynamics.effects.payload import Payload
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.common.autopilot_parameters import table
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.environment_schema import environment
@@ -28,7 +28,7 @@ def describe(scene: Scene) -> VehicleDescription:
         system=identity.system,
         flavour=identity.flavour,
         home=around.home,
-        air_temperature=uncompiled(temperature)(around.atmosphere, around.home.height) - FREEZING,
+        air_temperature=python_function(temperature)(around.atmosphere, around.home.height) - FREEZING,
         standing_height=start_height(scene),
         rotors=tuple(
             Rotor(place, turn == "ccw")
@@ -55,6 +55,6 @@ def _battery(scene: Scene) -> Battery | None:
     for effect in active(scene):
         if isinstance(effect, battery.Battery | BatteryThevenin):
             cells = round(effect.cells)
-            charged = uncompiled(battery.open_circuit_voltage)(1.0)
+            charged = python_function(battery.open_circuit_voltage)(1.0)
             return Battery(cells, effect.capacity, effect.resistance, charged, effect.cut_off / cells)
     return None

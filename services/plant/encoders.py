@@ -10,7 +10,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.dynamics.atmosphere import FREEZING
 from lapwing.dynamics.lie.quaternion import conjugate, rotate
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.messages import (
     BatteryState,
     BodyStates,
@@ -117,8 +117,8 @@ def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
 
 def _odometry(x: TrueState, time_ns: np.ndarray) -> Fields:
     """Pose in the world, velocities in the body frame, as nav_msgs defines them; both exact."""
-    q = uncompiled(conjugate)(np.asarray(x.attitude).T)
-    velocity_body = uncompiled(rotate)(q, np.asarray(x.velocity_world).T)
+    q = python_function(conjugate)(np.asarray(x.attitude).T)
+    velocity_body = python_function(rotate)(q, np.asarray(x.velocity_world).T)
     return {
         **stamp_columns(time_ns),
         "pose.pose.position": x.position_world,

@@ -19,7 +19,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, Mult
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import struck
 from lapwing.kernels import kernel
 from lapwing.kernels.cell import Cell, read, write
-from lapwing.kernels.codegen import implements
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.common import ports
 from lapwing.services.common.ports import PerRotor
 from lapwing.services.plant.blocks import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
@@ -152,6 +152,6 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_struck)
+@overload_for(_struck)
 def _struck_of(drive: types.Type, x: types.Type) -> Any:
     return struck if x.instance_class is FiveBodies else multirotor_euler.struck

@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.messages import topics as topic
 from lapwing.services.common.airspeed_encoder import airspeed_wire
 from lapwing.services.common.ports import AirspeedReading
@@ -49,7 +49,7 @@ def blank() -> AirspeedState:
     return AirspeedState(0.0, 0.0, BLANK)
 
 
-@leaf
+@always_inline
 def _true_pressure(truth: Truth) -> float:
     """[Pa]; from behind, the openings feel as much suction."""
     along = rotate_back(truth.attitude, truth.air_velocity_world)[0]

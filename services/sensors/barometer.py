@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from lapwing.dynamics.atmosphere import pressure
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.common.ports import BarometerReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
@@ -48,7 +48,7 @@ def blank() -> BarometerState:
     return BarometerState(0.0, 0.0, ZERO, BLANK)
 
 
-@leaf
+@always_inline
 def _true_pressure(p: Barometer, truth: Truth) -> float:
     static = pressure(truth.atmosphere, truth.home.height + truth.position_world[2])
     return static + p.airspeed_error * truth.dynamic_pressure + p.wash_pa_per_n * truth.thrust

@@ -10,8 +10,8 @@ from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import dot, subtract
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.sensors.sensor_inputs import Truth
 
 
@@ -29,7 +29,7 @@ def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_sample, inline=True)
+@overload_for(_sample, inline=True)
 def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Any:
     return sys.modules[p.instance_class.__module__].sample
 
@@ -39,12 +39,12 @@ def _initial(p: Any, key: Key, truth: Truth) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_initial, inline=True)
+@overload_for(_initial, inline=True)
 def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Any:
     return sys.modules[p.instance_class.__module__].initial
 
 
-@leaf
+@always_inline
 def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """The reading at `tick`; the instrument is switched on at tick 0."""
     x, around = inputs[0].value, p.around

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.noise import Key, normal3, uniform
 from lapwing.dynamics.vector import ZERO, Vec3, add, multiply, scale
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 DEPTH = 16  # samples that a line remembers
 Line = tuple[Vec3, ...]  # the last DEPTH values, newest first
@@ -32,14 +32,14 @@ class Fault(NamedTuple):
     samples: int = 0  # of delay, on top of the latency
 
 
-@leaf
+@always_inline
 def new_line(value: Vec3) -> Line:
     """A line that has carried only this value."""
     four = (value, value, value, value)
     return four + four + four + four  # DEPTH of them; compiled tuples have no `*`
 
 
-@leaf
+@always_inline
 def _pushed(line: Line, value: Vec3) -> Line:
     return (value,) + line[:-1]  # noqa: RUF005 (compiled tuples have no unpacking)
 

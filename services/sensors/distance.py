@@ -4,7 +4,7 @@ import math
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.noise import TURN_ON, Key, normal
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, Line, carry, new_line
@@ -25,13 +25,13 @@ def blank() -> DistanceState:
     return DistanceState(0.0, BLANK)
 
 
-@leaf
+@always_inline
 def switched_on(p: Any, key: Key, distance: float) -> DistanceState:
     """State before the first sample, at a true distance [m]; `p`: parameters of the sensor."""
     return DistanceState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((distance, 0.0, 0.0)))
 
 
-@leaf
+@always_inline
 def measured(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
     """Next state and reading of a true distance [m]; other arguments as of `imu.sample`."""
     noise = error_models.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)

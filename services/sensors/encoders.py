@@ -10,7 +10,7 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
-from lapwing.kernels.row_packing import width
+from lapwing.kernels.row_packing import row_width
 from lapwing.messages import (
     FluidPressure,
     Imu,
@@ -77,7 +77,7 @@ def _three(values: np.ndarray) -> np.ndarray:
 
 
 def _own_sample(frame: str, port: Port) -> Any:
-    return Reading(header(0, frame), port.name, (0.0,) * width(port.like))
+    return Reading(header(0, frame), port.name, (0.0,) * row_width(port.like))
 
 
 def _own(reading: Any, time_ns: np.ndarray) -> Fields:

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from lapwing.dynamics.vector import Mat3, Vec3, add, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2], the unit g of data sheets
 
@@ -22,44 +22,44 @@ def density_of_random_walk(walk_per_sqrt_hour: float) -> float:
     return walk_per_sqrt_hour * math.sqrt(2.0) / 60.0
 
 
-@leaf
+@always_inline
 def white_deviation(density: float, rate: float) -> float:
     """Standard deviation of a sample of white noise with this one-sided density (theory.md, eq. (3.10))."""
     return density * math.sqrt(0.5 * rate)
 
 
-@leaf
+@always_inline
 def sample_variance(density: float, step: float, rate: float) -> float:
     """Variance of a sample: its white noise and its rounding to multiples of step."""
     return 0.5 * rate * density * density + step * step / 12.0
 
 
-@leaf
+@always_inline
 def walk_deviation(instability: float) -> float:
     """Standard deviation of a first-order bias whose Allan deviation peaks at `instability` (theory.md, eq. (3.13))."""
     return instability / ALLAN_PEAK
 
 
-@leaf
+@always_inline
 def walk(bias: Vec3, deviation: float, correlation_time: float, rate: float, draw: Vec3) -> Vec3:
     """Next value of a first-order bias walk of this stationary deviation, exact at any rate (eq. (3.12))."""
     keep = math.exp(-1.0 / (rate * correlation_time))
     return add(scale(keep, bias), scale(deviation * math.sqrt(1.0 - keep * keep), draw))
 
 
-@leaf
+@always_inline
 def limit(x: float, largest: float) -> float:
     """x held within +-largest."""
     return min(max(x, -largest), largest)
 
 
-@leaf
+@always_inline
 def quantise(x: float, step: float) -> float:
     """x rounded to a multiple of step; step 0 means none."""
     return x if step == 0.0 else step * np.floor(x / step + 0.5)
 
 
-@leaf
+@always_inline
 def digitise(v: Vec3, largest: float, step: float) -> Vec3:
     """A vector saturated at +-largest and then quantised, element by element."""
     return (
@@ -69,7 +69,7 @@ def digitise(v: Vec3, largest: float, step: float) -> Vec3:
     )
 
 
-@leaf
+@always_inline
 def scale_and_misalignment(scale_error: float, misalignment: float, draw_scale: Vec3, draw_angle: Vec3) -> Mat3:
     """Matrix of a triad with axes of wrong length and direction, turned by small angles (theory.md, eq. (3.14))."""
     a, b, c = scale(misalignment, draw_angle)

@@ -10,7 +10,7 @@ from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
-from lapwing.kernels import kernel, leaf, uncompiled
+from lapwing.kernels import always_inline, kernel, python_function
 from lapwing.services.common.ports import GpsReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
@@ -75,7 +75,7 @@ def blank() -> GpsState:
     return GpsState(ZERO, IDENTITY, BLANK, BLANK)
 
 
-@leaf
+@always_inline
 def _deviations(p: Gps) -> Vec3:
     """Standard deviations of the wander [m]."""
     return (p.wander_horizontal, p.wander_horizontal, p.wander_vertical)
@@ -113,13 +113,13 @@ def check(p: Gps) -> None:
     """KeyedError where the satellites in view do not give a position."""
     if p.sky is None:
         return
-    dilution = math.sqrt(sum(x * x for x in uncompiled(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
+    dilution = math.sqrt(sum(x * x for x in python_function(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
     if not dilution < WORST:
         said = f"got {len(p.sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
         raise ConfigError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
 
 
-@leaf
+@always_inline
 def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec3, Vec3]:
     """(error [m], variance [m^2]) east, north, up."""
     if p.sky is None:

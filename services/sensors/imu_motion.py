@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.lie.quaternion import conjugate, log, multiply, rotate, rotate_back
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.triad import MG
 
@@ -32,7 +32,7 @@ def _swung(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
     return add(force, turning)
 
 
-@leaf
+@always_inline
 def true_values(p: Any, truth: Truth) -> tuple[Vec3, Vec3]:
     """(rate [rad/s], specific force [m/s^2]) of the body where the accelerometers are."""
     a = truth.acceleration_world
@@ -48,7 +48,7 @@ def velocity_world(position: Vec3 | None, truth: Truth) -> Vec3:
     return add(truth.velocity_world, rotate(truth.attitude, cross(truth.omega_body, position)))
 
 
-@leaf
+@always_inline
 def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec3]:
     """(rate [rad/s], specific force [m/s^2]) whose effect over the interval is what happened (theory.md, eq. (3.43)).
 

@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.common.ports import MagnetometerReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
@@ -50,7 +50,7 @@ def blank() -> MagnetometerState:
     return MagnetometerState((0.0,) * 9, ZERO, ZERO, BLANK)
 
 
-@leaf
+@always_inline
 def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
     """The Earth's and that of the motors' leads [T], body."""
     earth = rotate_back(truth.attitude, truth.magnetic_field_world)

@@ -11,7 +11,7 @@ from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.dynamics.lie.quaternion import rotate, rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.messages import OpticalFlow as OpticalFlowMessage
 from lapwing.messages import header
 from lapwing.messages import topics as topic
@@ -55,7 +55,7 @@ def blank() -> OpticalFlowState:
     return OpticalFlowState(0.0, BLANK, BLANK)
 
 
-@leaf
+@always_inline
 def _true_flow(truth: Truth) -> Vec3:
     """(flow about x, about y [rad/s], distance [m])."""
     distance = to_ground(truth.terrain, truth.position_world, rotate(truth.attitude, (0.0, 0.0, -1.0)))

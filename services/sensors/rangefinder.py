@@ -13,8 +13,8 @@ from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray
 from lapwing.dynamics.vector import ZERO, Vec3, add
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import overload_for
 from lapwing.messages import Range, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
@@ -51,24 +51,24 @@ def to_ground(terrain: Any, origin: Vec3, direction: Vec3) -> float:
     raise NotImplementedError("compiled code only")
 
 
-@leaf
+@always_inline
 def _to_level(terrain: Any, origin: Vec3, direction: Vec3) -> float:
     if origin[2] <= 0.0:
         return 0.0
     return origin[2] / -direction[2] if direction[2] < 0.0 else math.inf
 
 
-@leaf
+@always_inline
 def _to_relief(terrain: Any, origin: Vec3, direction: Vec3) -> float:
     return ray(terrain, origin, direction, FARTHEST)
 
 
-@implements(to_ground, inline=True)
+@overload_for(to_ground, inline=True)
 def _to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) -> Any:
     return _to_level if terrain.instance_class is Level else _to_relief
 
 
-@leaf
+@always_inline
 def _distance(p: Rangefinder, truth: Truth) -> float:
     azimuth, elevation = math.radians(p.azimuth_deg), math.radians(p.elevation_deg)
     across = math.cos(elevation)

@@ -11,8 +11,8 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray, surface
 from lapwing.dynamics.vector import add, apply, dot, scale
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
@@ -44,12 +44,12 @@ def _distance(p: Sonar, truth: Truth) -> float:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_distance, inline=True)
+@overload_for(_distance, inline=True)
 def _distance_over(p: types.Type, truth: types.Type) -> Any:
     return _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
 
 
-@leaf
+@always_inline
 def _over_level(p: Sonar, truth: Truth) -> float:
     cosine = rotation_matrix(truth.attitude)[8]
     tilt = math.acos(min(max(cosine, -1.0), 1.0))

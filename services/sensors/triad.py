@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Lt
 
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, Line, carry, new_line
 
@@ -70,7 +70,7 @@ class Units(NamedTuple):
     resolution: float
 
 
-@leaf
+@always_inline
 def gyro_units(g: Gyro) -> Units:
     """The errors of gyroscopes in SI units."""
     return Units(
@@ -86,7 +86,7 @@ def gyro_units(g: Gyro) -> Units:
     )
 
 
-@leaf
+@always_inline
 def accelerometer_units(a: Accelerometer) -> Units:
     """The errors of accelerometers in SI units."""
     return Units(

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import Reference
 from lapwing.services.trajectory import polynomial_piece
 
@@ -16,7 +16,7 @@ class TrajectoryPath(NamedTuple):
     interval: float  # [s] a tick
 
 
-@leaf
+@always_inline
 def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
     """The reference at `tick`; it has no state."""
     r = polynomial_piece.evaluate(p.path, tick * p.interval)

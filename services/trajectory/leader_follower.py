@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import Reference
 from lapwing.services.trajectory import polynomial_piece
 from lapwing.services.trajectory.block import TrajectoryPath
@@ -19,7 +19,7 @@ class FollowedPath(NamedTuple):
     heading: bool  # whether the way turns with the leader; otherwise it keeps its direction in the world
 
 
-@leaf
+@always_inline
 def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, Vec3]:
     """(position, velocity, acceleration) in the world of a way in a frame at an angle, with its two rates, about z."""
     angle, rate, acceleration = heading
@@ -38,7 +38,7 @@ def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, 
     )
 
 
-@leaf
+@always_inline
 def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
     """The reference at `tick`, with the phases of the vehicle's own way (theory.md, eq. (4.1a)); it has no state."""
     t = tick * p.relative.interval

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 WIDTH = 9  # columns of a coefficient row: six of the quintic, then amplitude, frequency, sweep
 
@@ -57,7 +57,7 @@ class Reference(NamedTuple):
     phase: int  # index of the phase that t lies in
 
 
-@leaf
+@always_inline
 def last_not_after(times: np.ndarray, t: float) -> int:
     """Index of the last entry of ascending `times` that is <= t, or 0."""
     low, high = 0, len(times)
@@ -70,7 +70,7 @@ def last_not_after(times: np.ndarray, t: float) -> int:
     return low
 
 
-@leaf
+@always_inline
 def channel_at(channel: Channel, t: float) -> Vec3:
     """Value, first and second derivative of a channel at time t [s] (theory.md, eq. (4.1))."""
     k = last_not_after(channel.start, t)

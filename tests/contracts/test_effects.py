@@ -18,7 +18,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 ROOT = Path(__file__).parents[2]
 DRONE = load_airframe(ROOT / "lapwing/scenes/vehicles/delivery_drone.toml")
@@ -158,7 +158,7 @@ def test_the_order_of_the_scenes_tables_does_not_matter():
     assert one == effects.from_scene(dict(reversed(ALL.items())), DRONE)
 
 
-@leaf
+@always_inline
 def bare_rate(p, t, m):
     """Gravity, thrust and lag written by hand, from the same constants."""
     layout, w = p.layout, m.rotor_speed

@@ -17,7 +17,7 @@ from lapwing.dynamics.lie.so3 import Rotation
 from lapwing.dynamics.lie.ts2 import Swing, tangent
 from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.state_tree import embed, flatten, unflatten
 
 pytestmark = pytest.mark.long
@@ -40,7 +40,7 @@ class EverySpaceParameters(NamedTuple):
     drive: float
 
 
-@leaf
+@always_inline
 def _turning(drive, t, forward_in_body):
     """Angular velocity that depends on time and attitude."""
     return add((drive * math.cos(t), 0.5 * math.sin(2.0 * t), 0.8 + 0.3 * t), scale(0.7, forward_in_body))
@@ -69,7 +69,7 @@ class TwistedBodyParameters(NamedTuple):
     inertia: Vec3
 
 
-@leaf
+@always_inline
 def twisted_body_rate(p, t, x):
     o = x.omega_body
     torque = cross((0.2, 0.0, 0.9), rotate_back(x.attitude, (0.3 * math.cos(t), 0.0, -1.0)))

@@ -15,10 +15,10 @@ FILES = {
     "plant/__init__.py": "pass\n",
     "plant/constants.py": "GAIN = 2.0\n",
     "plant/inner.py": """
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from .constants import GAIN
 
-@leaf
+@always_inline
 def inner(x):
     return GAIN * x
 """,
@@ -55,11 +55,11 @@ class Spring(NamedTuple):
     stiffness: float
 """,
     "plant/law.py": """
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from plant.spring import Spring
 from plant.table import FORCES
 
-@leaf
+@always_inline
 def law(p):
     return 10.0 * p.stiffness
 
@@ -76,9 +76,9 @@ def times(n):
     return product
 """,
     "plant/large.py": """
-from lapwing.kernels import apart, kernel
+from lapwing.kernels import kernel, noinline
 
-@apart
+@noinline
 def large(x):
     if x < 0.0:
         raise ValueError("below zero")
@@ -98,13 +98,13 @@ def outermost(x):
 """,
     "plant/slow.py": """
 import os, time
-from lapwing.kernels.codegen import implements
+from lapwing.kernels.codegen import overload_for
 from lapwing.kernels import kernel
 
 def held(x):
     raise NotImplementedError
 
-@implements(held)
+@overload_for(held)
 def _held(x):
     if "BEGUN" in os.environ:
         open(os.environ["BEGUN"], "w").close()

@@ -2,34 +2,34 @@
 
 from numba.core import types
 
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import any_of, define, each, each_index, fold, generated
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import any_in_tuple, compile_source, generated_overload, map_index, map_tuple, reduce_tuple
 
 
-@leaf
+@always_inline
 def weighted(k, x, y):
     return k * x + y
 
 
-@leaf
+@always_inline
 def taken(x, y, i):
     return x[i] - y[i]
 
 
 def _first(x):
-    return define("first(x)", {}, "return x[0]" if isinstance(x, types.BaseTuple) else "return x")
+    return compile_source("first(x)", {}, "return x[0]" if isinstance(x, types.BaseTuple) else "return x")
 
 
-first = generated("first(x)", _first, "The first number.")
+first = generated_overload("first(x)", _first, "The first number.")
 
 
 @kernel
 def all_of(x, y):
-    return each(weighted, 2.0, x, y), each_index(taken, x, x, y), first(x), first(x[1])
+    return map_tuple(weighted, 2.0, x, y), map_index(taken, x, x, y), first(x), first(x[1])
 
 
 def test_defines_a_function_of_several_lines():
-    assert define("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
+    assert compile_source("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
 
 
 def test_compiled_and_uncompiled_are_the_same():
@@ -40,10 +40,10 @@ def test_compiled_and_uncompiled_are_the_same():
 
 @kernel
 def any_above(x, y):
-    return any_of(each(above, 0.0, x, y))
+    return any_in_tuple(map_tuple(above, 0.0, x, y))
 
 
-@leaf
+@always_inline
 def above(_, x, y):
     return x > y
 
@@ -51,17 +51,17 @@ def above(_, x, y):
 def test_any_of_a_tuple():
     for y, found in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
         assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == found
-    assert not any_of(())
+    assert not any_in_tuple(())
 
 
-@leaf
+@always_inline
 def appended(common, value, x, y):
     return common * value + x * y
 
 
 @kernel
 def folded(x, y):
-    return fold(appended, 10.0, 1.0, x, y)
+    return reduce_tuple(appended, 10.0, 1.0, x, y)
 
 
 def test_folds_in_order():

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 FILES = [p for folder in ("services", "lapwing") for p in (ROOT / folder).rglob("*.py")]
-FOUND = [path for path in FILES if "@implements(" in path.read_text(encoding="utf-8")]
+FOUND = [path for path in FILES if "@overload_for(" in path.read_text(encoding="utf-8")]
 
 
 @pytest.mark.parametrize("path", FOUND, ids=lambda path: str(path.relative_to(ROOT)))
@@ -18,6 +18,6 @@ def test_an_implementation_is_in_the_module_of_its_function(path):
         d
         for f in functions
         for d in f.decorator_list
-        if isinstance(d, ast.Call) and ast.unparse(d.func) == "implements"
+        if isinstance(d, ast.Call) and ast.unparse(d.func) == "overload_for"
     ]
     assert {ast.unparse(call.args[0]) for call in calls} <= {f.name for f in functions}

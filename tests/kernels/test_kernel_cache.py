@@ -87,7 +87,8 @@ def test_a_constant_set_from_outside_counts_as_an_edit(package):
 def test_an_implementation_registered_elsewhere_counts_as_an_edit(package):
     package.run(TOTAL)
     (package.folder / "other.py").write_text(
-        "import plant.law\nfrom lapwing.kernels import leaf\n\n@leaf\ndef law(p):\n    return -p.stiffness\n\n"
+        "import plant.law\nfrom lapwing.kernels import always_inline\n\n"
+        "@always_inline\ndef law(p):\n    return -p.stiffness\n\n"
         "plant.law.FORCES[plant.law.Spring] = law\n"
     )
     assert package.run(f"import other\n{TOTAL}")["values"] == {"total": -3.0}

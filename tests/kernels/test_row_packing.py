@@ -11,7 +11,7 @@ from numba.core.errors import TypingError
 
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.kernels import kernel
-from lapwing.kernels.row_packing import columns, load, reader, store, to_row, width
+from lapwing.kernels.row_packing import columns, load, pack_row, row_unpacker, row_width, store
 
 
 class Inner(NamedTuple):
@@ -31,8 +31,8 @@ LIKE = Tree(1.0, Quaternion(1.0, 0.0, 0.0, 0.0), Inner((2.0, 3.0, 4.0), True), (
 
 
 def test_columns_are_the_numbers_of_each_part():
-    rows = np.stack([to_row(LIKE), 10.0 * to_row(LIKE)])
-    assert rows.shape == (2, width(LIKE))
+    rows = np.stack([pack_row(LIKE), 10.0 * pack_row(LIKE)])
+    assert rows.shape == (2, row_width(LIKE))
     found = columns(LIKE, rows)
     assert found.time.tolist() == [1.0, 10.0]
     assert found.attitude.shape == (2, 4)
@@ -44,11 +44,11 @@ def test_columns_are_the_numbers_of_each_part():
 
 def test_a_row_is_read_as_the_tree_that_it_was_made_of():
     tree = LIKE._replace(time=0.1, inner=Inner((1e-300, -0.0, math.inf), False))
-    read = reader(LIKE)(to_row(tree))
+    read = row_unpacker(LIKE)(pack_row(tree))
     assert repr(read) == repr(tree)
     several = ((1, True), (2.5,), ())
-    assert repr(reader(several)(to_row(several))) == repr(several)
-    assert reader(3)(to_row(2**53)) == 2**53
+    assert repr(row_unpacker(several)(pack_row(several))) == repr(several)
+    assert row_unpacker(3)(pack_row(2**53)) == 2**53
 
 
 @kernel
@@ -65,7 +65,7 @@ class Counted(NamedTuple):
 
 @pytest.mark.parametrize("tree", [Counted(-7, LIKE), Counted(2**53, LIKE._replace(time=-0.0)), (2.5, (True, 3), ())])
 def test_compiled_code_reads_and_writes_the_same_rows(tree):
-    rows = np.stack([np.full(width(tree), math.nan), to_row(tree), np.full(width(tree), 9.0)])
+    rows = np.stack([np.full(row_width(tree), math.nan), pack_row(tree), np.full(row_width(tree), 9.0)])
     found = _copied(tree, rows, 1, 2)
     assert repr(found) == repr(tree)
     assert rows[2].tobytes() == rows[1].tobytes()
@@ -79,7 +79,7 @@ def test_only_numbers_stand_in_rows():
 
 def test_rows_are_let_go_with_their_columns():
     """Without the garbage collector, which commands run seldom: a page of rows is there no longer than it is used."""
-    rows = np.stack([to_row(LIKE)] * 3)
+    rows = np.stack([pack_row(LIKE)] * 3)
     gone = weakref.ref(rows)
     gc.disable()
     try:

@@ -10,17 +10,17 @@ from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.kernels import kernel
 from lapwing.kernels.simd import (
     any_above,
-    apart,
-    beside,
-    choose,
-    lanes,
+    deinterleave,
+    horizontal_sum,
+    interleave,
     load,
-    root,
-    separate,
-    spread,
+    pack4,
+    select,
+    select_vector,
+    splat,
+    sqrt,
     store,
-    total,
-    where,
+    unpack4,
 )
 
 
@@ -31,7 +31,7 @@ def formula(a, b, s):
 
 @kernel
 def on_lanes(a, b, s):
-    return apart(formula(lanes(a[0], a[1], a[2], a[3]), lanes(b[0], b[1], b[2], b[3]), s))
+    return unpack4(formula(pack4(a[0], a[1], a[2], a[3]), pack4(b[0], b[1], b[2], b[3]), s))
 
 
 def test_arithmetic_is_that_of_floats():
@@ -43,9 +43,9 @@ def test_arithmetic_is_that_of_floats():
 
 @kernel
 def turned(four, v):
-    q = beside(four)
+    q = interleave(four)
     R = quaternion.rotation_matrix(quaternion.multiply(quaternion.conjugate(q), q))
-    return separate((q, vector.apply(R, v), vector.cross(v, quaternion.rotate(q, v))))
+    return deinterleave((q, vector.apply(R, v), vector.cross(v, quaternion.rotate(q, v))))
 
 
 def test_trees_go_in_and_out_in_their_order():
@@ -59,8 +59,8 @@ def test_trees_go_in_and_out_in_their_order():
 
 @kernel
 def chosen(flag, x):
-    f = beside(flag)
-    return apart(where(f, root(beside(x)), -1.0)), total(beside(x))
+    f = interleave(flag)
+    return unpack4(select(f, sqrt(interleave(x)), -1.0)), horizontal_sum(interleave(x))
 
 
 def test_choice_root_and_sum():
@@ -72,8 +72,8 @@ def test_choice_root_and_sum():
 
 @kernel
 def vectors(flag, a, b):
-    f = beside(flag)
-    return separate(choose(f, beside(a), b)), any_above(f)
+    f = interleave(flag)
+    return deinterleave(select_vector(f, interleave(a), b)), any_above(f)
 
 
 def test_choice_of_vectors_and_whether_any_is_chosen():
@@ -84,7 +84,7 @@ def test_choice_of_vectors_and_whether_any_is_chosen():
 
 @kernel
 def moved(a):
-    store(a, 5, load(a, 1) + spread(10.0))
+    store(a, 5, load(a, 1) + splat(10.0))
     return a
 
 

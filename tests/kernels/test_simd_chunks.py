@@ -3,13 +3,13 @@
 import pytest
 
 from lapwing.kernels import kernel
-from lapwing.kernels.simd_chunks import in_fours, one_by_one
+from lapwing.kernels.simd_chunks import chunk4, unchunk4
 
 
 @kernel
 def there_and_back(values):
-    groups = in_fours(values, -1.0)
-    return groups, one_by_one(groups, values)
+    groups = chunk4(values, -1.0)
+    return groups, unchunk4(groups, values)
 
 
 @pytest.mark.parametrize("n", [1, 4, 6])

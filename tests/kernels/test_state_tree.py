@@ -92,13 +92,13 @@ def test_a_state_of_something_else_is_refused():
 
 def test_apart_is_the_largest_difference_relative_to_size():
     y = X._replace(rotors=(X.rotors[0] + 0.3, X.rotors[1]), one=(X.one[0] - 0.01,))
-    assert state_tree.apart(X, y) == pytest.approx(0.3 / (1.0 + X.rotors[0]))
-    assert state_tree.apart(X, X) == state_tree.apart((), ()) == 0.0
+    assert state_tree.relative_difference(X, y) == pytest.approx(0.3 / (1.0 + X.rotors[0]))
+    assert state_tree.relative_difference(X, X) == state_tree.relative_difference((), ()) == 0.0
 
 
 @kernel
 def compiled_apart(x, y):
-    return state_tree.apart(x, y)
+    return state_tree.relative_difference(x, y)
 
 
 def test_apart_of_nested_tuples_is_that_of_their_numbers():
@@ -109,4 +109,4 @@ def test_apart_of_nested_tuples_is_that_of_their_numbers():
         y[4] = math.nan if nan else y[4]
         flat = max(abs(a - b) / (1.0 + abs(a)) for a, b in zip(x, y, strict=True) if not math.isnan(b))
         nested_x, nested_y = (((), (n[:3], n[3:6]), (n[6], (n[7],)), n[8]) for n in (tuple(x), tuple(y)))
-        assert state_tree.apart(nested_x, nested_y) == compiled_apart(nested_x, nested_y) == flat
+        assert state_tree.relative_difference(nested_x, nested_y) == compiled_apart(nested_x, nested_y) == flat

@@ -9,7 +9,7 @@ import lapwing
 from lapwing.dynamics import simd_batch as kernels
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels import kernel
-from lapwing.kernels.row_packing import to_row
+from lapwing.kernels.row_packing import pack_row
 from lapwing.services.scene_resolver import load, resolve
 
 N = 19  # more than a block, less than two
@@ -39,7 +39,7 @@ def alone(k, volts, ticks, start=None):
     core, state = plant.core, plant.start.vehicle
     if start is not None:
         state = state._replace(motion=state.motion._replace(position_world=start))
-    return to_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
+    return pack_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
 
 
 def test_members_are_stepped_side_by_side_in_vector_registers(batch):

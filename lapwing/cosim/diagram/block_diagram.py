@@ -16,7 +16,7 @@ from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_all, 
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode
 from lapwing.cosim.run_errors import DivergedError, LockStepError
-from lapwing.kernels.row_packing import reader, to_row, width
+from lapwing.kernels.row_packing import pack_row, row_unpacker, row_width
 from lapwing.messages.topics import Topic
 
 NEVER = 2**62  # [tick]
@@ -164,12 +164,12 @@ class BlockDiagram:
         """The value of a port at the last tick not after `tick` at which one was due."""
         period = max(1, self.ports[port].period)
         if port not in self._readers:
-            self._readers[port] = reader(self.ports[port].like)
+            self._readers[port] = row_unpacker(self.ports[port].like)
         return self._readers[port](self._rows[port][self._index(port, tick - tick % period)])
 
     def put(self, port: str, tick: int, value: Any) -> None:
         """Give the value of a port at `tick`."""
-        self._rows[port][self._index(port, tick)] = to_row(value)
+        self._rows[port][self._index(port, tick)] = pack_row(value)
 
     def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
         """Give the value of a port at `tick` as numbers, shape (width,)."""
@@ -236,7 +236,7 @@ def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
     """Rows for so many ticks, in the memory of the former ones where these are as many."""
     rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
-    shape = 1 << (rows - 1).bit_length(), max(1, width(port.like))
+    shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.like))
     if former is None or former.shape != shape:
         return np.zeros(shape)
     former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # those read before they are written, of ticks before 0

@@ -23,9 +23,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, due
-from lapwing.kernels import kernel, leaf, uncounted
+from lapwing.kernels import always_inline, kernel, no_refcount
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.codegen import define, implements
+from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.kernels.row_packing import load, store
 
 CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
@@ -121,12 +121,12 @@ def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-@implements(step, inline=True)
+@overload_for(step, inline=True)
 def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
     return sys.modules[parameters.instance_class.__module__].step
 
 
-@leaf
+@always_inline
 def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
     """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
     if period == 1:
@@ -134,13 +134,13 @@ def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
     return 0 if period == LATCHED else (stamp // period) & (rows.shape[0] - 1)
 
 
-@leaf
+@always_inline
 def _take(given: InputRing, tick: int) -> InputSample:
     stamp = due(tick, given.period, given.delay)
     return InputSample(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
 
 
-@leaf
+@always_inline
 def _give(value: Any, taken: OutputRing, tick: int) -> None:
     if due(tick, taken.period, 0) >= 0:
         store(value, taken.rows, row_of(tick, taken.period, taken.rows))
@@ -150,23 +150,23 @@ def _take_all(inputs: tuple[InputRing, ...], tick: int) -> tuple[InputSample, ..
     raise NotImplementedError("compiled code only")
 
 
-@implements(_take_all, inline=True)
+@overload_for(_take_all, inline=True)
 def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
     calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
-    return define("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
+    return compile_source("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
 def _give_all(values: tuple, outputs: tuple[OutputRing, ...], tick: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_give_all, inline=True)
+@overload_for(_give_all, inline=True)
 def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
     calls = [f"give(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
-    return define("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
+    return compile_source("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
 
 
-@uncounted
+@no_refcount
 def advance(memory: Any, tick: int) -> int:
     """One step of the part whose `BlockData` is in the cell `memory`; its signal."""
     core = memory.value

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 LATCHED = 0  # period of a port whose value is due at every tick, and stays until another is given
 
@@ -29,7 +29,7 @@ class InputPort(NamedTuple):
     delay: int = 0
 
 
-@leaf
+@always_inline
 def due(tick: int, period: int, delay: int) -> int:
     """The tick with which the message due at `tick` is stamped; -1 where none is."""
     stamp = tick - delay

@@ -12,13 +12,13 @@ from lapwing.cosim.transport.bus_keys import BATCH_KEY, WAITING_KEY
 from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, way, ways
 from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch
 from lapwing.cosim.transport.publish_watchdog import PublishWatchdog
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.messages.topics import Topic
 
 BATCH = 0.1  # [s] of wall time between two batches
 PAGE = 1024  # ticks after which a batch is handed over in any case
 
-_due = uncompiled(due)
+_due = python_function(due)
 
 
 class EndOfRun(Exception):

@@ -20,7 +20,7 @@ import numpy as np
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, due_ticks
-from lapwing.kernels.row_packing import width
+from lapwing.kernels.row_packing import row_width
 from lapwing.messages.topics import topic_named
 
 _PAGE = struct.Struct("<HII")
@@ -45,7 +45,7 @@ class StepPacketCodec:
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
         """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
-        self._ports = [(port.name, port.period, width(port.like)) for port in ports]
+        self._ports = [(port.name, port.period, row_width(port.like)) for port in ports]
         self._periods = sorted({port.period for port in ports})
         self._cycle = math.lcm(*self._periods)  # [ticks] after which bundles hold the same rows again
         self._ticks = ticks

@@ -12,50 +12,50 @@ from numba import types
 
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
 from lapwing.dynamics.vector import add, apply, apply_transposed, cross, dot, norm, pair, scale, subtract
-from lapwing.kernels import leaf, uncompiled
-from lapwing.kernels.codegen import each, implements
+from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.codegen import map_tuple, overload_for
 
 
 def by_axis(along_z: Callable, tilted: Callable, axis: tuple, given: Any) -> Any:
     """`along_z(given)` where rotors have no axes of their own, otherwise `tilted(given)`; both compiled."""
-    return uncompiled(tilted if axis else along_z)(given)
+    return python_function(tilted if axis else along_z)(given)
 
 
-@implements(by_axis, inline=True)
+@overload_for(by_axis, inline=True)
 def _by_axis(along_z, tilted, axis, given):
     if len(axis):
         return lambda along_z, tilted, axis, given: tilted(given)
     return lambda along_z, tilted, axis, given: along_z(given)
 
 
-@leaf
+@always_inline
 def _place(_, plan, height):
     return plan[0], plan[1], height
 
 
-@leaf
+@always_inline
 def places(layout):
     """Position of each rotor [m], body coordinates."""
-    plan = each(pair, 0.0, layout.x_body, layout.y_body)
-    return each(_place, 0.0, plan, layout.z_body)
+    plan = map_tuple(pair, 0.0, layout.x_body, layout.y_body)
+    return map_tuple(_place, 0.0, plan, layout.z_body)
 
 
-@leaf
+@always_inline
 def _product(_, a, b):
     return a * b
 
 
-@leaf
+@always_inline
 def _thrust_along_z(given):
     layout, loads = given
     return total(loads.thrust), (
-        total(each(_product, 0.0, layout.y_body, loads.thrust)),
-        -total(each(_product, 0.0, layout.x_body, loads.thrust)),
-        total(each(_product, 0.0, layout.reaction_sign, loads.torque)),
+        total(map_tuple(_product, 0.0, layout.y_body, loads.thrust)),
+        -total(map_tuple(_product, 0.0, layout.x_body, loads.thrust)),
+        total(map_tuple(_product, 0.0, layout.reaction_sign, loads.torque)),
     )
 
 
-@leaf
+@always_inline
 def _push(_, axis, load):
     """(force [N], torque [N m]) of a rotor: r x T a + s Q a (theory.md, eq. (1.6b))."""
     place, thrust, reaction = load
@@ -63,20 +63,20 @@ def _push(_, axis, load):
     return force, add(cross(place, force), scale(reaction, axis))
 
 
-@leaf
+@always_inline
 def _load(_, place, both):
     return place, both[0], both[1]
 
 
-@leaf
+@always_inline
 def _thrust_tilted(given):
     layout, loads = given
-    reaction = each(_product, 0.0, layout.reaction_sign, loads.torque)
-    pushes = each(_load, 0.0, places(layout), each(pair, 0.0, loads.thrust, reaction))
-    return total_wrench(each(_push, 0.0, layout.axis, pushes))
+    reaction = map_tuple(_product, 0.0, layout.reaction_sign, loads.torque)
+    pushes = map_tuple(_load, 0.0, places(layout), map_tuple(pair, 0.0, loads.thrust, reaction))
+    return total_wrench(map_tuple(_push, 0.0, layout.axis, pushes))
 
 
-@leaf
+@always_inline
 def thrust_wrench(layout, loads):
     """(thrust, torque [N m]) of all rotors in body coordinates.
 
@@ -92,7 +92,7 @@ def in_world(thrust: Any, R_world_body: tuple) -> tuple:
     return (thrust * R_world_body[2], thrust * R_world_body[5], thrust * R_world_body[8])
 
 
-@implements(in_world, inline=True)
+@overload_for(in_world, inline=True)
 def _in_world(thrust, R_world_body):
     if isinstance(thrust, types.BaseTuple):
         return lambda thrust, R_world_body: apply(R_world_body, thrust)
@@ -107,50 +107,50 @@ def beside(thrust: Any, force: tuple) -> tuple:
     return add(force, thrust) if isinstance(thrust, tuple) else (force[0], force[1], force[2] + thrust)
 
 
-@implements(beside, inline=True)
+@overload_for(beside, inline=True)
 def _beside(thrust, force):
     if isinstance(thrust, types.BaseTuple):
         return lambda thrust, force: add(force, thrust)
     return lambda thrust, force: (force[0], force[1], force[2] + thrust)
 
 
-@leaf
+@always_inline
 def air_body(s):
     """(velocity [m/s], rate [rad/s]) of the body against the air around it, body coordinates."""
     air = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))
     return air, subtract(s.motion.omega_body, s.air_rate_body)
 
 
-@leaf
+@always_inline
 def _axial_along_z(c, x, y):
     axial, omega = c
     return axial + omega[0] * y - omega[1] * x
 
 
-@leaf
+@always_inline
 def _axial_speeds_along_z(s):
     air, omega = air_body(s)
-    return each(_axial_along_z, (air[2], omega), s.layout.x_body, s.layout.y_body)
+    return map_tuple(_axial_along_z, (air[2], omega), s.layout.x_body, s.layout.y_body)
 
 
-@leaf
+@always_inline
 def _axial_tilted(c, place, axis):
     air, omega = c
     return dot(axis, add(air, cross(omega, place)))
 
 
-@leaf
+@always_inline
 def _axial_speeds_tilted(s):
-    return each(_axial_tilted, air_body(s), places(s.layout), s.layout.axis)
+    return map_tuple(_axial_tilted, air_body(s), places(s.layout), s.layout.axis)
 
 
-@leaf
+@always_inline
 def axial_speeds(s):
     """Air speed of each hub along its rotor's axis [m/s], the body's turning included."""
     return by_axis(_axial_speeds_along_z, _axial_speeds_tilted, s.layout.axis, s)
 
 
-@leaf
+@always_inline
 def _hub_along_z(c, plan, z):
     air, omega = c
     x, y = plan
@@ -158,13 +158,13 @@ def _hub_along_z(c, plan, z):
     return air[2] + omega[0] * y - omega[1] * x, math.sqrt(ahead * ahead + aside * aside)
 
 
-@leaf
+@always_inline
 def _hubs_along_z(s):
-    plan = each(pair, 0.0, s.layout.x_body, s.layout.y_body)
-    return each(_hub_along_z, air_body(s), plan, s.layout.z_body)
+    plan = map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body)
+    return map_tuple(_hub_along_z, air_body(s), plan, s.layout.z_body)
 
 
-@leaf
+@always_inline
 def _hub_tilted(c, place, axis):
     air, omega = c
     speed = add(air, cross(omega, place))
@@ -172,12 +172,12 @@ def _hub_tilted(c, place, axis):
     return axial, norm(subtract(speed, scale(axial, axis)))
 
 
-@leaf
+@always_inline
 def _hubs_tilted(s):
-    return each(_hub_tilted, air_body(s), places(s.layout), s.layout.axis)
+    return map_tuple(_hub_tilted, air_body(s), places(s.layout), s.layout.axis)
 
 
-@leaf
+@always_inline
 def hub_speeds(s):
     """(axial, across) air speed of each hub [m/s], the body's turning included."""
     return by_axis(_hubs_along_z, _hubs_tilted, s.layout.axis, s)

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.terrain import Level, over_plane, summit, touch, upright
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, apply_transposed, cross, dot, scale
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each, implements
-from lapwing.kernels.simd import beside, separate, spread, where
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.simd import deinterleave, interleave, select, splat
 
 NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is nowhere is under nothing
 
@@ -23,7 +23,7 @@ class Stance(NamedTuple):
     R_world_body: Mat3
 
 
-@leaf
+@always_inline
 def stance_of(e, motion, R_world_body):
     """Computed once for all feet."""
     omega_world = apply(R_world_body, motion.omega_body)
@@ -37,7 +37,7 @@ def stance_of(e, motion, R_world_body):
     )
 
 
-@leaf
+@always_inline
 def in_reach(stance, feet_body):
     """Above zero for feet that may touch: the cheap question that spares most of them the rest."""
     return -(stance.over + dot(stance.upright_body, feet_body))
@@ -55,7 +55,7 @@ class FootContact(NamedTuple):
     approach: float  # [m/s] at which it grows
 
 
-@leaf
+@always_inline
 def _touch(terrain, place_world, _):
     return touch(terrain, place_world)
 
@@ -65,24 +65,24 @@ def _touch_four(terrain: Any, places_world: Vec3) -> tuple[float, Vec3]:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_touch_four, inline=True)
+@overload_for(_touch_four, inline=True)
 def _touch_four_on(terrain, places_world):
     if terrain.instance_class is Level:
 
         def level(terrain, places_world):
             depth, normal = touch(terrain, places_world)
-            return depth, (spread(normal[0]), spread(normal[1]), spread(normal[2]))
+            return depth, (splat(normal[0]), splat(normal[1]), splat(normal[2]))
 
         return level
 
     def one_by_one(terrain, places_world):
-        places = separate(places_world)
-        return beside(each(_touch, terrain, places, places))
+        places = deinterleave(places_world)
+        return interleave(map_tuple(_touch, terrain, places, places))
 
     return one_by_one
 
 
-@leaf
+@always_inline
 def footing(e, stance, feet_body):
     """The footing of four feet (theory.md, eq. (2.12))."""
     arm = apply(stance.R_world_body, feet_body)
@@ -91,7 +91,7 @@ def footing(e, stance, feet_body):
     velocity = add(stance.velocity_world, cross(stance.omega_world, arm))
     approach = -dot(velocity, normal)
     onset = depth * e.inverse_width
-    onset = where(1.0 - onset, onset, 1.0)
+    onset = select(1.0 - onset, onset, 1.0)
     press = onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach)
-    press = where(depth, where(press, press, 0.0), 0.0)
+    press = select(depth, select(press, press, 0.0), 0.0)
     return FootContact(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)

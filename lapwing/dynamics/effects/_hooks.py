@@ -48,8 +48,8 @@ from numba.core.errors import TypingError
 
 from lapwing.dynamics.effects._axes import beside, in_world
 from lapwing.dynamics.vector import add, apply
-from lapwing.kernels import DispatchTable, leaf
-from lapwing.kernels.codegen import define, generated
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import compile_source, generated_overload
 
 HOOKS: dict[str, DispatchTable] = {}
 
@@ -59,7 +59,7 @@ def _hook(name: str) -> Callable:
 
     def for_type(parameters: type) -> Callable:
         def register(function: Callable) -> Callable:
-            registered[parameters] = leaf(function)
+            registered[parameters] = always_inline(function)
             return registered[parameters]
 
         return register
@@ -123,9 +123,9 @@ def _written_out(
         end = default if default and not lines else result
         if end == "memory":
             end = f"({', '.join(members)}{',' if len(members) == 1 else ''})"
-        return define(signature, names, *lines, f"return {end}")
+        return compile_source(signature, names, *lines, f"return {end}")
 
-    return generated(signature, generate, f"The effects' `{hook}`, one after the other.", inline=True)
+    return generated_overload(signature, generate, f"The effects' `{hook}`, one after the other.", inline=True)
 
 
 def _chain(hook: str, before: str = "") -> Callable:
@@ -252,10 +252,10 @@ def _all_calm(effects: Any, *_rest: Any) -> Callable:
     stiff = [i for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)]
     names = {f"f{i}": HOOKS["asleep"][effects.types[i].instance_class] for i in stiff}
     calm = " and ".join(f"f{i}(effects[{i}], memory[{i}], motion, h)" for i in stiff)
-    return define("all_calm(effects, memory, motion, h)", names, f"return {calm or 'True'}")
+    return compile_source("all_calm(effects, memory, motion, h)", names, f"return {calm or 'True'}")
 
 
-all_calm = generated(
+all_calm = generated_overload(
     "all_calm(effects, memory, motion, h)",
     _all_calm,
     "Whether every effect that is stiff is asleep.",
@@ -265,10 +265,10 @@ all_calm = generated(
 
 def _without_sleepers(effects: Any, _: Any) -> Callable:
     kept = "".join(f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["asleep"])
-    return define("without_sleepers(effects, values)", {}, f"return ({kept})")
+    return compile_source("without_sleepers(effects, values)", {}, f"return ({kept})")
 
 
-without_sleepers = generated(
+without_sleepers = generated_overload(
     "without_sleepers(effects, values)",
     _without_sleepers,
     "The members of `values`, one for each effect, that belong to effects that never sleep.",

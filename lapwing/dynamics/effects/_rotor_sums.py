@@ -2,7 +2,7 @@
 
 from lapwing.dynamics.effects._types import PerRotor
 from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels.codegen import define, implements
+from lapwing.kernels.codegen import compile_source, overload_for
 
 
 def total(a: PerRotor) -> float:
@@ -10,13 +10,13 @@ def total(a: PerRotor) -> float:
     return sum(a)
 
 
-@implements(total, inline=True)
+@overload_for(total, inline=True)
 def _total(a):
     def pairs(terms):
         half = len(terms) // 2
         return terms[0] if len(terms) == 1 else f"({pairs(terms[:half])} + {pairs(terms[half:])})"
 
-    return define("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
+    return compile_source("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
 
 
 def total_vector(a: tuple[Vec3, ...]) -> Vec3:
@@ -27,10 +27,10 @@ def total_vector(a: tuple[Vec3, ...]) -> Vec3:
     return found
 
 
-@implements(total_vector, inline=True)
+@overload_for(total_vector, inline=True)
 def _total_vector(a):
     lines = [f"found = add(found, a[{i}])" for i in range(1, len(a))]
-    return define("total_vector(a)", {"add": add}, "found = a[0]", *lines, "return found")
+    return compile_source("total_vector(a)", {"add": add}, "found = a[0]", *lines, "return found")
 
 
 def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
@@ -41,7 +41,7 @@ def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
     return force, torque
 
 
-@implements(total_wrench, inline=True)
+@overload_for(total_wrench, inline=True)
 def _total_wrench(a):
     lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
-    return define("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")
+    return compile_source("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")

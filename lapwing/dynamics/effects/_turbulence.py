@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.terrain import LEVEL, surface
 from lapwing.dynamics.vector import Vec3, norm, subtract
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 KIND = "turbulence"
 FOOT = 0.3048  # [m]
@@ -44,7 +44,7 @@ def conditions(table: dict) -> Conditions:
     return Conditions(given.wind_speed, airspeed, altitude, math.cos(given.heading), math.sin(given.heading))
 
 
-@leaf
+@always_inline
 def intensity(wind_speed, altitude):
     """(standard deviations [m/s], scales [m]) along, across and vertical to the wind (theory.md, eq. (2.20))."""
     feet = altitude / FOOT
@@ -54,7 +54,7 @@ def intensity(wind_speed, altitude):
     return (horizontal, horizontal, vertical), (scale, scale, altitude)
 
 
-@leaf
+@always_inline
 def surroundings(c: Conditions, s: Any) -> tuple[float, float]:
     """(altitude over the ground [m], airspeed [m/s]) of a vehicle in a situation."""
     x, y, z = s.motion.position_world
@@ -66,7 +66,7 @@ def surroundings(c: Conditions, s: Any) -> tuple[float, float]:
     return altitude, airspeed
 
 
-@leaf
+@always_inline
 def passing(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
     """(standard deviations [m/s], airspeed over scale [1/s]) for a vehicle in a situation."""
     altitude, airspeed = surroundings(c, s)
@@ -74,20 +74,20 @@ def passing(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
     return sigma, (airspeed / scale[0], airspeed / scale[1], airspeed / scale[2])
 
 
-@leaf
+@always_inline
 def in_world(c: Conditions, u: float, v: float, w: float) -> Vec3:
     """Gusts along, across and vertical to the wind in world coordinates."""
     return (c.cosine * u - c.sine * v, c.sine * u + c.cosine * v, w)
 
 
-@leaf
+@always_inline
 def first_order(x, theta, n):
     """State of the longitudinal filter `theta` correlation times later (theory.md, eq. (2.22))."""
     kept = math.exp(-theta)
     return kept * x + math.sqrt(1.0 - kept * kept) * n
 
 
-@leaf
+@always_inline
 def second_order(x1, x2, theta, n1, n2):
     """The states of the transverse filter `theta` correlation times later (theory.md, eq. (2.23))."""
     kept = math.exp(-theta)
@@ -101,7 +101,7 @@ def second_order(x1, x2, theta, n1, n2):
     return kept * x1 + root * n1, kept * (x2 + theta * x1) + cross * n1 + rest * n2
 
 
-@leaf
+@always_inline
 def transverse(x1, x2):
     """Output of the transverse filter, with unit variance (theory.md, eq. (2.24))."""
     return math.sqrt(3.0) * x1 + (1.0 - math.sqrt(3.0)) * x2

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects._hooks import HOOKS
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import DispatchTable, leaf
-from lapwing.kernels.codegen import define, generated
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import compile_source, generated_overload
 
 
 class NeighbourState(NamedTuple):
@@ -44,7 +44,7 @@ def interact(parameters: type) -> Any:
     """Register the hook of a parameter class."""
 
     def register(function: Any) -> Any:
-        INTERACT[parameters] = leaf(function)
+        INTERACT[parameters] = always_inline(function)
         return INTERACT[parameters]
 
     return register
@@ -69,10 +69,10 @@ def _all_interactions(effects: Any, *_rest: Any) -> Any:
             names[f"f{i}"] = INTERACT[effect.instance_class]
         members.append(f"f{i}(effects[{i}], memory[{i}], own, others, interval)" if known else f"memory[{i}]")
     values = "".join(f"{member}, " for member in members)
-    return define("all_interactions(effects, memory, own, others, interval)", names, f"return ({values})")
+    return compile_source("all_interactions(effects, memory, own, others, interval)", names, f"return ({values})")
 
 
-all_interactions = generated(
+all_interactions = generated_overload(
     "all_interactions(effects, memory, own, others, interval)",
     _all_interactions,
     "The effects' memory after each that knows of other vehicles has looked at them.",

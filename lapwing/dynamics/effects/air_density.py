@@ -7,7 +7,7 @@ from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import air, sample
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
-from lapwing.kernels import leaf, uncompiled
+from lapwing.kernels import always_inline, python_function
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -39,10 +39,10 @@ class AirDensity(NamedTuple):
 
     def initial_memory(self) -> tuple[float, float]:
         """The tangent at home."""
-        return uncompiled(_tangent)(self, 0.0)
+        return python_function(_tangent)(self, 0.0)
 
 
-@leaf
+@always_inline
 def _tangent(e, height):
     altitude = e.home_altitude + height
     slope = density_slope(e.atmosphere, altitude)

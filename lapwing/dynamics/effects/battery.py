@@ -8,8 +8,8 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import gauge, sample, supply
 from lapwing.dynamics.effects._rotor_sums import total
-from lapwing.kernels import leaf, uncompiled
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -48,16 +48,16 @@ class Battery(NamedTuple):
 
     def initial_memory(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
-        return (self.charge, self.cells * uncompiled(open_circuit_voltage)(self.charge), 0.0)
+        return (self.charge, self.cells * python_function(open_circuit_voltage)(self.charge), 0.0)
 
 
-@leaf
+@always_inline
 def open_circuit_voltage(charge):
     """[V] of one cell at a charge between 0 and 1."""
     return -1.031 * math.exp(-35.0 * charge) + 3.685 + charge * (0.2156 + charge * (-0.1178 + charge * 0.3201))
 
 
-@leaf
+@always_inline
 def at_most(limit, voltage, _):
     """A voltage, or the limit where that is lower."""
     return min(voltage, limit)
@@ -78,7 +78,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 @supply(Battery)
 def battery(e, memory, voltage):
     """Voltage [V] that each motor gets."""
-    return each(at_most, memory[1], voltage, voltage)
+    return map_tuple(at_most, memory[1], voltage, voltage)
 
 
 @gauge(Battery)

@@ -12,7 +12,7 @@ from lapwing.dynamics.effects._hooks import gauge, sample, supply
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, at_most, open_circuit_voltage
 from lapwing.dynamics.environment import Environment
-from lapwing.kernels.codegen import each
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -117,7 +117,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 @supply(BatteryThevenin)
 def battery_thevenin(e, memory, voltage):
     """Voltage [V] that each motor gets."""
-    return each(at_most, memory[1] * memory[6], voltage, voltage)
+    return map_tuple(at_most, memory[1] * memory[6], voltage, voltage)
 
 
 @gauge(BatteryThevenin)

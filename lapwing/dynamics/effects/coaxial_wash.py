@@ -13,8 +13,8 @@ from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
-from lapwing.kernels import leaf, uncompiled
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -70,7 +70,7 @@ class CoaxialWash(NamedTuple):
             axial: speed of the hubs through the air along their axes [m/s].
             across: the same across them.
         """
-        change, wash = uncompiled(_change), self.flow * speed
+        change, wash = python_function(_change), self.flow * speed
         washes = [wash * any(above) for above in self.above]
         return [
             change(self, (speed, w), ((axial, across), distance))
@@ -80,7 +80,7 @@ class CoaxialWash(NamedTuple):
     def slopes(self) -> WakeSlopes:
         """Of thrusts and torques, all rotors at one speed at rest in the air (theory.md, eq. (2.45))."""
         q, count = self.pitch, len(self.above)
-        t = uncompiled(inflow.thrust_in_wake)(q, 1.0)
+        t = python_function(inflow.thrust_in_wake)(q, 1.0)
         through = q - (q - 1.0) * t
         steep = through * (through - 2.0 * (q - 1.0) * t) - (q - 1.0) - 2.0 * (t + 1.0)
         slope = (4.0 * (t + 1.0) - 3.0 * through) / steep  # of t over the speed of the wake
@@ -127,12 +127,12 @@ def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
     return number, distance
 
 
-@leaf
+@always_inline
 def _square(_, speed, factor):
     return factor * speed * speed
 
 
-@leaf
+@always_inline
 def _flow(c, above, _):
     """[m/s] induced velocity of the rotor above."""
     flow, squares = c
@@ -142,7 +142,7 @@ def _flow(c, above, _):
     return flow * math.sqrt(square)
 
 
-@leaf
+@always_inline
 def _change(e, both, place):
     """(change of thrust [N], change of torque [N m]) at a density of 1."""
     speed, wash = both
@@ -158,18 +158,18 @@ def _change(e, both, place):
     return static * (thrust - 1.0), static * e.flow * (thrust * through - 1.0)
 
 
-@leaf
+@always_inline
 def _more(density, before, both):
     factor, change = both
     return before + density * factor * change
 
 
-@leaf
+@always_inline
 def _first(_, change, factor):
     return factor, change[0]
 
 
-@leaf
+@always_inline
 def _second(_, change, factor):
     return factor, change[1]
 
@@ -178,8 +178,10 @@ def _second(_, change, factor):
 def coaxial_wash(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed = s.motion.rotor_speed
-    squares = each(_square, 0.0, speed, factors.thrust)
-    wash = each(_flow, (e.flow, squares), e.above, e.above)
-    change = each(_change, e, each(pair, 0.0, speed, wash), each(pair, 0.0, hub_speeds(s), e.distance))
-    thrust, torque = each(_first, 0.0, change, factors.thrust), each(_second, 0.0, change, factors.torque)
-    return Loads(each(_more, s.air.density, before.thrust, thrust), each(_more, s.air.density, before.torque, torque))
+    squares = map_tuple(_square, 0.0, speed, factors.thrust)
+    wash = map_tuple(_flow, (e.flow, squares), e.above, e.above)
+    change = map_tuple(_change, e, map_tuple(pair, 0.0, speed, wash), map_tuple(pair, 0.0, hub_speeds(s), e.distance))
+    thrust, torque = map_tuple(_first, 0.0, change, factors.thrust), map_tuple(_second, 0.0, change, factors.torque)
+    return Loads(
+        map_tuple(_more, s.air.density, before.thrust, thrust), map_tuple(_more, s.air.density, before.torque, torque)
+    )

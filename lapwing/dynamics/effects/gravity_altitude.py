@@ -7,7 +7,7 @@ from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import field, sample, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -49,7 +49,7 @@ class GravityAltitude(NamedTuple):
         return (self.acceleration_at_home,)
 
 
-@leaf
+@always_inline
 def _at(e, height):
     ratio = EARTH_RADIUS / (EARTH_RADIUS + e.home_altitude + height)
     return e.acceleration * ratio * ratio

@@ -18,15 +18,15 @@ from lapwing.dynamics.effects._hooks import asleep, contact, contact_forces, eve
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import any_of, each, fold, implements
-from lapwing.kernels.simd import any_above, beside, choose, root, separate, where
-from lapwing.kernels.simd_chunks import in_fours, one_by_one
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import any_in_tuple, map_tuple, overload_for, reduce_tuple
+from lapwing.kernels.simd import any_above, deinterleave, interleave, select, select_vector, sqrt
+from lapwing.kernels.simd_chunks import chunk4, unchunk4
 
 WALL = 0.5  # z of the normal of a face, below which it is a wall
 
 
-@leaf
+@always_inline
 def _far(e, motion, h):
     """Can no foot reach the ground within a step, whatever happens in it?"""
     velocity = motion.velocity_world
@@ -35,21 +35,21 @@ def _far(e, motion, h):
     return over > e.reach + h * (2.0 * approach + h * SUDDEN)
 
 
-@leaf
+@always_inline
 def _spring(e, anchor, foot):
     """Pull of the anchors on four feet, tangential [N]; none before a foot has touched."""
-    k = where(anchor[3], e.tangential_stiffness, 0.0)
+    k = select(anchor[3], e.tangential_stiffness, 0.0)
     pull, n = scale(k, subtract(anchor, foot.place)), foot.normal
     # brought into the plane along z: by its normal, feet on a slope would step on at 1 ms
     along_z = (pull[0], pull[1], -(n[0] * pull[0] + n[1] * pull[1]) / n[2])
-    return choose(n[2] - WALL, along_z, subtract(pull, scale(dot(n, pull), n)))
+    return select_vector(n[2] - WALL, along_z, subtract(pull, scale(dot(n, pull), n)))
 
 
-@leaf
+@always_inline
 def _trial(e, anchor, foot):
     """(force if the feet stick, maximum friction) [N]."""
     sliding = anchor[3] - STICKING
-    limit = where(sliding, e.dynamic, where(anchor[3], e.static, e.dynamic)) * foot.press
+    limit = select(sliding, e.dynamic, select(anchor[3], e.static, e.dynamic)) * foot.press
     return subtract(_spring(e, anchor, foot), scale(e.damping, foot.slip)), limit
 
 
@@ -57,7 +57,7 @@ def _friction(e, memory, foot):
     raise NotImplementedError("compiled code only")
 
 
-@implements(_friction, inline=True)
+@overload_for(_friction, inline=True)
 def _friction_by_law(e, memory, foot):
     if e.instance_class is GroundContact:
 
@@ -65,53 +65,53 @@ def _friction_by_law(e, memory, foot):
             trial, limit = _trial(e, memory, foot)
             square = dot(trial, trial)
             over = square - limit * limit
-            return choose(over, scale(limit / root(square), trial), trial) if any_above(over) else trial
+            return select_vector(over, scale(limit / sqrt(square), trial), trial) if any_above(over) else trial
 
         return anchored
 
     def smooth(e, memory, foot):
-        speed = root(dot(foot.slip, foot.slip))
+        speed = sqrt(dot(foot.slip, foot.slip))
         x = speed * e.inverse_critical
         below = -foot.press * e.static * e.inverse_critical * (1.5 - 0.5 * x * x)
         y = 2.0 * (x - 1.0)
-        y = where(1.0 - y, y, 1.0)
+        y = select(1.0 - y, y, 1.0)
         coefficient = e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)
-        return scale(where(1.0 - x, below, -coefficient * foot.press / speed), foot.slip)
+        return scale(select(1.0 - x, below, -coefficient * foot.press / speed), foot.slip)
 
     return smooth
 
 
-@leaf
+@always_inline
 def _push(e, stance, feet_body, memory):
     """(force, torque) of four feet, in world coordinates, in lanes; zero where a foot is in the air."""
     foot = footing(e, stance, feet_body)
     force = add(scale(foot.press, foot.normal), _friction(e, memory, foot))
-    pressing = where(in_reach(stance, feet_body), foot.press, 0.0)
-    return choose(pressing, force, ZERO), choose(pressing, cross(foot.arm, force), ZERO)
+    pressing = select(in_reach(stance, feet_body), foot.press, 0.0)
+    return select_vector(pressing, force, ZERO), select_vector(pressing, cross(foot.arm, force), ZERO)
 
 
-@leaf
+@always_inline
 def _in_turn(start, four):
     """`start` plus the four lanes' vectors, added in the order of the feet."""
-    a, b, c, d = separate(four)
+    a, b, c, d = deinterleave(four)
     return add(add(add(add(start, a), b), c), d)
 
 
-@leaf
+@always_inline
 def _pushed(c, before, feet, memory):
     e, stance = c
-    feet_body = beside(feet)
+    feet_body = interleave(feet)
     if not any_above(in_reach(stance, feet_body)):
         return before
-    force, torque = _push(e, stance, feet_body, beside(memory))
+    force, torque = _push(e, stance, feet_body, interleave(memory))
     return _in_turn(before[0], force), _in_turn(before[1], torque)
 
 
 @kernel
 def _feet_wrench(e, memory, motion, R_world_body):
     stance = stance_of(e, motion, R_world_body)
-    feet, memory = in_fours(e.feet, NO_FOOT), in_fours(memory, memory[0])
-    force, torque_world = fold(_pushed, (e, stance), (ZERO, ZERO), feet, memory)
+    feet, memory = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
+    force, torque_world = reduce_tuple(_pushed, (e, stance), (ZERO, ZERO), feet, memory)
     return force, apply_transposed(R_world_body, torque_world)
 
 
@@ -127,19 +127,19 @@ def ground_contact_smooth(e, memory, s, rotors):
     return _feet_wrench(e, memory, s.motion, s.R_world_body)
 
 
-@leaf
+@always_inline
 def _on_points(c, feet, memory):
     e, stance = c
-    feet_body = beside(feet)
+    feet_body = interleave(feet)
     place = add(stance.position_world, apply(stance.R_world_body, feet_body))
-    return separate((place, _push(e, stance, feet_body, beside(memory))[0]))
+    return deinterleave((place, _push(e, stance, feet_body, interleave(memory))[0]))
 
 
-@leaf
+@always_inline
 def _forces(e, memory, motion):
     stance = stance_of(e, motion, rotation_matrix(motion.attitude))
-    feet, fours = in_fours(e.feet, NO_FOOT), in_fours(memory, memory[0])
-    return one_by_one(each(_on_points, (e, stance), feet, fours), e.feet)
+    feet, fours = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
+    return unchunk4(map_tuple(_on_points, (e, stance), feet, fours), e.feet)
 
 
 @contact_forces(GroundContact)
@@ -166,48 +166,48 @@ def far_smooth(e, memory, motion, h):
     return _far(e, motion, h)
 
 
-@leaf
+@always_inline
 def _settled_four(c, feet, memory):
     e, stance, h = c
-    feet_body = beside(feet)
+    feet_body = interleave(feet)
     reached = in_reach(stance, feet_body)
     if not any_above(reached):
         return (NOWHERE, NOWHERE, NOWHERE, NOWHERE)
     foot = footing(e, stance, feet_body)
-    pressing = where(reached, foot.press, 0.0)
-    x, y, z, how, before = beside(memory)
+    pressing = select(reached, foot.press, 0.0)
+    x, y, z, how, before = interleave(memory)
     square = dot(foot.slip, foot.slip)
     since = foot.depth / foot.approach
-    since = where(foot.approach, where(h - since, since, h), h)  # [s] a foot has touched
-    place = choose(how, (x, y, z), subtract(foot.place, scale(since, foot.slip)))
-    how, before = where(how, how, SLIDING), where(how, before, square)
+    since = select(foot.approach, select(h - since, since, h), h)  # [s] a foot has touched
+    place = select_vector(how, (x, y, z), subtract(foot.place, scale(since, foot.slip)))
+    how, before = select(how, how, SLIDING), select(how, before, square)
     anchor = (place[0], place[1], place[2], how)
     trial, limit = _trial(e, anchor, foot)
-    over = where(pressing, dot(trial, trial) - limit * limit, 0.0)
-    how = where(over, how, STICKING)
+    over = select(pressing, dot(trial, trial) - limit * limit, 0.0)
+    how = select(over, how, STICKING)
     if any_above(over):
         # a foot that is slowing down is held by the static coefficient, one that breaks away by the dynamic one
-        caught = where(before - e.square_stick_velocity, e.square_stick_velocity, before) - square
+        caught = select(before - e.square_stick_velocity, e.square_stick_velocity, before) - square
         spring = _spring(e, anchor, foot)
-        pull, limit = root(dot(spring, spring)), where(caught, e.static, e.dynamic) * foot.press
-        kept = where(pull - limit, limit / pull, 1.0)
-        place = choose(over, add(foot.place, scale(kept, subtract(place, foot.place))), place)
-        how = where(over, where(caught, STICKING, SLIDING), how)
+        pull, limit = sqrt(dot(spring, spring)), select(caught, e.static, e.dynamic) * foot.press
+        kept = select(pull - limit, limit / pull, 1.0)
+        place = select_vector(over, add(foot.place, scale(kept, subtract(place, foot.place))), place)
+        how = select(over, select(caught, STICKING, SLIDING), how)
     # how high an anchor is counts on a wall only, and would else disturb the error control
-    place = (place[0], place[1], where(foot.normal[2] - WALL, 0.0, place[2]))
-    place = choose(pressing, place, ZERO)
-    return separate((*place, where(pressing, how, FREE), where(pressing, square, 0.0)))
+    place = (place[0], place[1], select(foot.normal[2] - WALL, 0.0, place[2]))
+    place = select_vector(pressing, place, ZERO)
+    return deinterleave((*place, select(pressing, how, FREE), select(pressing, square, 0.0)))
 
 
 @settle(GroundContact)
 def drag_anchors(e, memory, motion, h):
     """Anchors after a step: kept by feet that stick, dragged along by feet that slide."""
     stance = stance_of(e, motion, rotation_matrix(motion.attitude))
-    feet, fours = in_fours(e.feet, NO_FOOT), in_fours(memory, memory[0])
-    return one_by_one(each(_settled_four, (e, stance, h), feet, fours), memory)
+    feet, fours = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
+    return unchunk4(map_tuple(_settled_four, (e, stance, h), feet, fours), memory)
 
 
-@leaf
+@always_inline
 def _lets_go(_, before, after):
     return before[3] + after[3] == STICKING + SLIDING
 
@@ -215,7 +215,7 @@ def _lets_go(_, before, after):
 @event(GroundContact)
 def lets_go(e, before, after):
     """Has any foot begun to slide, or to stick?"""
-    return any_of(each(_lets_go, 0.0, before, after))
+    return any_in_tuple(map_tuple(_lets_go, 0.0, before, after))
 
 
 @substeps(GroundContact)
@@ -240,16 +240,16 @@ def split_smooth(e, memory, motion, h):
     return max(math.ceil(h * e.rate_bound / STABLE), math.ceil(h * friction / STABLE_REAL))
 
 
-@leaf
+@always_inline
 def _press(c, touching, feet, _):
     e, stance = c
-    return touching or any_above(footing(e, stance, beside(feet)).press)
+    return touching or any_above(footing(e, stance, interleave(feet)).press)
 
 
 @kernel
 def _touches(e, motion, R_world_body):
-    feet = in_fours(e.feet, NO_FOOT)
-    return fold(_press, (e, stance_of(e, motion, R_world_body)), False, feet, feet)
+    feet = chunk4(e.feet, NO_FOOT)
+    return reduce_tuple(_press, (e, stance_of(e, motion, R_world_body)), False, feet, feet)
 
 
 @contact(GroundContact)

@@ -8,8 +8,8 @@ from lapwing.dynamics.effects._hooks import asleep, factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -48,7 +48,7 @@ class GroundEffect(NamedTuple):
         return self._replace(highest=self.highest * stretch, terrain=environment.terrain)
 
 
-@leaf
+@always_inline
 def gain(height):
     """Thrust over that far from the ground, at a height in radii."""
     z = max(height, LOWEST)
@@ -57,7 +57,7 @@ def gain(height):
     return 1.0 + square / (1.0 - square) * (1.0 - fade * fade * (3.0 - 2.0 * fade))
 
 
-@leaf
+@always_inline
 def _height(c, x, y):
     e, s = c
     R, (px, py, pz) = s.R_world_body, s.motion.position_world
@@ -65,7 +65,7 @@ def _height(c, x, y):
     return e.inverse_radius * (pz + R[6] * x + R[7] * y - ground)
 
 
-@leaf
+@always_inline
 def _gained(_, factor, height):
     return factor * gain(height)
 
@@ -73,8 +73,8 @@ def _gained(_, factor, height):
 @factors(GroundEffect)
 def ground_effect(e, memory, s, before):
     """Factors on thrust; the torque stays."""
-    heights = each(_height, (e, s), s.layout.x_body, s.layout.y_body)
-    return Factors(each(_gained, 0.0, before.thrust, heights), before.torque)
+    heights = map_tuple(_height, (e, s), s.layout.x_body, s.layout.y_body)
+    return Factors(map_tuple(_gained, 0.0, before.thrust, heights), before.torque)
 
 
 @asleep(GroundEffect)

@@ -7,8 +7,8 @@ from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.effects._rotor_sums import total, total_vector
 from lapwing.dynamics.vector import cross, scale, subtract
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -34,33 +34,33 @@ class GyroscopicTorque(NamedTuple):
         return cls(airframe.rotors.inertia)
 
 
-@leaf
+@always_inline
 def _signed(_, sign, value):
     return sign * value
 
 
-@leaf
+@always_inline
 def _along_z(given):
     e, s, rotors = given
     sign, omega = s.layout.reaction_sign, s.motion.omega_body
     # a rotor that pushes the body to +z turns about -z itself
-    momentum = -e.inertia * total(each(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
-    spin_up = e.inertia * total(each(_signed, 0.0, sign, rotors.acceleration))
+    momentum = -e.inertia * total(map_tuple(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
+    spin_up = e.inertia * total(map_tuple(_signed, 0.0, sign, rotors.acceleration))
     return (-omega[1] * momentum, omega[0] * momentum, spin_up)
 
 
-@leaf
+@always_inline
 def _scaled(_, value, axis):
     return scale(value, axis)
 
 
-@leaf
+@always_inline
 def _sum_along(axis, sign, values):
     """Sum of a value of each rotor along its axis, with the sign of its reaction."""
-    return total_vector(each(_scaled, 0.0, each(_signed, 0.0, sign, values), axis))
+    return total_vector(map_tuple(_scaled, 0.0, map_tuple(_signed, 0.0, sign, values), axis))
 
 
-@leaf
+@always_inline
 def _tilted(given):
     e, s, rotors = given
     sign, axis = s.layout.reaction_sign, s.layout.axis

@@ -10,8 +10,8 @@ from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
 from lapwing.dynamics.vector import add, cross, dot, pair, scale, subtract
 from lapwing.dynamics.vehicles.propeller import h_force_coefficient
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -50,12 +50,12 @@ class HForce(NamedTuple):
         return cls(coefficient, positions[0][2], tuple(x * x + y * y for x, y, _ in positions))
 
 
-@leaf
+@always_inline
 def _product(_, a, b):
     return a * b
 
 
-@leaf
+@always_inline
 def _along_z(given):
     e, s = given
     layout, speed = s.layout, s.motion.rotor_speed
@@ -63,16 +63,16 @@ def _along_z(given):
     # sums over the rotors of speed times 1, x, y and x^2 + y^2 give the force and torque of all of them
     k, h = e.coefficient * s.air.density, e.height
     w = k * total(speed)
-    wx = k * total(each(_product, 0.0, speed, layout.x_body))
-    wy = k * total(each(_product, 0.0, speed, layout.y_body))
-    w_square = k * total(each(_product, 0.0, speed, e.square_arm))
+    wx = k * total(map_tuple(_product, 0.0, speed, layout.x_body))
+    wy = k * total(map_tuple(_product, 0.0, speed, layout.y_body))
+    w_square = k * total(map_tuple(_product, 0.0, speed, e.square_arm))
     x = -(w * (v[0] + h * omega[1]) - wy * omega[2])
     y = -(w * (v[1] - h * omega[0]) + wx * omega[2])
     yaw = wy * (v[0] + h * omega[1]) - wx * (v[1] - h * omega[0]) - w_square * omega[2]
     return (x, y, 0.0), (-h * y, h * x, yaw)
 
 
-@leaf
+@always_inline
 def _of_rotor(c, speed, at):
     k, air, omega = c
     place, axis = at
@@ -81,12 +81,12 @@ def _of_rotor(c, speed, at):
     return force, cross(place, force)
 
 
-@leaf
+@always_inline
 def _tilted(given):
     e, s = given
     air, omega = air_body(s)
-    at = each(pair, 0.0, places(s.layout), s.layout.axis)
-    return total_wrench(each(_of_rotor, (e.coefficient * s.air.density, air, omega), s.motion.rotor_speed, at))
+    at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
+    return total_wrench(map_tuple(_of_rotor, (e.coefficient * s.air.density, air, omega), s.motion.rotor_speed, at))
 
 
 @wrench_body(HForce)

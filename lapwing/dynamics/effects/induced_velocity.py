@@ -11,8 +11,8 @@ from lapwing.dynamics.effects.rotor_inflow import KIND
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -68,7 +68,7 @@ class InducedVelocity(NamedTuple):
         return self.at_rest
 
 
-@leaf
+@always_inline
 def _through(e, axial, speed, induced):
     """[m/s] air through the disc, held to where blades neither stall nor brake hard."""
     blades = e.pitch * speed
@@ -91,10 +91,10 @@ def _followed(c, induced, both):
 @sample(InducedVelocity)
 def follow(e, memory, s, rotors, key, tick, interval):
     """Induced velocity of each rotor for the next interval [m/s]."""
-    return each(_followed, (e, interval), memory, each(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
+    return map_tuple(_followed, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
 
 
-@leaf
+@always_inline
 def _change(e, both, hub):
     """(change of thrust [N], change of torque [N m]) at a density of 1."""
     speed, induced = both
@@ -104,13 +104,13 @@ def _change(e, both, hub):
     return speed * e.slope * (e.hover * speed - through), torque
 
 
-@leaf
+@always_inline
 def _more_thrust(density, before, both):
     factor, change = both
     return before + density * factor * change[0]
 
 
-@leaf
+@always_inline
 def _more_torque(density, before, both):
     factor, change = both
     return before + density * factor * change[1]
@@ -119,8 +119,8 @@ def _more_torque(density, before, both):
 @loads(InducedVelocity)
 def induced_velocity(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
-    change = each(_change, e, each(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
+    change = map_tuple(_change, e, map_tuple(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
     return Loads(
-        each(_more_thrust, s.air.density, before.thrust, each(pair, 0.0, factors.thrust, change)),
-        each(_more_torque, s.air.density, before.torque, each(pair, 0.0, factors.torque, change)),
+        map_tuple(_more_thrust, s.air.density, before.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
+        map_tuple(_more_torque, s.air.density, before.torque, map_tuple(pair, 0.0, factors.torque, change)),
     )

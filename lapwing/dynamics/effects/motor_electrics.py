@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import motor
 from lapwing.dynamics.vector import pair
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -57,13 +57,13 @@ class MotorElectrics(NamedTuple):
         )
 
 
-@leaf
+@always_inline
 def _unlimited(e, speed, voltage):
     """Current [A] without the controller's limits, but that it does not brake."""
     return max(voltage * e.inverse_resistance - (e.motor_constant * e.inverse_resistance) * speed, 0.0)
 
 
-@leaf
+@always_inline
 def _current(e, speed, voltage):
     wanted = min(_unlimited(e, speed, voltage), e.current_limit)
     # the power K w I + R I^2 is at its limit where I = 2 P / (K w + sqrt((K w)^2 + 4 R P))
@@ -73,14 +73,14 @@ def _current(e, speed, voltage):
     return 2.0 * e.power_limit / (back + math.sqrt(back * back + 4.0 * e.power_limit / e.inverse_resistance))
 
 
-@leaf
+@always_inline
 def _acceleration(e, torque, both):
     speed, current = both
     friction = e.no_load_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
     return (e.efficiency * e.motor_constant * e.inverse_inertia) * (current - friction) - torque * e.inverse_inertia
 
 
-@leaf
+@always_inline
 def _power(e, voltage, both):
     """[W] at the controller: of the voltage asked for, or of the lower one that keeps the current in its limits."""
     speed, current = both
@@ -93,6 +93,6 @@ def _power(e, voltage, both):
 def motor_electrics(e, memory, s, loads, voltage):
     """(acceleration [rad/s^2], current [A], power [W]) of each rotor."""
     speed = s.motion.rotor_speed
-    current = each(_current, e, speed, voltage)
-    both = each(pair, 0.0, speed, current)
-    return each(_acceleration, e, loads.torque, both), current, each(_power, e, voltage, both)
+    current = map_tuple(_current, e, speed, voltage)
+    both = map_tuple(pair, 0.0, speed, current)
+    return map_tuple(_acceleration, e, loads.torque, both), current, map_tuple(_power, e, voltage, both)

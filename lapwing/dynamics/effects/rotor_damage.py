@@ -8,8 +8,8 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import factors, sample
 from lapwing.dynamics.effects._types import Factors, PerRotor
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -53,7 +53,7 @@ class RotorDamage(NamedTuple):
         return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.torque_left)
 
 
-@leaf
+@always_inline
 def _product(_, a, b):
     return a * b
 
@@ -67,4 +67,6 @@ def strike(e, memory, s, rotors, key, tick, interval):
 @factors(RotorDamage)
 def rotor_damage(e, memory, s, before):
     """Factors on the damaged rotor's loads."""
-    return Factors(each(_product, 0.0, before.thrust, memory[0]), each(_product, 0.0, before.torque, memory[1]))
+    return Factors(
+        map_tuple(_product, 0.0, before.thrust, memory[0]), map_tuple(_product, 0.0, before.torque, memory[1])
+    )

@@ -11,8 +11,8 @@ from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total_wrench
 from lapwing.dynamics.vector import add, cross, dot, norm, pair, scale, subtract
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -54,7 +54,7 @@ class RotorFlapping(NamedTuple):
         return cls(coefficient, given.stiffness, 1.0 / radius)
 
 
-@leaf
+@always_inline
 def _wrench(c, place, state):
     e, air, omega = c
     thrust, speed = state
@@ -71,7 +71,7 @@ def _wrench(c, place, state):
     return force, (moment[0] + e.stiffness * b, moment[1] - e.stiffness * a, moment[2])
 
 
-@leaf
+@always_inline
 def _wrench_tilted(c, at, state):
     e, air, omega = c
     place, axis = at
@@ -86,23 +86,23 @@ def _wrench_tilted(c, at, state):
     return force, subtract(cross(place, force), scale(e.stiffness, cross(axis, back)))
 
 
-@leaf
+@always_inline
 def _along_z(given):
     e, s, states = given
     air, omega = air_body(s)
-    return total_wrench(each(_wrench, (e, air, omega), places(s.layout), states))
+    return total_wrench(map_tuple(_wrench, (e, air, omega), places(s.layout), states))
 
 
-@leaf
+@always_inline
 def _tilted(given):
     e, s, states = given
     air, omega = air_body(s)
-    at = each(pair, 0.0, places(s.layout), s.layout.axis)
-    return total_wrench(each(_wrench_tilted, (e, air, omega), at, states))
+    at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
+    return total_wrench(map_tuple(_wrench_tilted, (e, air, omega), at, states))
 
 
 @wrench_body(RotorFlapping)
 def rotor_flapping(e, memory, s, rotors):
     """Force [N] and torque [N m] in body coordinates."""
-    states = each(pair, 0.0, rotors.thrust, s.motion.rotor_speed)
+    states = map_tuple(pair, 0.0, rotors.thrust, s.motion.rotor_speed)
     return by_axis(_along_z, _tilted, s.layout.axis, (e, s, states))

@@ -9,8 +9,8 @@ from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -51,23 +51,23 @@ class RotorInflow(NamedTuple):
         )
 
 
-@leaf
+@always_inline
 def _advance(turn_per_metre, axial, speed):
     """[rad/s] of a hub: its axial speed in turns over the pitch, held to where the model is valid."""
     return min(max(turn_per_metre * axial, -0.5 * speed), 0.5 * speed)
 
 
-@leaf
+@always_inline
 def _square_change(_, speed, w):
     return w * (speed + speed - w)
 
 
-@leaf
+@always_inline
 def _less(constant, before, both):
     return before - (constant * both[1]) * both[0]
 
 
-@leaf
+@always_inline
 def _product(_, a, b):
     return a * b
 
@@ -76,9 +76,11 @@ def _product(_, a, b):
 def rotor_inflow(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
-    w = each(_advance, e.turn_per_metre, axial_speeds(s), speed)
-    linear, square = each(_product, 0.0, speed, w), each(_square_change, 0.0, speed, w)
+    w = map_tuple(_advance, e.turn_per_metre, axial_speeds(s), speed)
+    linear, square = map_tuple(_product, 0.0, speed, w), map_tuple(_square_change, 0.0, speed, w)
     return Loads(
-        each(_less, e.thrust_constant * density, before.thrust, each(pair, 0.0, linear, factors.thrust)),
-        each(_less, e.induced_torque_constant * density, before.torque, each(pair, 0.0, square, factors.torque)),
+        map_tuple(_less, e.thrust_constant * density, before.thrust, map_tuple(pair, 0.0, linear, factors.thrust)),
+        map_tuple(
+            _less, e.induced_torque_constant * density, before.torque, map_tuple(pair, 0.0, square, factors.torque)
+        ),
     )

@@ -7,8 +7,8 @@ from annotated_types import Gt, Le
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 KIND = "rotor thrust model"
 
@@ -24,7 +24,7 @@ class RotorQuadratic(NamedTuple):
     torque_constant: Annotated[float, Gt(0), Le(1)]  # [N m s^2/rad^2]
 
 
-@leaf
+@always_inline
 def _added(constant, speed, both):
     return both[0] + constant * (speed * speed) * both[1]
 
@@ -34,6 +34,6 @@ def rotor_quadratic(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed = s.motion.rotor_speed
     return Loads(
-        each(_added, e.thrust_constant, speed, each(pair, 0.0, before.thrust, factors.thrust)),
-        each(_added, e.torque_constant, speed, each(pair, 0.0, before.torque, factors.torque)),
+        map_tuple(_added, e.thrust_constant, speed, map_tuple(pair, 0.0, before.thrust, factors.thrust)),
+        map_tuple(_added, e.torque_constant, speed, map_tuple(pair, 0.0, before.torque, factors.torque)),
     )

@@ -16,8 +16,8 @@ from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._propeller_data import parsed
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -123,7 +123,7 @@ def _check(given: Settings) -> None:
             raise ConfigError(name, f"got {at_rest:g} at J = 0", "a number above 0 there")
 
 
-@leaf
+@always_inline
 def _place(points, x):
     """(index, share of the next) of a value in a growing array, held within it."""
     i = 0
@@ -132,12 +132,12 @@ def _place(points, x):
     return i, min(max((x - points[i]) / (points[i + 1] - points[i]), 0.0), 1.0)
 
 
-@leaf
+@always_inline
 def _along(curves, k, i, a):
     return curves[k, i] + a * (curves[k, i + 1] - curves[k, i])
 
 
-@leaf
+@always_inline
 def _between(curves, k, i, b, a):
     low = _along(curves, k, i, a)
     return low + b * (_along(curves, k + 1, i, a) - low)
@@ -162,7 +162,7 @@ def coefficients(e, axial, across, turns):
     return _between(e.thrust, k, i, b, a), _between(e.torque, k, i, b, a)
 
 
-@leaf
+@always_inline
 def _loads(c, speed, hub):
     e, density = c
     turns = speed / (2.0 * math.pi)
@@ -170,13 +170,13 @@ def _loads(c, speed, hub):
     return density * thrust * turns * turns, density * torque * turns * turns
 
 
-@leaf
+@always_inline
 def _thrust(_, before, both):
     factor, found = both
     return before + factor * found[0]
 
 
-@leaf
+@always_inline
 def _torque(_, before, both):
     factor, found = both
     return before + factor * found[1]
@@ -185,8 +185,8 @@ def _torque(_, before, both):
 @loads(RotorTable)
 def rotor_table(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
-    found = each(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
+    found = map_tuple(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
     return Loads(
-        each(_thrust, 0.0, before.thrust, each(pair, 0.0, factors.thrust, found)),
-        each(_torque, 0.0, before.torque, each(pair, 0.0, factors.torque, found)),
+        map_tuple(_thrust, 0.0, before.thrust, map_tuple(pair, 0.0, factors.thrust, found)),
+        map_tuple(_torque, 0.0, before.torque, map_tuple(pair, 0.0, factors.torque, found)),
     )

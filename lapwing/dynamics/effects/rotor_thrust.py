@@ -7,8 +7,8 @@ from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -42,7 +42,7 @@ class RotorThrust(NamedTuple):
         )
 
 
-@leaf
+@always_inline
 def _times_square(constant, speed, factor):
     return (constant * factor) * (speed * speed)
 
@@ -52,11 +52,15 @@ def rotor_thrust(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
     return Loads(
-        each(_sum, 0.0, before.thrust, each(_times_square, e.thrust_constant * density, speed, factors.thrust)),
-        each(_sum, 0.0, before.torque, each(_times_square, e.torque_constant * density, speed, factors.torque)),
+        map_tuple(
+            _sum, 0.0, before.thrust, map_tuple(_times_square, e.thrust_constant * density, speed, factors.thrust)
+        ),
+        map_tuple(
+            _sum, 0.0, before.torque, map_tuple(_times_square, e.torque_constant * density, speed, factors.torque)
+        ),
     )
 
 
-@leaf
+@always_inline
 def _sum(_, a, b):
     return a + b

@@ -27,7 +27,7 @@ from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -77,7 +77,7 @@ class WindDrydenRates(NamedTuple):
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 0.0), ZERO
 
 
-@leaf
+@always_inline
 def passed(x1, x2, z, beta, theta, n1, n2, n3):
     """The low-passed transverse gust z, `theta` of its correlation times later (theory.md, eq. (2.40)).
 

@@ -12,7 +12,7 @@ from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import sample, wind, wrench
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -69,7 +69,7 @@ def check(table: Mapping, tables: Mapping) -> None:
         raise ConfigError("", message, expected)
 
 
-@leaf
+@always_inline
 def _blow(e, key, number, velocity_world):
     """(force [N], wind [m/s]) of one draw, world."""
     drawn = add(e.mean, scale(e.sigma, normal3(key, number, LANE)))

@@ -8,8 +8,8 @@ import sys
 from collections import namedtuple
 from typing import Any
 
-from lapwing.kernels import DispatchTable, kernel, leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import DispatchTable, always_inline, kernel
+from lapwing.kernels.codegen import overload_for
 from lapwing.kernels.state_tree import finite, flatten
 
 RATES = DispatchTable()
@@ -31,12 +31,12 @@ def _rate(p, t, x):
     """Dispatch by the class of p."""
 
 
-@implements(_rate)
+@overload_for(_rate)
 def _rate_of(p, t, x):
     return RATES[p.instance_class]
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """The tangent at state x and time t of the system with parameters p."""
     return _rate(p, t, x)
@@ -47,7 +47,7 @@ def step(method: Any, p: Any, t: float, x: Any, h: float) -> Any:
     return sys.modules[type(method).__module__].step(rate, p, t, x, h)
 
 
-@implements(step)
+@overload_for(step)
 def _step(method, p, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     return lambda method, p, t, x, h: one_step(rate, p, t, x, h)

@@ -4,9 +4,9 @@ import math
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.integrators._fixed_step import step
-from lapwing.kernels import apart as never_inlined
-from lapwing.kernels import leaf
-from lapwing.kernels.state_tree import apart, finite
+from lapwing.kernels import always_inline
+from lapwing.kernels import noinline as never_inlined
+from lapwing.kernels.state_tree import finite, relative_difference
 
 SHORTEST = 0.01  # [s] times the tolerance: a part no longer than this is not split
 
@@ -18,7 +18,7 @@ class StepDoubling(NamedTuple):
     tolerance: float  # relative to 1 + size
 
 
-@leaf
+@always_inline
 def shorter(part, error, tolerance):
     """What to try instead of a part that was too long (theory.md, eq. (2.33))."""
     return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
@@ -44,7 +44,7 @@ def march_controlled(how, p, t, x, h, end):
         whole = _once(how.method, p, t, x, taken)
         y = _once(how.method, p, t + half, _once(how.method, p, t, x, half), half)
         sound = finite(y)
-        error = apart(y, whole) if sound else math.inf
+        error = relative_difference(y, whole) if sound else math.inf
         if error > allowed and taken > smallest:
             part = shorter(taken, error, allowed)
             continue

@@ -4,7 +4,7 @@ Celledoni, Marthinsen, Owren, Future Gener. Comput. Syst. 19 (2003) 341.
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, retract, scale
 
 ORDER = 4
@@ -13,7 +13,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Four stages and five exponentials, of which x exp(k1/2) is used twice (theory.md, eq. (6.10))."""
     half = 0.5 * h

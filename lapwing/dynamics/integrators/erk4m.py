@@ -5,7 +5,7 @@ differential of the exponential by the curvature at second order (theory.md, eq.
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, retract, scale, transport
 
 ORDER = 3
@@ -15,7 +15,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Classical tableau with retraction for addition, transport for comparison (theory.md, eq. (6.11))."""
     half = 0.5 * h

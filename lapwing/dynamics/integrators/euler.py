@@ -1,7 +1,7 @@
 """Forward Euler in the embedding: the stored numbers are stepped as if space were flat, and drift off the manifold."""
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed
 
 ORDER = 1
@@ -10,7 +10,7 @@ ON_MANIFOLD = False
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """x + h x' (theory.md, eq. (6.1))."""
     return axpy(h, embed(x, rate(p, t, x)), x)

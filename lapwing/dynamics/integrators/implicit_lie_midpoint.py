@@ -3,7 +3,7 @@
 import math
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, largest, retract, scale
 
 ORDER = 2
@@ -13,7 +13,7 @@ Method = token(__name__)
 ITERATIONS = 60
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """u = h f(t + h/2, x exp(u/2)), then x exp(u) (theory.md, eq. (6.13)).
 

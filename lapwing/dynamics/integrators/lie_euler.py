@@ -4,7 +4,7 @@ This is also the gyrostat paper's forward Euler on a manifold, fEulM: its retrac
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import retract, scale
 
 ORDER = 1
@@ -13,7 +13,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """x exp(h f) (theory.md, eq. (6.2))."""
     return retract(x, scale(h, rate(p, t, x)))

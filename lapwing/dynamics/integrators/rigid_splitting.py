@@ -12,7 +12,7 @@ from typing import Any
 from lapwing.dynamics.integrators._fixed_step import token
 from lapwing.dynamics.lie.quaternion import Quaternion, normalise
 from lapwing.dynamics.vector import add, cross, divide, multiply, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import flatten, unflatten
 
 ORDER = 6
@@ -35,7 +35,7 @@ def unfit(p: Any, x: Any) -> str:
     return "" if getattr(p, "torque_without_rate", False) else "it is for a torque that does not depend on the rate"
 
 
-@leaf
+@always_inline
 def _spin(w, a, b, c, momentum_b, momentum_c, angle):
     """Turn by `angle` about the body axis a: quaternion (w, a, b, c with a, b, c cyclic) and the other momenta."""
     cosine, sine = math.cos(0.5 * angle), math.sin(0.5 * angle)
@@ -50,7 +50,7 @@ def _spin(w, a, b, c, momentum_b, momentum_c, angle):
     )
 
 
-@leaf
+@always_inline
 def free_flow(inertia, attitude, momentum_body, h):
     """Strang composition of the three exact flows: x, y for half the time, z for all of it, and back (eq. (6.15))."""
     w, x, y, z = attitude
@@ -64,13 +64,13 @@ def free_flow(inertia, attitude, momentum_body, h):
     return normalise(Quaternion(w, x, y, z)), (lx, ly, lz)
 
 
-@leaf
+@always_inline
 def _torque(rate, p, t, x):
     """What the rate has beyond the free body: I omega' + omega x I omega."""
     return add(multiply(p.inertia, rate(p, t, x)[1]), cross(x[1], multiply(p.inertia, x[1])))
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Nine Strang steps of kick, free flow, kick, neighbouring kicks in one (theory.md, eq. (6.16))."""
     attitude, momentum = x[0], multiply(p.inertia, x[1])

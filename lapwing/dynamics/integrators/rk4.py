@@ -1,7 +1,7 @@
 """The classical Runge-Kutta method in the embedding: attitudes drift off SO(3) with the fifth power of the step."""
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed
 
 ORDER = 4
@@ -10,7 +10,7 @@ ON_MANIFOLD = False
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """One step of the classical tableau on the stored numbers (theory.md, eq. (6.3))."""
     half = 0.5 * h

@@ -2,7 +2,7 @@
 
 from lapwing.dynamics.integrators import rk4
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import normalise
 
 ORDER = 4
@@ -11,7 +11,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Step of `rk4`, then the nearest point of the manifold; the projection keeps the order (theory.md, eq. (6.4))."""
     return normalise(rk4.step(rate, p, t, x, h))

@@ -4,7 +4,7 @@ For errors near round-off. Tableau: Hairer, Norsett, Wanner, Solving Ordinary Di
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed, normalise
 
 ORDER = 8
@@ -13,12 +13,12 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def _slope(rate, p, t, x):
     return embed(x, rate(p, t, x))
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Twelve stages; the projection keeps the order (theory.md, eq. (6.4))."""
     k1 = _slope(rate, p, t, x)

@@ -1,7 +1,7 @@
 """Runge-Kutta-Munthe-Kaas of order 2: the explicit midpoint rule along the exponential; no bracket is needed."""
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import retract, scale
 
 ORDER = 2
@@ -10,7 +10,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """x exp(h f(t + h/2, x exp(h f / 2))) (theory.md, eq. (6.6))."""
     middle = retract(x, scale(0.5 * h, rate(p, t, x)))

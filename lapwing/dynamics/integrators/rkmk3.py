@@ -1,7 +1,7 @@
 """Runge-Kutta-Munthe-Kaas of order 3: Heun's tableau in the Lie algebra, with one bracket a step."""
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 3
@@ -10,7 +10,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Three stages; of the corrections only the last reaches the order (theory.md, eq. (6.8))."""
     k1 = scale(h, rate(p, t, x))

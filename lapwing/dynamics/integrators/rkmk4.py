@@ -5,7 +5,7 @@ Phil. Trans. R. Soc. A 357 (1999) 957.
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 4
@@ -14,7 +14,7 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """Four stages, each reached from x by one exponential (theory.md, eq. (6.7))."""
     half = 0.5 * h

@@ -4,7 +4,7 @@
 """
 
 from lapwing.dynamics.integrators._fixed_step import token
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 5
@@ -13,14 +13,14 @@ ON_MANIFOLD = True
 Method = token(__name__)
 
 
-@leaf
+@always_inline
 def _pulled_back(x, u, k):
     """dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory.md, eq. (5.4))."""
     b = bracket(x, u, k)
     return axpy(1.0 / 12.0, bracket(x, u, b), axpy(-0.5, b, k))
 
 
-@leaf
+@always_inline
 def stages(rate, p, t, x, h, k1):
     """(end, u, e, k, last): state at t + h, step u in the algebra and its error e (theory.md, eq. (6.9)).
 
@@ -46,7 +46,7 @@ def stages(rate, p, t, x, h, k1):
     return end, u, e, (k1, k3, k4, k5, k6, k7), last
 
 
-@leaf
+@always_inline
 def between(x, u, k, s):
     """State at the fraction s of the step from x by u with stages k: fourth order (theory.md, eq. (6.14))."""
     k1, k3, k4, k5, k6, k7 = k
@@ -59,7 +59,7 @@ def between(x, u, k, s):
     return retract(x, scale(s, axpy(r, axpy(s, axpy(r, rest, twist), bend), u)))
 
 
-@leaf
+@always_inline
 def step(rate, p, t, x, h):
     """One step of order 5."""
     return stages(rate, p, t, x, h, scale(h, rate(p, t, x)))[0]

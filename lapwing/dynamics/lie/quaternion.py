@@ -7,7 +7,7 @@ q' = q * (0, omega_body) / 2 (theory.md, eq. (5.12)); q and -q are the same atti
 import math
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -23,7 +23,7 @@ class Quaternion(NamedTuple):
 NO_ROTATION = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 
-@leaf
+@always_inline
 def multiply(p, q):
     """Hamilton product p * q: first q, then p."""
     return Quaternion(
@@ -34,13 +34,13 @@ def multiply(p, q):
     )
 
 
-@leaf
+@always_inline
 def conjugate(q):
     """The opposite rotation."""
     return Quaternion(q[0], -q[1], -q[2], -q[3])
 
 
-@leaf
+@always_inline
 def rotation_matrix(q):
     """R_world_body of an attitude, nine floats in row order."""
     x2, y2, z2 = q[1] + q[1], q[2] + q[2], q[3] + q[3]
@@ -50,7 +50,7 @@ def rotation_matrix(q):
     return (1.0 - (yy + zz), xy - wz, xz + wy, xy + wz, 1.0 - (xx + zz), yz - wx, xz - wy, yz + wx, 1.0 - (xx + yy))
 
 
-@leaf
+@always_inline
 def rotate(q, v_body):
     """v_world = R_world_body v_body. Several vectors: use `rotation_matrix` once and `vector.apply`."""
     tx = 2.0 * (q[2] * v_body[2] - q[3] * v_body[1])
@@ -63,13 +63,13 @@ def rotate(q, v_body):
     )
 
 
-@leaf
+@always_inline
 def rotate_back(q, v_world):
     """v_body = transpose(R_world_body) v_world."""
     return rotate(conjugate(q), v_world)
 
 
-@leaf
+@always_inline
 def exp(v):
     """Quaternion of the rotation vector v [rad] (theory.md, eq. (5.9))."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
@@ -83,7 +83,7 @@ def exp(v):
     return Quaternion(c, s * v[0], s * v[1], s * v[2])
 
 
-@leaf
+@always_inline
 def log(q):
     """Rotation vector [rad] of a unit quaternion, the branch with angle at most pi (theory.md, eq. (5.10))."""
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -94,7 +94,7 @@ def log(q):
     return (k * q[1], k * q[2], k * q[3])
 
 
-@leaf
+@always_inline
 def from_matrix(m):
     """Quaternion (w >= 0) of a rotation matrix, by the largest of four candidates (theory.md, eq. (5.11))."""
     trace = m[0] + m[4] + m[8]
@@ -111,7 +111,7 @@ def from_matrix(m):
     return Quaternion(k * q[0], k * q[1], k * q[2], k * q[3])
 
 
-@leaf
+@always_inline
 def from_roll_pitch_yaw(roll, pitch, yaw):
     """Attitude turned by yaw about z, then pitch about the new y, then roll about the new x [rad]; in FLU
     a positive pitch is nose down."""
@@ -126,7 +126,7 @@ def from_roll_pitch_yaw(roll, pitch, yaw):
     )
 
 
-@leaf
+@always_inline
 def to_roll_pitch_yaw(q):
     """(roll, pitch, yaw) [rad], inverse of `from_roll_pitch_yaw`; pitch in [-pi/2, pi/2]."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -137,7 +137,7 @@ def to_roll_pitch_yaw(q):
     return (math.atan2(r21, r22), pitch, math.atan2(r10, r00))
 
 
-@leaf
+@always_inline
 def retract(q, v):
     """q exp(v): turned by the rotation vector v, given in body coordinates [rad]."""
     r = multiply(q, exp(v))
@@ -146,7 +146,7 @@ def retract(q, v):
     return Quaternion(k * r[0], k * r[1], k * r[2], k * r[3])
 
 
-@leaf
+@always_inline
 def embed(q, omega_body):
     """Derivative of the four numbers: q * (0, omega_body) / 2."""
     x, y, z = 0.5 * omega_body[0], 0.5 * omega_body[1], 0.5 * omega_body[2]
@@ -158,7 +158,7 @@ def embed(q, omega_body):
     )
 
 
-@leaf
+@always_inline
 def normalise(q):
     """q / |q|; close to unit length the first-order term of the root is exact to round-off, and needs no division."""
     square = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
@@ -170,13 +170,13 @@ def normalise(q):
     return Quaternion(k * q[0], k * q[1], k * q[2], k * q[3])
 
 
-@leaf
+@always_inline
 def bracket(u, v):
     """Signed for tangents on the right (theory.md, eq. (5.3)): -(u x v)."""
     return (u[2] * v[1] - u[1] * v[2], u[0] * v[2] - u[2] * v[0], u[1] * v[0] - u[0] * v[1])
 
 
-@leaf
+@always_inline
 def transport(u, v):
     """From q exp(u) back to q: half the rotation (theory.md, eq. (5.20))."""
     return rotate(exp((0.5 * u[0], 0.5 * u[1], 0.5 * u[2])), v)

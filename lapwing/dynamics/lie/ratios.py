@@ -5,7 +5,7 @@ Near zero, where the closed forms divide zero by zero or cancel, each is its Tay
 
 import math
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(6))
 COSINE = tuple((-1) ** k / math.factorial(2 * k + 2) for k in range(9))
@@ -15,7 +15,7 @@ _BERNOULLI = (1 / 6, 1 / 30, 1 / 42, 1 / 30, 5 / 66, 691 / 2730, 7 / 6, 3617 / 5
 COTANGENT = tuple(b / math.factorial(2 * k + 2) for k, b in enumerate(_BERNOULLI))
 
 
-@leaf
+@always_inline
 def polynomial(coefficients, x):
     """coefficients[0] + coefficients[1] x + ..."""
     value = 0.0
@@ -24,7 +24,7 @@ def polynomial(coefficients, x):
     return value
 
 
-@leaf
+@always_inline
 def sine_ratio(square):
     """sin(a) / a."""
     if square < 0.0625:
@@ -33,7 +33,7 @@ def sine_ratio(square):
     return math.sin(a) / a
 
 
-@leaf
+@always_inline
 def cosine_ratio(square):
     """(1 - cos(a)) / a^2, as 2 sin^2(a/2) / a^2, which does not cancel."""
     if square < 0.0625:
@@ -42,7 +42,7 @@ def cosine_ratio(square):
     return 2.0 * s * s / square
 
 
-@leaf
+@always_inline
 def cubic_ratio(square):
     """(a - sin(a)) / a^3."""
     if square < 1.0:
@@ -51,7 +51,7 @@ def cubic_ratio(square):
     return (a - math.sin(a)) / (a * square)
 
 
-@leaf
+@always_inline
 def _two_product(a, b):
     """a b as an unevaluated sum of two floats (Dekker's splitting)."""
     p = a * b
@@ -63,14 +63,14 @@ def _two_product(a, b):
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
 
-@leaf
+@always_inline
 def _two_sum(a, b):
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
-@leaf
+@always_inline
 def half_angle(v):
     """(a/2, sin(a/2), cos(a/2)) of a = |v|, the two functions to full relative accuracy.
 
@@ -90,7 +90,7 @@ def half_angle(v):
     return half, sine + 0.5 * rest * cosine, cosine - 0.5 * rest * sine
 
 
-@leaf
+@always_inline
 def cotangent_ratio(v):
     """(1 - (a/2) cot(a/2)) / a^2 of a = |v|, with its pole at 2 pi."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]

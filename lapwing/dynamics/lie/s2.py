@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.so3 import turn
 from lapwing.dynamics.vector import cross, dot, norm, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -21,7 +21,7 @@ class Direction(NamedTuple):
     z: float
 
 
-@leaf
+@always_inline
 def retract(q, v):
     """exp(hat(v)) q: the direction turned by the rotation vector v [rad] (theory.md, eq. (5.15))."""
     r = turn(v, q)
@@ -29,7 +29,7 @@ def retract(q, v):
     return Direction(*scale(1.5 - 0.5 * dot(r, r), r))
 
 
-@leaf
+@always_inline
 def log(q, r):
     """Rotation vector orthogonal to q and r that takes q to r; zero for r = -q, where no axis stands out."""
     axis = cross(q, r)
@@ -38,19 +38,19 @@ def log(q, r):
     return scale(k, axis)
 
 
-@leaf
+@always_inline
 def normalise(q):
     """q / |q|."""
     return Direction(*scale(1.0 / norm(q), q))
 
 
-@leaf
+@always_inline
 def embed(q, omega):
     """Derivative of the three numbers: omega x q."""
     return cross(omega, q)
 
 
-@leaf
+@always_inline
 def transport(u, v):
     """From exp(u) q back to q, u orthogonal to q: turned back by u (theory.md, eq. (5.21))."""
     return turn(scale(-1.0, u), v)

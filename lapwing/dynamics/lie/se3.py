@@ -10,7 +10,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion, rotate
 from lapwing.dynamics.lie.ratio_slopes import cosine_slope, cotangent_slope, cubic_slope
 from lapwing.dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio
 from lapwing.dynamics.vector import Vec3, add, cross, dot, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -21,39 +21,39 @@ class Pose(NamedTuple):
     attitude: Quaternion  # body to world
 
 
-@leaf
+@always_inline
 def exp(u):
     """Rigid motion of u = (translation [m], rotation [rad]) (theory.md, eq. (5.16))."""
     return Pose(so3.dexp(u[1], u[0]), quaternion.exp(u[1]))
 
 
-@leaf
+@always_inline
 def log(g):
     """(translation, rotation) of a rigid motion, inverse of `exp` for rotations below pi."""
     rotation = quaternion.log(g[1])
     return so3.dexpinv(rotation, g[0]), rotation
 
 
-@leaf
+@always_inline
 def compose(g, h):
     """The product g h: first h, then g."""
     return Pose(add(g[0], rotate(g[1], h[0])), quaternion.multiply(g[1], h[1]))
 
 
-@leaf
+@always_inline
 def adjoint(g, u):
     """Ad_g u: the element of se(3) seen from the other side of g (theory.md, eq. (5.17))."""
     rotation = rotate(g[1], u[1])
     return add(rotate(g[1], u[0]), cross(g[0], rotation)), rotation
 
 
-@leaf
+@always_inline
 def commutator(u, v):
     """[u, v] in se(3): ad_u v."""
     return add(cross(u[1], v[0]), cross(u[0], v[1])), cross(u[1], v[1])
 
 
-@leaf
+@always_inline
 def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
     """Derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory.md, eq. (5.19))."""
     b, w = u[0], u[1]
@@ -64,7 +64,7 @@ def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
     return add(first, second)
 
 
-@leaf
+@always_inline
 def dexp(u, v):
     """exp(u)' = (dexp(u, u'))^ exp(u) on se(3) (theory.md, eq. (5.19))."""
     square = dot(u[1], u[1])
@@ -73,38 +73,38 @@ def dexp(u, v):
     return add(so3.dexp(u[1], v[0]), coupling), so3.dexp(u[1], v[1])
 
 
-@leaf
+@always_inline
 def dexpinv(u, v):
     """Inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory.md, eq. (5.19))."""
     coupling = _along(-0.5, cotangent_ratio(u[1]), cotangent_slope(u[1]), 0.0, u, v[1])
     return add(so3.dexpinv(u[1], v[0]), coupling), so3.dexpinv(u[1], v[1])
 
 
-@leaf
+@always_inline
 def retract(g, u):
     """g exp(u): moved along the screw u, given in body coordinates."""
     return Pose(add(g[0], rotate(g[1], so3.dexp(u[1], u[0]))), quaternion.retract(g[1], u[1]))
 
 
-@leaf
+@always_inline
 def embed(g, twist):
     """Derivative of the seven numbers."""
     return rotate(g[1], twist[0]), quaternion.embed(g[1], twist[1])
 
 
-@leaf
+@always_inline
 def normalise(g):
     """The attitude back to unit length."""
     return Pose(g[0], quaternion.normalise(g[1]))
 
 
-@leaf
+@always_inline
 def bracket(u, v):
     """Signed for tangents on the right (theory.md, eq. (5.3)): -[u, v]."""
     return commutator(v, u)
 
 
-@leaf
+@always_inline
 def transport(u, v):
     """From g exp(u) back to g: Ad of exp(u/2), as on SO(3) (theory.md, eq. (5.20))."""
     return adjoint(exp((scale(0.5, u[0]), scale(0.5, u[1]))), v)

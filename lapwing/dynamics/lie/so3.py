@@ -5,7 +5,7 @@ from typing import NamedTuple
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio, sine_ratio
 from lapwing.dynamics.vector import add, apply, cross, dot, matmul, scale, transpose
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -23,19 +23,19 @@ class Rotation(NamedTuple):
     m22: float
 
 
-@leaf
+@always_inline
 def hat(v):
     """The skew matrix with hat(v) a = v x a."""
     return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
 
 
-@leaf
+@always_inline
 def vee(m):
     """Inverse of `hat` on the skew part of m."""
     return (0.5 * (m[7] - m[5]), 0.5 * (m[2] - m[6]), 0.5 * (m[3] - m[1]))
 
 
-@leaf
+@always_inline
 def exp(v):
     """Rotation matrix of the rotation vector v (theory.md, eq. (5.6))."""
     square = dot(v, v)
@@ -48,7 +48,7 @@ def exp(v):
     )
 
 
-@leaf
+@always_inline
 def turn(v, a):
     """exp(hat(v)) a without the matrix."""
     square = dot(v, v)
@@ -56,13 +56,13 @@ def turn(v, a):
     return add(a, add(scale(sine_ratio(square), across), scale(cosine_ratio(square), cross(v, across))))
 
 
-@leaf
+@always_inline
 def log(m):
     """Rotation vector, at most pi long, of a rotation matrix: by the quaternion, accurate near zero and near pi."""
     return quaternion.log(quaternion.from_matrix(m))
 
 
-@leaf
+@always_inline
 def dexp(u, v):
     """Derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory.md, eq. (5.7))."""
     square = dot(u, u)
@@ -70,20 +70,20 @@ def dexp(u, v):
     return add(v, add(scale(cosine_ratio(square), across), scale(cubic_ratio(square), cross(u, across))))
 
 
-@leaf
+@always_inline
 def dexpinv(u, v):
     """Inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory.md, eq. (5.8))."""
     across = cross(u, v)
     return add(v, add(scale(-0.5, across), scale(cotangent_ratio(u), cross(u, across))))
 
 
-@leaf
+@always_inline
 def determinant(m):
     """Determinant of a 3x3 matrix: +1 for a rotation, -1 for a reflection."""
     return dot((m[0], m[1], m[2]), cross((m[3], m[4], m[5]), (m[6], m[7], m[8])))
 
 
-@leaf
+@always_inline
 def _polish(m):
     """One Newton step towards the polar factor: m (3 I - transpose(m) m) / 2; squares the defect."""
     g = matmul(transpose(m), m)
@@ -94,26 +94,26 @@ def _polish(m):
     ))  # fmt: skip
 
 
-@leaf
+@always_inline
 def normalise(m):
     """The rotation matrix nearest to m, for m within 0.1 of one."""
     return Rotation(*_polish(_polish(_polish(_polish(m)))))
 
 
-@leaf
+@always_inline
 def adjoint(m, v):
     """Ad of a rotation matrix on so(3): the rotated vector."""
     return apply(m, v)
 
 
-@leaf
+@always_inline
 def retract(m, v):
     """m exp(hat(v)): turned by v in body coordinates."""
     # polished, else the rounding of many equal steps adds up
     return Rotation(*_polish(matmul(m, exp(v))))
 
 
-@leaf
+@always_inline
 def embed(m, omega_body):
     """Derivative of the nine numbers: m hat(omega_body)."""
     return matmul(m, hat(omega_body))

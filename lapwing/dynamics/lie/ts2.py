@@ -9,7 +9,7 @@ from typing import NamedTuple
 from lapwing.dynamics.lie import so3
 from lapwing.dynamics.lie.se3 import adjoint, commutator, exp
 from lapwing.dynamics.vector import Vec3, add, cross, dot, scale, subtract
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -20,7 +20,7 @@ class Swing(NamedTuple):
     omega: Vec3  # [rad/s], orthogonal to direction
 
 
-@leaf
+@always_inline
 def tangent(x, acceleration):
     """The algebra element (mu_1, mu_2) that moves x with omega' = acceleration, orthogonal to the direction [rad/s^2].
 
@@ -29,47 +29,47 @@ def tangent(x, acceleration):
     return x[1], cross(x[0], acceleration)
 
 
-@leaf
+@always_inline
 def act(rotation, shift, x):
     """Action of the rigid motion (exp(rotation), shift) on x (theory.md, eq. (5.22))."""
     direction = so3.turn(rotation, x[0])
     return Swing(direction, add(so3.turn(rotation, x[1]), cross(shift, direction)))
 
 
-@leaf
+@always_inline
 def _polish(x):
     """First-order return to |q| = 1 and q . omega = 0: rounding of many steps must not add up."""
     q = scale(1.5 - 0.5 * dot(x[0], x[0]), x[0])
     return Swing(q, subtract(x[1], scale(dot(q, x[1]), q)))
 
 
-@leaf
+@always_inline
 def retract(x, mu):
     """exp(mu) x with the exponential of SE(3): rotation exp(mu_1), shift dexp(mu_1, mu_2)."""
     return _polish(act(mu[0], so3.dexp(mu[0], mu[1]), x))
 
 
-@leaf
+@always_inline
 def embed(x, mu):
     """Derivative of the six numbers (theory.md, eq. (5.23))."""
     return cross(mu[0], x[0]), add(cross(mu[0], x[1]), cross(mu[1], x[0]))
 
 
-@leaf
+@always_inline
 def normalise(x):
     """Direction to unit length, angular velocity orthogonal to it."""
     q = scale(1.0 / dot(x[0], x[0]) ** 0.5, x[0])
     return Swing(q, subtract(x[1], scale(dot(q, x[1]), q)))
 
 
-@leaf
+@always_inline
 def bracket(u, v):
     """[u, v] of (rotation, translation) pairs; rotations act from the left."""
     translation, rotation = commutator((u[1], u[0]), (v[1], v[0]))
     return rotation, translation
 
 
-@leaf
+@always_inline
 def transport(u, v):
     """From exp(u) x back to x: Ad of exp(-u/2) in SE(3), which acts from the left (theory.md, eq. (5.20))."""
     translation, rotation = adjoint(exp((scale(-0.5, u[1]), scale(-0.5, u[0]))), (v[1], v[0]))

@@ -9,8 +9,8 @@ they are. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3, add, cross, dot, scale, subtract
-from lapwing.kernels import leaf
-from lapwing.kernels.simd import total
+from lapwing.kernels import always_inline
+from lapwing.kernels.simd import horizontal_sum
 
 Sym3 = tuple[float, float, float, float, float, float]
 
@@ -53,7 +53,7 @@ class Result(NamedTuple):
     reaction_torque: Vec3  # the same about the hinge point [N m]; along the axis: the drive torque
 
 
-@leaf
+@always_inline
 def times(m, a):
     """m a for a symmetric matrix of six floats."""
     return (
@@ -63,27 +63,27 @@ def times(m, a):
     )
 
 
-@leaf
+@always_inline
 def plus(m, n):
     """m + n."""
     return (m[0] + n[0], m[1] + n[1], m[2] + n[2], m[3] + n[3], m[4] + n[4], m[5] + n[5])
 
 
-@leaf
+@always_inline
 def outer(s, a):
     """s a a^T for a scalar s."""
     x, y, z = s * a[0], s * a[1], s * a[2]
     return (x * a[0], y * a[1], z * a[2], x * a[1], x * a[2], y * a[2])
 
 
-@leaf
+@always_inline
 def point_inertia(mass, a):
     """mass (|a|^2 1 - a a^T): the inertia of a point at a."""
     xx, yy, zz = mass * a[0] * a[0], mass * a[1] * a[1], mass * a[2] * a[2]
     return (yy + zz, xx + zz, xx + yy, -mass * a[0] * a[1], -mass * a[0] * a[2], -mass * a[1] * a[2])
 
 
-@leaf
+@always_inline
 def felt(C, moments, spins):
     """The inertia of a leaf as its core feels it: C diag(moments) C^T for a rotation matrix C, without the moment about
     the leaf's z axis if it spins freely."""
@@ -94,7 +94,7 @@ def felt(C, moments, spins):
     return (x + moments[1], y + moments[1], z + moments[1], xy, xz, yz)
 
 
-@leaf
+@always_inline
 def solve_symmetric(m, b):
     """m^-1 b by cofactors."""
     c00 = m[1] * m[2] - m[5] * m[5]
@@ -107,25 +107,32 @@ def solve_symmetric(m, b):
     return scale(k, times((c00, c11, c22, c01, c02, c12), b))
 
 
-@leaf
+@always_inline
 def _all(a):
     """Sum over the four lanes of each of the three components of a vector."""
-    return (total(a[0]), total(a[1]), total(a[2]))
+    return (horizontal_sum(a[0]), horizontal_sum(a[1]), horizontal_sum(a[2]))
 
 
-@leaf
+@always_inline
 def _sum(m):
     """Sum over the four lanes of each of the six entries of a symmetric matrix."""
-    return (total(m[0]), total(m[1]), total(m[2]), total(m[3]), total(m[4]), total(m[5]))
+    return (
+        horizontal_sum(m[0]),
+        horizontal_sum(m[1]),
+        horizontal_sum(m[2]),
+        horizontal_sum(m[3]),
+        horizontal_sum(m[4]),
+        horizontal_sum(m[5]),
+    )
 
 
-@leaf
+@always_inline
 def eliminate(core, leaf):
     """Accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
     given = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
     force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
     torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(given, leaf.axis)))
-    mass, moment = core.mass + total(leaf.mass), _all(scale(leaf.mass, leaf.offset))
+    mass, moment = core.mass + horizontal_sum(leaf.mass), _all(scale(leaf.mass, leaf.offset))
     inverse = 1.0 / mass
     points = point_inertia(leaf.mass, leaf.offset)
     fixed = plus(core.inertia, plus(point_inertia(-inverse, moment), _sum(points)))

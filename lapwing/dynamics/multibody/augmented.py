@@ -15,7 +15,7 @@ from lapwing.dynamics.multibody.body_kinematics import nine, place, three
 from lapwing.dynamics.multibody.constraints import equations, in_coordinates
 from lapwing.dynamics.multibody.system import System
 from lapwing.dynamics.vector import apply_transposed
-from lapwing.kernels import apart, kernel
+from lapwing.kernels import kernel, noinline
 
 RANK_TOLERANCE = 1e-9  # of a unit row: what is left of a dependent row after elimination is round-off
 ANY = 1 << 30  # no bound on the rank
@@ -83,7 +83,7 @@ def divide_root_transposed(root, rotational, x):
         x[k + 3] = (x[k + 3] - l10 * x[k + 4] - l20 * x[k + 5]) / l00
 
 
-@apart
+@noinline
 def generalised_force(a, p, wrench):
     """Q = Q_v + Q_e, shape (n, 6), of a wrench (n, 6): force at the centre of mass [N], world; torque [N m], body.
 
@@ -114,7 +114,7 @@ def factor_rows(a, p, e, count, tolerance, most):
     return root, rotational, pivoted_qr.factor(b, tolerance, most)
 
 
-@apart
+@noinline
 def constrained(a, p, e, force, gamma, tolerance, most):
     """Accelerations (n, 6) with M a = force - J^T lambda, J a = gamma: the core of every solve."""
     root, rotational, f = factor_rows(a, p, e, len(gamma), tolerance, most)
@@ -134,7 +134,7 @@ def constrained(a, p, e, force, gamma, tolerance, most):
     return Solution((a0 + y).reshape(-1, 6), multipliers, f.rank, conflict)
 
 
-@apart
+@noinline
 def solve(a, configuration, velocity, wrench, drive, damping, stiffness, tolerance, most):
     """`accelerations` on packed arrays: at most `most` independent rows, Baumgarte feedback `damping` [1/s] and
     `stiffness` [1/s^2] (zero for none); returns (solution, singular body or -1)."""

@@ -12,7 +12,7 @@ import numpy as np
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody import cardan_angles
 from lapwing.dynamics.vector import IDENTITY, ZERO, apply
-from lapwing.kernels import apart, kernel
+from lapwing.kernels import kernel, noinline
 
 
 class BodyKinematics(NamedTuple):
@@ -46,7 +46,7 @@ def put(a, i, values):
         a[i, k] = values[k]
 
 
-@apart
+@noinline
 def place(configuration, velocity):
     """Placement of the bodies of a configuration (n, 6 or 7) and velocity (n, 6); theory.md, eqs. (8.1)-(8.3)."""
     n, width = configuration.shape

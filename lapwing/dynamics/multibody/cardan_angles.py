@@ -6,12 +6,12 @@ Angles are (roll, pitch, yaw) [rad]; A takes body coordinates to world; matrices
 import math
 
 from lapwing.dynamics.vector import add, apply, apply_transposed, cross, matmul, transpose
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 SINGULAR = 1e-6  # |cos(pitch)| below which the angles are called singular: their rates lose six of sixteen digits
 
 
-@leaf
+@always_inline
 def rotation(angles):
     """A of shape (3, 3), body to world (theory.md, eq. (8.1))."""
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
@@ -24,7 +24,7 @@ def rotation(angles):
     )  # fmt: skip
 
 
-@leaf
+@always_inline
 def rate_matrix(angles):
     """G-bar: omega_body = G-bar d(angles)/dt (theory.md, eq. (8.2)); its determinant is cos(pitch)."""
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -32,7 +32,7 @@ def rate_matrix(angles):
     return (cy * cz, sz, 0.0, -cy * sz, cz, 0.0, sy, 0.0, 1.0)
 
 
-@leaf
+@always_inline
 def rate_matrix_derivative(angles, rates):
     """d(G-bar)/dt for angle rates [rad/s] (theory.md, eq. (8.3))."""
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -45,13 +45,13 @@ def rate_matrix_derivative(angles, rates):
     )  # fmt: skip
 
 
-@leaf
+@always_inline
 def rotational_mass(G, inertia):
     """G-bar^T I G-bar, the rotational block of the mass matrix (theory.md, eq. (8.5))."""
     return matmul(transpose(G), matmul(inertia, G))
 
 
-@leaf
+@always_inline
 def quadratic_velocity(G, inertia, omega_body, bias):
     """-G-bar^T (omega x I omega + I bias) with bias = d(G-bar)/dt d(angles)/dt (theory.md, eq. (8.6))."""
     gyroscopic = cross(omega_body, apply(inertia, omega_body))
@@ -59,13 +59,13 @@ def quadratic_velocity(G, inertia, omega_body, bias):
     return apply_transposed(G, (-total[0], -total[1], -total[2]))
 
 
-@leaf
+@always_inline
 def angles_of(R):
     """(roll, pitch, yaw) of a rotation matrix, pitch in [-pi/2, pi/2] (theory.md, eq. (8.4))."""
     return (math.atan2(-R[5], R[8]), math.atan2(R[2], math.hypot(R[0], R[1])), math.atan2(-R[1], R[0]))
 
 
-@leaf
+@always_inline
 def rates_of(angles, omega_body):
     """d(angles)/dt [rad/s] of an angular velocity; divides by cos(pitch) (theory.md, eq. (8.4))."""
     cy, sy = math.cos(angles[1]), math.sin(angles[1])

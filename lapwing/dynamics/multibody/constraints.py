@@ -11,7 +11,7 @@ import numpy as np
 
 from lapwing.dynamics.multibody.body_kinematics import nine, three
 from lapwing.dynamics.vector import add, apply, apply_transposed, cross, dot, scale, subtract
-from lapwing.kernels import apart, kernel
+from lapwing.kernels import kernel, noinline
 
 
 class Equations(NamedTuple):
@@ -82,7 +82,7 @@ def _drive(a, p, k, speed, acceleration, out):
             out.jacobian_t[cj + 3 + c, r + row] = -Rj[3 * row + c]
 
 
-@apart
+@noinline
 def equations(a, p, drive):
     """All rows at a placement, for imposed (speed [rad/s], acceleration [rad/s^2]) per drive, shape (d, 2)."""
     k, d = len(a.joint_bodies), len(a.drive_bodies)
@@ -95,7 +95,7 @@ def equations(a, p, drive):
     return out
 
 
-@apart
+@noinline
 def in_coordinates(e, p):
     """The same rows for the coordinates' own rates, ground columns dropped: J <- J G, gamma <- gamma - J bias.
 

@@ -12,8 +12,8 @@ from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate
 from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.simd import apart, beside, separate
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.simd import deinterleave, interleave, unpack4
 
 Four = tuple[float, ...]
 
@@ -121,21 +121,21 @@ def delivery_drone(
     )
 
 
-@leaf
+@always_inline
 def _double(angles):
     """Cosines and sines of twice the angles."""
     c, s = math.cos, math.sin
     a, b, d, e = 2.0 * angles[0], 2.0 * angles[1], 2.0 * angles[2], 2.0 * angles[3]
-    return beside((c(a), c(b), c(d), c(e))), beside((s(a), s(b), s(d), s(e)))
+    return interleave((c(a), c(b), c(d), c(e))), interleave((s(a), s(b), s(d), s(e)))
 
 
-@leaf
+@always_inline
 def _propellers(d, x, loads, g):
     """The propellers as leaves in chassis axes; their inertia turns with them at twice the speed (theory.md, eq.
     (8.50))."""
-    w, speed, spins, held = x.omega_body, beside(x.speeds), beside(d.spins), beside(d.held)
-    offset, drive = beside(d.hubs), beside(loads.drive)
-    mass, inertia = held * beside(d.propeller_mass), beside(d.propeller_inertia)
+    w, speed, spins, held = x.omega_body, interleave(x.speeds), interleave(d.spins), interleave(d.held)
+    offset, drive = interleave(d.hubs), interleave(loads.drive)
+    mass, inertia = held * interleave(d.propeller_mass), interleave(d.propeller_inertia)
     moments = scale(held, inertia)
     cosine, sine = _double(x.angles)
     mean, half = 0.5 * (moments[0] + moments[1]), 0.5 * (moments[0] - moments[1])
@@ -154,12 +154,12 @@ def _propellers(d, x, loads, g):
         held * drive,
         cross(w, cross(w, offset)),
         (w[1] * speed, -w[0] * speed, drive * (1.0 - spins)),
-        (weight[0], weight[1], weight[2] + held * beside(loads.thrust)),
-        (-gyroscopic[0], -gyroscopic[1], held * beside(loads.aerodynamic_torque) - gyroscopic[2]),
+        (weight[0], weight[1], weight[2] + held * interleave(loads.thrust)),
+        (-gyroscopic[0], -gyroscopic[1], held * interleave(loads.aerodynamic_torque) - gyroscopic[2]),
     )
 
 
-@leaf
+@always_inline
 def motion(d, loads, x):
     """Accelerations and reactions of a drone under loads in a state (theory.md, eqs. (8.40)-(8.45), (8.50))."""
     R = quaternion.rotation_matrix(x.attitude)
@@ -172,15 +172,15 @@ def motion(d, loads, x):
         subtract(loads.torque_body, cross(w, multiply(d.inertia, w))),
     )
     s = eliminate(core, _propellers(d, x, loads, g))
-    held, spins = beside(d.held), beside(d.spins)
-    spin = held * (s.spin + (1.0 - spins) * beside(loads.drive))
+    held, spins = interleave(d.held), interleave(d.spins)
+    spin = held * (s.spin + (1.0 - spins) * interleave(loads.drive))
     return Accelerations(
         apply(R, s.acceleration),
         s.angular_acceleration,
-        apart(spin),
-        apart(s.reaction_torque[2]),
-        separate(s.reaction_force),
-        separate(s.reaction_torque),
+        unpack4(spin),
+        unpack4(s.reaction_torque[2]),
+        deinterleave(s.reaction_force),
+        deinterleave(s.reaction_torque),
     )
 
 

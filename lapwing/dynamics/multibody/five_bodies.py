@@ -29,8 +29,8 @@ from lapwing.dynamics.vector import (
     scale,
     subtract,
 )
-from lapwing.kernels import leaf
-from lapwing.kernels.simd import beside, choose, separate
+from lapwing.kernels import always_inline
+from lapwing.kernels.simd import deinterleave, interleave, select_vector
 
 UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -85,13 +85,13 @@ class Machine(NamedTuple):
     feedback: float  # Baumgarte's rate of critically damped feedback [1/s], eq. (8.30); 0: none
 
 
-@leaf
+@always_inline
 def column(R, k):
     """Column k of a 3x3 matrix: body axis k in the world."""
     return (R[k], R[3 + k], R[6 + k])
 
 
-@leaf
+@always_inline
 def from_chassis(chassis, leaf):
     """Rotation matrices from the leaves' axes to the chassis' axes, orthogonal even where the stages of a step have
     attitudes that are not quite of unit length."""
@@ -104,7 +104,7 @@ def from_chassis(chassis, leaf):
     return (1.0 - (yy + zz), xy - wz, xz + wy, xy + wz, 1.0 - (xx + zz), yz - wx, xz - wy, yz + wx, 1.0 - (xx + yy))
 
 
-@leaf
+@always_inline
 def free_turn(axis, gamma_1, gamma_2):
     """The relative angular acceleration that the rows v1 . v3 and v2 . v3 ask for, up to the hinge axis itself
     (theory.md, eq. (8.46)); v1 and v2 are the chassis' x and y axes, `axis` is v3."""
@@ -112,7 +112,7 @@ def free_turn(axis, gamma_1, gamma_2):
     return (-k * gamma_2, k * gamma_1, 0.0 * k)
 
 
-@leaf
+@always_inline
 def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
     """(drift, turn) of Baumgarte's feedback at `rate` [1/s] of what is missing at a hinge (theory.md, eq. (8.30))."""
     w, back = chassis.omega_body, rate * rate
@@ -124,10 +124,10 @@ def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
     tilt = free_turn(axis, -back * axis[0], -back * axis[1])
     swings = free_turn(axis, -2.0 * rate * swing[0], -2.0 * rate * swing[1])
     slip = subtract(relative, (0.0, 0.0, speed))
-    return drift, add(tilt, choose(r.spins, swings, scale(-2.0 * rate, slip)))
+    return drift, add(tilt, select_vector(r.spins, swings, scale(-2.0 * rate, slip)))
 
 
-@leaf
+@always_inline
 def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
     """What `arrow` must know of the rotors r in states x, in chassis axes; C: `from_chassis`."""
     w, own, axis = chassis.omega_body, apply(C, x.omega_body), column(C, 2)
@@ -137,7 +137,7 @@ def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
     gamma_1 = axis[0] * square - w[0] * wa + own[0] * twice
     gamma_2 = axis[1] * square - w[1] * wa + own[1] * twice
     speed = r.speed + r.drive * t
-    turn = choose(r.spins, free_turn(axis, gamma_1, gamma_2), (w[1] * speed, -w[0] * speed, r.drive))
+    turn = select_vector(r.spins, free_turn(axis, gamma_1, gamma_2), (w[1] * speed, -w[0] * speed, r.drive))
     mass, moments = r.held * r.mass, scale(r.held, r.inertia)
     force = add(scale(mass, gravity_body), scale(r.held, apply_transposed(R0, r.wrench.force_world)))
     gyroscopic = cross(x.omega_body, multiply(moments, x.omega_body))
@@ -151,10 +151,10 @@ def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
     return HingedBody(mass, inertia, r.offset, axis, r.inertia[2], r.spins, drive, drift, turn, force, torque)
 
 
-@leaf
+@always_inline
 def solve(p, t, x):
     """(`arrow.Result` at a state in chassis axes, chassis to world, leaves to chassis)."""
-    c, r, b = x.chassis, beside(p.rotors), beside(x.propellers)
+    c, r, b = x.chassis, interleave(p.rotors), interleave(x.propellers)
     R0, C, w = quaternion.rotation_matrix(c.attitude), from_chassis(c, b), c.omega_body
     g = apply_transposed(R0, p.gravity)
     core = Core(
@@ -166,31 +166,31 @@ def solve(p, t, x):
     return eliminate(core, _leaf(r, b, t, c, R0, C, g, p.feedback)), R0, C
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """Tangent of the state: index-1 equations of motion by elimination (theory.md, eqs. (8.40)-(8.46))."""
     s, R0, C = solve(p, t, x)
-    r, b = beside(p.rotors), beside(x.propellers)
+    r, b = interleave(p.rotors), interleave(x.propellers)
     acceleration = apply(R0, s.acceleration)
     # one that was torn off flies by itself
     free = add(p.gravity, scale(1.0 / r.mass, r.wrench.force_world))
     spun = subtract(r.wrench.torque_body, cross(b.omega_body, multiply(r.inertia, b.omega_body)))
-    turned = choose(r.held, apply_transposed(C, s.turned), divide(spun, r.inertia))
-    moved = choose(r.held, add(acceleration, apply(R0, s.relative)), free)
+    turned = select_vector(r.held, apply_transposed(C, s.turned), divide(spun, r.inertia))
+    moved = select_vector(r.held, add(acceleration, apply(R0, s.relative)), free)
     return FiveBodies(
         BodyState(x.chassis.velocity_world, x.chassis.omega_body, acceleration, s.angular_acceleration),
-        separate(BodyState(b.velocity_world, b.omega_body, moved, turned)),
+        deinterleave(BodyState(b.velocity_world, b.omega_body, moved, turned)),
     )
 
 
 RATES[Machine] = rate
 
 
-@leaf
+@always_inline
 def reactions(p, t, x):
     """(force [N], torque about its hinge [N m]) from the chassis on each propeller, in the world."""
     s, R0, _ = solve(p, t, x)
-    return separate((apply(R0, s.reaction_force), apply(R0, s.reaction_torque)))
+    return deinterleave((apply(R0, s.reaction_force), apply(R0, s.reaction_torque)))
 
 
 def machine(

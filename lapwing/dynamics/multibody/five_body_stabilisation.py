@@ -5,15 +5,15 @@ import math
 from lapwing.dynamics.integrators import step
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, felt
-from lapwing.dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, choose, column, free_turn, from_chassis
+from lapwing.dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, column, free_turn, from_chassis
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.simd import beside, root, separate, where
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.simd import deinterleave, interleave, select, select_vector, sqrt
 
 NONE, PARTITION, PROJECTION = 0, 1, 2
 
 
-@leaf
+@always_inline
 def _gap(chassis, R0, offset, x):
     """Where the leaf is missing from its hinge [m] and its spin axis, in chassis axes."""
     away = subtract(x.position_world, chassis.position_world)
@@ -21,7 +21,7 @@ def _gap(chassis, R0, offset, x):
     return subtract(apply_transposed(R0, away), offset), apply_transposed(R0, axis)
 
 
-@leaf
+@always_inline
 def _resting(r, spins, C, drift, turn, force, torque):
     """Leaves whose drives rest; what acts on them are momenta, or nothing."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
@@ -30,7 +30,7 @@ def _resting(r, spins, C, drift, turn, force, torque):
     )
 
 
-@leaf
+@always_inline
 def _turned(q, turn):
     """The attitude after a turn in the body [rad], right to its third power; of unit length, without a root."""
     s = scale(0.25, turn)
@@ -42,15 +42,15 @@ def _turned(q, turn):
     return quaternion.Quaternion(k * t[0], k * t[1], k * t[2], k * t[3])
 
 
-@leaf
+@always_inline
 def _attitude(flag, a, b):
     """The attitude a where flag is above zero, else b."""
     return quaternion.Quaternion(
-        where(flag, a[0], b[0]), where(flag, a[1], b[1]), where(flag, a[2], b[2]), where(flag, a[3], b[3])
+        select(flag, a[0], b[0]), select(flag, a[1], b[1]), select(flag, a[2], b[2]), select(flag, a[3], b[3])
     )
 
 
-@leaf
+@always_inline
 def _gathered(p, c, r, b):
     """(chassis, propellers) as lanes with their hinges closed."""
     R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
@@ -67,7 +67,7 @@ def _gathered(p, c, r, b):
     return (
         BodyState(add(c.position_world, moved), turned, c.velocity_world, c.omega_body),
         BodyState(
-            choose(r.held, position, b.position_world),
+            select_vector(r.held, position, b.position_world),
             _attitude(r.held, attitude, b.attitude),
             b.velocity_world,
             b.omega_body,
@@ -75,54 +75,54 @@ def _gathered(p, c, r, b):
     )
 
 
-@leaf
+@always_inline
 def _core(p, force, torque):
     return Core(p.mass, (p.inertia[0], p.inertia[1], p.inertia[2], 0.0, 0.0, 0.0), force, torque)
 
 
-@leaf
+@always_inline
 def project(p, t, x):
     """The nearest state, in the metric of the masses, that meets all constraints (theory.md, eqs. (8.31), (8.32)).
 
     One Newton step on position level, then the velocities: a drift of e is left at e^2.
     """
-    r = beside(p.rotors)
-    c, b = _gathered(p, x.chassis, r, beside(x.propellers))
+    r = interleave(p.rotors)
+    c, b = _gathered(p, x.chassis, r, interleave(x.propellers))
     R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
     speed = r.speed + r.drive * t
     still = 0.0 * speed
     momentum = apply_transposed(R0, scale(r.held * r.mass, b.velocity_world))
     angular = apply(C, multiply(scale(r.held, r.inertia), b.omega_body))
-    imposed = choose(r.spins, (still, still, still), (still, still, speed))
+    imposed = select_vector(r.spins, (still, still, still), (still, still, speed))
     core = _core(p, scale(p.mass, apply_transposed(R0, c.velocity_world)), multiply(p.inertia, c.omega_body))
     s = eliminate(core, _resting(r, r.spins, C, (still, still, still), imposed, momentum, angular))
     velocity = apply(R0, s.acceleration)
     return FiveBodies(
         BodyState(c.position_world, c.attitude, velocity, s.angular_acceleration),
-        separate(
+        deinterleave(
             BodyState(
                 b.position_world,
                 b.attitude,
-                choose(r.held, add(velocity, apply(R0, s.relative)), b.velocity_world),
-                choose(r.held, apply_transposed(C, s.turned), b.omega_body),
+                select_vector(r.held, add(velocity, apply(R0, s.relative)), b.velocity_world),
+                select_vector(r.held, apply_transposed(C, s.turned), b.omega_body),
             )
         ),
     )
 
 
-@leaf
+@always_inline
 def partition(p, t, x):
     """Chassis pose, spin angles and their rates are independent; all else follows (theory.md, eq. (8.33))."""
     c = x.chassis
     c = BodyState(c.position_world, quaternion.normalise(c.attitude), c.velocity_world, c.omega_body)
-    R0, r, b = quaternion.rotation_matrix(c.attitude), beside(p.rotors), beside(x.propellers)
+    R0, r, b = quaternion.rotation_matrix(c.attitude), interleave(p.rotors), interleave(x.propellers)
     relative = quaternion.multiply(quaternion.conjugate(c.attitude), b.attitude)
     axis = column(quaternion.rotation_matrix(relative), 2)
     # the shortest turn that takes a leaf's axis onto the chassis' z: about axis x z
     swing = quaternion.Quaternion(1.0 + axis[2], axis[1], -axis[0], 0.0 * axis[0])
     relative = _unit(quaternion.multiply(swing, relative))
     core_rate = quaternion.rotate_back(relative, c.omega_body)
-    spin = where(r.spins, b.omega_body[2] - core_rate[2], r.speed + r.drive * t)
+    spin = select(r.spins, b.omega_body[2] - core_rate[2], r.speed + r.drive * t)
     followed = BodyState(
         add(c.position_world, apply(R0, r.offset)),
         quaternion.multiply(c.attitude, relative),
@@ -131,25 +131,25 @@ def partition(p, t, x):
     )
     return FiveBodies(
         c,
-        separate(
+        deinterleave(
             BodyState(
-                choose(r.held, followed.position_world, b.position_world),
+                select_vector(r.held, followed.position_world, b.position_world),
                 _attitude(r.held, followed.attitude, b.attitude),
-                choose(r.held, followed.velocity_world, b.velocity_world),
-                choose(r.held, followed.omega_body, b.omega_body),
+                select_vector(r.held, followed.velocity_world, b.velocity_world),
+                select_vector(r.held, followed.omega_body, b.omega_body),
             )
         ),
     )
 
 
-@leaf
+@always_inline
 def _unit(q):
     """`quaternion.normalise` for lanes."""
-    k = 1.0 / root(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    k = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return quaternion.Quaternion(k * q[0], k * q[1], k * q[2], k * q[3])
 
 
-@leaf
+@always_inline
 def _worse(a, b):
     """The larger of two, NaN if the second is."""
     return a if b <= a else b
@@ -203,7 +203,7 @@ def together(p, chassis, angles, speeds):
     )
 
 
-@leaf
+@always_inline
 def _placed(r, R0, chassis, angle, speed):
     half = quaternion.Quaternion(math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))
     position = add(chassis.position_world, apply(R0, r.offset))

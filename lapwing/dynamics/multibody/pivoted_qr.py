@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.kernels import apart, kernel, leaf
-from lapwing.kernels.simd import load, spread, store
+from lapwing.kernels import always_inline, kernel, noinline
+from lapwing.kernels.simd import load, splat, store
 
 BLOCK = 16  # numbers that a vectorised loop takes at once; rows are padded with empty columns to a multiple of it
 
@@ -35,13 +35,13 @@ def _lengths(b, k, out):
             out[j] += row[j] * row[j]
 
 
-@leaf
+@always_inline
 def _reflect(b, v, beta, k):
     """Reflect the columns of b from row k down; those before k are zero there and stay so."""
     n, width = b.shape
     # a row touches two bodies only: most of v is zero at first
     for j in range(k // BLOCK * BLOCK, width, BLOCK):
-        w0 = w1 = w2 = w3 = spread(0.0)
+        w0 = w1 = w2 = w3 = splat(0.0)
         for i in range(k, n):
             f, at = v[i], i * width + j
             if f != 0.0:
@@ -59,7 +59,7 @@ def _reflect(b, v, beta, k):
                 store(b, at + 12, load(b, at + 12) - f * w3)
 
 
-@apart
+@noinline
 def factor(matrix, tolerance, most):
     """Factor a matrix (n, m); what is left of a dependent column after elimination is below `tolerance` of its length.
     At most `most` columns are taken as independent."""
@@ -116,7 +116,7 @@ def factor(matrix, tolerance, most):
     return Factor(b, reflection, beta, order, scale, rank)
 
 
-@apart
+@noinline
 def shortest(f, r):
     """The shortest y with B^T y = r on the independent rows: (y of shape (n,), Q^T y, conflict).
 
@@ -176,7 +176,7 @@ def _solve_positive(m, x):
             x[i] -= m[k, i] * x[k]
 
 
-@apart
+@noinline
 def minimum_norm(f, z):
     """The shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
     m = len(f.order)

@@ -11,7 +11,7 @@ from lapwing.dynamics.multibody import pivoted_qr
 from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, divide_root_transposed, factor_rows
 from lapwing.dynamics.multibody.body_kinematics import displaced, place
 from lapwing.dynamics.multibody.constraints import equations, in_coordinates, velocity_defect
-from lapwing.kernels import apart, kernel
+from lapwing.kernels import kernel, noinline
 
 NONE, PARTITION, PROJECTION, BAUMGARTE = 0, 1, 2, 3
 NAMES = {"none": NONE, "partitioning": PARTITION, "projection": PROJECTION, "baumgarte": BAUMGARTE}
@@ -59,7 +59,7 @@ def _tolerance(e):
     return max(RANK_TOLERANCE, min(10.0 * largest(e.residual), 1e-3))
 
 
-@apart
+@noinline
 def project(a, configuration, velocity, drive, ranks):
     """Nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
 
@@ -102,7 +102,7 @@ def _correction(jacobian, mask, defect, tolerance, most):
     return pivoted_qr.basic(pivoted_qr.factor(reduced, tolerance, most), -defect)
 
 
-@apart
+@noinline
 def partition(a, configuration, velocity, drive, ranks):
     """Generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)): column pivoting of the Jacobian picks the
     dependent coordinates, Newton's iteration corrects those alone; the same for the velocities. `ranks` as above."""

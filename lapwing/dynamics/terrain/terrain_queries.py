@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.terrain.heightfield import UP, depth, top
 from lapwing.dynamics.vector import Vec3, dot
-from lapwing.kernels.codegen import implements
+from lapwing.kernels.codegen import overload_for
 
 
 class Level(NamedTuple):
@@ -19,7 +19,7 @@ def upright(terrain: Any) -> Vec3:
     return UP if isinstance(terrain, Level) else (-terrain.slope[0], -terrain.slope[1], 1.0)
 
 
-@implements(upright, inline=True)
+@overload_for(upright, inline=True)
 def _upright(terrain):
     if terrain.instance_class is Level:
         return lambda terrain: UP
@@ -31,7 +31,7 @@ def over_plane(terrain: Any, vector_world: Vec3) -> float:
     return vector_world[2] if isinstance(terrain, Level) else dot(upright(terrain), vector_world)
 
 
-@implements(over_plane, inline=True)
+@overload_for(over_plane, inline=True)
 def _over_plane(terrain, vector_world):
     if terrain.instance_class is Level:
         return lambda terrain, vector_world: vector_world[2]
@@ -43,7 +43,7 @@ def summit(terrain: Any) -> float:
     return 0.0 if isinstance(terrain, Level) else terrain.summit
 
 
-@implements(summit, inline=True)
+@overload_for(summit, inline=True)
 def _summit(terrain):
     return (lambda terrain: 0.0) if terrain.instance_class is Level else (lambda terrain: terrain.summit)
 
@@ -53,7 +53,7 @@ def surface(terrain: Any, x: float, y: float) -> tuple[float, Vec3]:
     return (0.0, UP) if isinstance(terrain, Level) else top(terrain, x, y)
 
 
-@implements(surface, inline=True)
+@overload_for(surface, inline=True)
 def _surface(terrain, x, y):
     if terrain.instance_class is Level:
         return lambda terrain, x, y: (0.0, UP)
@@ -65,7 +65,7 @@ def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3]:
     return (-place_world[2], UP) if isinstance(terrain, Level) else depth(terrain, place_world)
 
 
-@implements(touch, inline=True)
+@overload_for(touch, inline=True)
 def _touch(terrain, place_world):
     if terrain.instance_class is Level:
         return lambda terrain, place_world: (-place_world[2], UP)

@@ -10,7 +10,7 @@ from lapwing.dynamics.vehicles import cooperative_forces as forces
 from lapwing.dynamics.vehicles import cooperative_load as formation
 from lapwing.dynamics.vehicles.cooperative_load import COMMANDS, LiftCommand, load_acceleration
 from lapwing.kernels import kernel
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels.codegen import map_index
 
 
 class FormationControl(NamedTuple):
@@ -32,13 +32,13 @@ def formation_control(p, t, x):
     """Thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
     wanted, slope = forces.wanted_specific(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, wanted, slope)
-    thrust = each_index(forces.quad_thrust, x.link, p, x, wanted, slope, s, s_rate)
+    thrust = map_index(forces.quad_thrust, x.link, p, x, wanted, slope, s, s_rate)
     # these thrusts give the accelerations, and those the rates of the wanted forces
-    force = each_index(formation.thrust_world, x.link, x, thrust)
+    force = map_index(formation.thrust_world, x.link, x, thrust)
     specific = load_acceleration(p, x, force)
     wanted, slope = forces.wanted_specific(p, t, x, add(specific, (0.0, 0.0, -p.gravity)))
     s, s_rate = forces.shares(p, x, wanted, slope)
-    return LiftCommand(thrust, each_index(forces.quad_moment, x.link, p, x, wanted, slope, s, s_rate, force, specific))
+    return LiftCommand(thrust, map_index(forces.quad_moment, x.link, p, x, wanted, slope, s, s_rate, force, specific))
 
 
 COMMANDS[FormationControl] = formation_control

@@ -20,7 +20,7 @@ from lapwing.dynamics.vector import (
     transpose,
 )
 from lapwing.dynamics.vehicles.cooperative_load import add_outer, link_acceleration, solve_symmetric
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 UPRIGHT_SHARE = 0.3  # of its weight that a quadrotor's attitude always aims to carry
 NOTHING = (0.0, 0.0, 0.0)
@@ -28,14 +28,14 @@ FORWARD = (1.0, 0.0, 0.0)  # heading of all quadrotors
 SHARE_DAMPING = 0.03  # keeps the shares bounded where the links do not span space (theory.md, eq. (7.23))
 
 
-@leaf
+@always_inline
 def desired_load(path, t):
     """(position, velocity, acceleration) of the desired path at time t."""
     velocity = add(path[1], scale(2.0 * t, path[2]))
     return add(path[0], add(scale(t, path[1]), scale(t * t, path[2]))), velocity, scale(2.0, path[2])
 
 
-@leaf
+@always_inline
 def wanted_specific(p, t, x, acceleration):
     """Wanted v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (theory.md, eq. (7.22))."""
     c = p.drive
@@ -47,7 +47,7 @@ def wanted_specific(p, t, x, acceleration):
     return add(add(feedback, wanted_acceleration), (0.0, 0.0, p.gravity)), slope
 
 
-@leaf
+@always_inline
 def _shared(matrix, x, b, b_rate):
     """Solution of (sum of q q^T + damping) s = b and its derivative."""
     s = solve_symmetric(matrix, b)
@@ -91,7 +91,7 @@ def wanted_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
     return force, add(along, add(cross(lever_rate, q), cross(lever, q_rate)))
 
 
-@leaf
+@always_inline
 def _unit(a, a_rate):
     """a / |a| and its derivative."""
     k = 1.0 / norm(a)
@@ -99,7 +99,7 @@ def _unit(a, a_rate):
     return unit, scale(k, subtract(a_rate, scale(dot(unit, a_rate), unit)))
 
 
-@leaf
+@always_inline
 def upright(force, force_rate, floor):
     """The force with its vertical part kept above `floor` [N], smoothly, and its derivative: no quadrotor tips over."""
     over = force[2] - floor
@@ -109,7 +109,7 @@ def upright(force, force_rate, floor):
     return kept, (force_rate[0], force_rate[1], slope * force_rate[2])
 
 
-@leaf
+@always_inline
 def wanted_attitude(force, force_rate):
     """R_world_wanted: z along the force, x towards world x; and its rate in that frame (theory.md, eq. (7.26))."""
     z, z_rate = _unit(force, force_rate)
@@ -133,7 +133,7 @@ def moment(p, x, force, force_rate, i):
     return add(add(turned, damped), cross(o, multiply(p.quad_inertia[i], o)))
 
 
-@leaf
+@always_inline
 def quad_thrust(p, x, wanted, slope, s, s_rate, i):
     """Thrust [N] of quadrotor i: the part of its wanted force along its axis."""
     # a force does not depend on the accelerations, only its derivative does
@@ -142,7 +142,7 @@ def quad_thrust(p, x, wanted, slope, s, s_rate, i):
     return dot(force, (m[2], m[5], m[8]))
 
 
-@leaf
+@always_inline
 def quad_moment(p, x, wanted, slope, s, s_rate, force, specific, i):
     """Moment [N m] of quadrotor i when all give `force` [N] and the load has `specific` acceleration [m/s^2]."""
     omega_rate = link_acceleration(p, x, force, specific, i)

@@ -10,8 +10,8 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.dynamics.lie.ts2 import Swing, tangent
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, divide, dot, multiply, scale, subtract
-from lapwing.kernels import DispatchTable, kernel, leaf
-from lapwing.kernels.codegen import each_index, implements
+from lapwing.kernels import DispatchTable, always_inline, kernel
+from lapwing.kernels.codegen import map_index, overload_for
 
 
 class LiftCommand(NamedTuple):
@@ -66,7 +66,7 @@ def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> 
     return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
 
 
-@implements(command)
+@overload_for(command)
 def _command(p, t, x):
     drive = p.types[p.fields.index("drive")].instance_class
     if drive is LiftCommand:
@@ -75,7 +75,7 @@ def _command(p, t, x):
     return lambda p, t, x: law(p, t, x)
 
 
-@leaf
+@always_inline
 def solve_symmetric(m: Mat3, b: Vec3) -> Vec3:
     """Solution of m x = b for a symmetric 3x3 matrix, by cofactors."""
     c0 = m[4] * m[8] - m[5] * m[5]
@@ -88,7 +88,7 @@ def solve_symmetric(m: Mat3, b: Vec3) -> Vec3:
     return scale(k, apply((c0, c1, c2, c1, c4, c5, c2, c5, c8), b))
 
 
-@leaf
+@always_inline
 def add_outer(m: Mat3, weight: float, q: Vec3) -> Mat3:
     """m + weight q q^T."""
     x, y, z = weight * q[0], weight * q[1], weight * q[2]
@@ -99,7 +99,7 @@ def add_outer(m: Mat3, weight: float, q: Vec3) -> Mat3:
     )  # fmt: skip
 
 
-@leaf
+@always_inline
 def thrust_world(x, thrust, i):
     """Thrust of quadrotor i in the world [N]."""
     m = rotation_matrix(x.attitude[i])
@@ -119,19 +119,19 @@ def load_acceleration(p, x, force):
     return solve_symmetric(matrix, pull)
 
 
-@leaf
+@always_inline
 def link_acceleration(p, x, force, specific, i):
     """omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory.md, eq. (7.20))."""
     relative = subtract(specific, scale(1.0 / p.quad_mass[i], force[i]))
     return scale(1.0 / p.link_length[i], cross(x.link[i].direction, relative))
 
 
-@leaf
+@always_inline
 def _link_rate(p, x, force, specific, i):
     return tangent(x.link[i], link_acceleration(p, x, force, specific, i))
 
 
-@leaf
+@always_inline
 def _body_rate(p, x, given, i):
     inertia, o = p.quad_inertia[i], x.omega_body[i]
     return divide(add(given.moment_body[i], cross(multiply(inertia, o), o)), inertia)
@@ -141,27 +141,27 @@ def _body_rate(p, x, given, i):
 def rate(p, t, x):
     """Tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
     given = command(p, t, x)
-    force = each_index(thrust_world, x.link, x, given.thrust)
+    force = map_index(thrust_world, x.link, x, given.thrust)
     specific = load_acceleration(p, x, force)
     return CooperativeLoadState(
         x.load_velocity,
         add(specific, (0.0, 0.0, -p.gravity)),
         x.omega_body,
-        each_index(_body_rate, x.link, p, x, given),
-        each_index(_link_rate, x.link, p, x, force, specific),
+        map_index(_body_rate, x.link, p, x, given),
+        map_index(_link_rate, x.link, p, x, force, specific),
     )
 
 
 RATES[CooperativeLoadParameters] = rate
 
 
-@leaf
+@always_inline
 def quad_position(p, x, i):
     """Position [m] of quadrotor i: the load's, less the link."""
     return subtract(x.load_position, scale(p.link_length[i], x.link[i].direction))
 
 
-@leaf
+@always_inline
 def quad_velocity(p, x, i):
     """Velocity [m/s] of quadrotor i."""
     return subtract(x.load_velocity, scale(p.link_length[i], cross(x.link[i].omega, x.link[i].direction)))

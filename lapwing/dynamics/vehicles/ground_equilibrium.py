@@ -15,7 +15,7 @@ from lapwing.dynamics.terrain import LEVEL, Level, Relief, surface
 from lapwing.dynamics.vector import Mat3, Vec3
 from lapwing.dynamics.vector import apply as compiled_apply
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 
 ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
 CONVERGED = 1e-12  # change of the slope between two iterations
@@ -27,8 +27,8 @@ Pose = tuple[Vec3, Quaternion]  # position of the centre of mass [m] in the worl
 Place = tuple[float, float]  # world x and y [m]
 
 # thousands of calls, each cheaper than handing its arguments to machine code
-apply = uncompiled(compiled_apply)
-from_matrix, rotation_matrix = uncompiled(quaternion.from_matrix), uncompiled(quaternion.rotation_matrix)
+apply = python_function(compiled_apply)
+from_matrix, rotation_matrix = python_function(quaternion.from_matrix), python_function(quaternion.rotation_matrix)
 
 
 def standing_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: Place = (0.0, 0.0)) -> Pose:

@@ -12,7 +12,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion, conjugate, log, multiply
 from lapwing.dynamics.vector import Vec3, add, cross, scale
 from lapwing.dynamics.vector import multiply as multiply_each
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class GyrostatParameters(NamedTuple):
@@ -37,7 +37,7 @@ class GyrostatParameters(NamedTuple):
         return not any(of_rate)
 
 
-@leaf
+@always_inline
 def rotor_momentum(p, t):
     """Momentum of the rotors and its derivative, both in the body (theory.md, eq. (7.6))."""
     h, w = p.rotor_momentum, p.forcing_frequency
@@ -45,14 +45,14 @@ def rotor_momentum(p, t):
     return momentum, (0.0, 0.0, -h[2] * p.forcing_amplitude * w * math.sin(w * t))
 
 
-@leaf
+@always_inline
 def attitude_torque(p, x):
     """Proportional-derivative control on SO(3) towards the target (theory.md, eq. (7.9))."""
     error = log(multiply(conjugate(p.target), x.attitude))
     return add(scale(-p.attitude_gain, error), scale(-p.rate_gain, x.omega_body))
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """I omega' = (I omega + h) x omega - h' - damping + feedback + control (theory.md, eq. (7.7))."""
     o = x.omega_body

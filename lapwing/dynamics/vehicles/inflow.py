@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 # measured between hover and the windmill brake state: powers of the climb over the induced velocity in hover
 DESCENT = (1.0, -1.125, -1.372, -1.718, -0.655)
@@ -11,7 +11,7 @@ NEWTON_STEPS = 12  # from ten hover velocities across to a rounding
 WAKE_STEPS = 8  # from no wake to a rounding
 
 
-@leaf
+@always_inline
 def axial(climb):
     """Induced velocity in climb or descent, both over that in hover; without a wind across the axis."""
     if climb >= 0.0:

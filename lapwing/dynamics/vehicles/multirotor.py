@@ -25,7 +25,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 )
 from lapwing.dynamics.vehicles.multirotor_stepper import begin, parts, steps, within
 from lapwing.kernels import kernel
-from lapwing.kernels.codegen import each
+from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -79,7 +79,7 @@ def advance(method, p, key, tick, state, command, h, n):
 def observe(p, tick, interval, state, command):
     """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
     layout = p.layout
-    voltage = each(within, layout.max_voltage, command, command)
+    voltage = map_tuple(within, layout.max_voltage, command, command)
     body = hooks.all_body(p.effects, state.memory, p.body)
     drive = MultirotorDrive(p, body, state.memory, voltage)
     s, rotors, _, _ = evaluate(drive, tick * interval, seen(layout, state.motion))

@@ -24,8 +24,8 @@ from lapwing.dynamics.effects._types import (
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
-from lapwing.kernels import DispatchTable, leaf
-from lapwing.kernels.codegen import each, implements
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import map_tuple, overload_for
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
@@ -84,28 +84,28 @@ class MultirotorDrive(NamedTuple):
     voltage: PerRotor  # [V]
 
 
-@leaf
+@always_inline
 def _lag(s, speed, voltage):
     return s.layout.lag_rate * (s.layout.speed_per_volt * voltage - speed)
 
 
-@leaf
+@always_inline
 def _static_current(s, torque, voltage):
     """Current that holds the air's torque (theory.md, eq. (1.14)); none when the controller is off."""
     return torque / s.layout.volt_per_speed + s.layout.no_load_current if voltage > 0.0 else 0.0
 
 
-@leaf
+@always_inline
 def _product(c, a, b):
     return a * b
 
 
-@leaf
+@always_inline
 def _constant(c, a, b):
     return c
 
 
-@leaf
+@always_inline
 def evaluate(drive, t, motion):
     """One evaluation of all effects: (situation, rotors, force_world [N], torque_body [N m])."""
     p, memory = drive.parameters, drive.memory
@@ -117,12 +117,12 @@ def evaluate(drive, t, motion):
     air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
     s = EffectInputs(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
     # adding to -0.0 changes no number, so the compiler drops it
-    one, zero = each(_constant, 1.0, speed, speed), each(_constant, -0.0, speed, speed)
+    one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
     factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
     voltage = hooks.all_supply(p.effects, memory, drive.voltage)
-    current = each(_static_current, s, loads.torque, voltage)
-    lag = (each(_lag, s, speed, voltage), current, each(_product, 0.0, voltage, current))
+    current = map_tuple(_static_current, s, loads.torque, voltage)
+    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(_product, 0.0, voltage, current))
     acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
     rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
     thrust, torque = thrust_wrench(layout, loads)
@@ -132,7 +132,7 @@ def evaluate(drive, t, motion):
     return s, rotors, force, torque
 
 
-@leaf
+@always_inline
 def rate(drive, t, motion):
     """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
     s, rotors, force, torque = evaluate(drive, t, motion)
@@ -140,12 +140,12 @@ def rate(drive, t, motion):
     return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)
 
 
-@leaf
+@always_inline
 def _itself(_, motion):
     return motion
 
 
-@leaf
+@always_inline
 def accelerations(drive, t, motion):
     """(linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
     s, _, force, torque = evaluate(drive, t, motion)
@@ -160,7 +160,7 @@ def seen(layout: RotorLayout, x: Any) -> Motion:
     raise NotImplementedError("compiled code only")
 
 
-@implements(seen, inline=True)
+@overload_for(seen, inline=True)
 def _seen(layout, x):
     return FORMS[x.instance_class].seen
 
@@ -170,6 +170,6 @@ def accelerations_of_form(drive, t, x):
     raise NotImplementedError("compiled code only")
 
 
-@implements(accelerations_of_form, inline=True)
+@overload_for(accelerations_of_form, inline=True)
 def _accelerations_of_form(drive, t, x):
     return FORMS[x.instance_class].accelerations

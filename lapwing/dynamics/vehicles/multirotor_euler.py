@@ -19,7 +19,7 @@ from lapwing.dynamics.vector import ZERO, Vec3, apply
 from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorParameters, MultirotorState, StateForm
-from lapwing.kernels import apart, kernel, leaf
+from lapwing.kernels import always_inline, kernel, noinline
 
 NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
 
@@ -138,7 +138,7 @@ def _ranks(a):
     return held, held + len(a.drive_bodies)
 
 
-@leaf
+@always_inline
 def _upright(b):
     """Whether a pitch is apart from 90 degrees; it passes there without a jump, so that no step leaps over it."""
     return math.cos(b.angles[1]) > NEAR
@@ -150,19 +150,19 @@ def _all_upright(x):
     return _upright(b[0]) and _upright(b[1]) and _upright(b[2]) and _upright(b[3]) and _upright(b[4])
 
 
-@leaf
+@always_inline
 def _stopped(b):
     """The tangent of one body where angles end: infinite for a pitch that is there, and nothing else."""
     return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
 
 
-@apart
+@noinline
 def seen(layout, x):
     """The Motion of the chassis with the speeds of the rotors."""
     return on_se3.seen(layout, five(x))
 
 
-@apart
+@noinline
 def rate(drive, t, x):
     """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
     if not _all_upright(x):
@@ -177,7 +177,7 @@ def rate(drive, t, x):
     return _tree(v, s.acceleration)
 
 
-@apart
+@noinline
 def struck(drive, x):
     """As `multirotor_multibody_equations.struck`."""
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
@@ -187,7 +187,7 @@ def struck(drive, x):
     return _tree(q, v)
 
 
-@apart
+@noinline
 def held(drive, x):
     """The bodies brought together again, as the assembly says."""
     given = drive.parameters.layout.bodies

@@ -17,8 +17,8 @@ from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.multibody.five_bodies import NO_WRENCH, FiveBodies, Machine, Rotor, Wrench
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, StateForm, evaluate
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple
 
 
 class Assembly(NamedTuple):
@@ -40,32 +40,32 @@ class AppliedLoads(NamedTuple):
     rotor: tuple  # (thrust [N], torque [N m], acceleration [rad/s^2]) of each rotor, as the reduced model has them
 
 
-@leaf
+@always_inline
 def _rotor_speed(chassis_rate, sign, propeller):
     # a rotor that pushes the body to +z turns about -z itself
     return sign * (chassis_rate - propeller.omega_body[2])
 
 
-@leaf
+@always_inline
 def _product(_, a, b):
     return a * b
 
 
-@leaf
+@always_inline
 def seen(layout, x):
     """The Motion of the chassis with the speeds of the rotors; of one that was torn off it is zero."""
     c = x.chassis
-    speed = each(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
-    speed = each(_product, 0.0, layout.bodies.drone.held, speed)
+    speed = map_tuple(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
+    speed = map_tuple(_product, 0.0, layout.bodies.drone.held, speed)
     return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
 
 
-@leaf
+@always_inline
 def _triple(accelerations, load, k):
     return load[0], load[1], accelerations[k]
 
 
-@leaf
+@always_inline
 def acting(drive, t, motion):
     """(situation, Acting): the effects of `multirotor.evaluate`, taken apart by body."""
     s, rotors, force, torque = evaluate(drive, t, motion)
@@ -73,16 +73,16 @@ def acting(drive, t, motion):
     field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
     known = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
     arms = (
-        total(each(_product, 0.0, layout.y_body, rotors.thrust)),
-        -total(each(_product, 0.0, layout.x_body, rotors.thrust)),
-        total(each(_product, 0.0, layout.reaction_sign, rotors.torque)),
+        total(map_tuple(_product, 0.0, layout.y_body, rotors.thrust)),
+        -total(map_tuple(_product, 0.0, layout.x_body, rotors.thrust)),
+        total(map_tuple(_product, 0.0, layout.reaction_sign, rotors.torque)),
     )
-    loads = each(pair, 0.0, rotors.thrust, rotors.torque)
-    parts = each(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
+    loads = map_tuple(pair, 0.0, rotors.thrust, rotors.torque)
+    parts = map_tuple(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
     return s, AppliedLoads(field, subtract(force, known), subtract(torque, arms), parts)
 
 
-@leaf
+@always_inline
 def _rotor(k, layout, R, motion, part):
     d, sign, powered = layout.bodies.drone, -layout.reaction_sign[k], layout.bodies.powered[k]
     thrust, torque, acceleration = part
@@ -93,7 +93,7 @@ def _rotor(k, layout, R, motion, part):
     return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], spins, drive, speed, wrench, d.held[k])
 
 
-@leaf
+@always_inline
 def machine(drive, t, motion):
     """`five_bodies.Machine` at an instant, its imposed speeds those of the state."""
     s, a = acting(drive, t, motion)
@@ -109,14 +109,14 @@ def machine(drive, t, motion):
     return Machine(mass, s.body.inertia, a.gravity_world, wrench, rotors, layout.bodies.feedback)
 
 
-@leaf
+@always_inline
 def _still(k, layout, motion):
     d = layout.bodies.drone
     speed = -layout.bodies.powered[k] * layout.reaction_sign[k] * motion.rotor_speed[k]
     return Rotor(d.propeller_mass[k], d.propeller_inertia[k], d.hubs[k], d.spins[k], 0.0, speed, NO_WRENCH, d.held[k])
 
 
-@leaf
+@always_inline
 def unloaded(drive, motion):
     """The machine without loads: all that projection looks at."""
     layout = drive.parameters.layout
@@ -162,13 +162,13 @@ def accelerations(drive, t, x):
 FORMS[FiveBodies] = StateForm(seen, rate, held, accelerations)
 
 
-@leaf
+@always_inline
 def _on_propeller(x, reaction):
     force, torque = reaction
     return force, rotate_back(x.attitude, torque)
 
 
-@leaf
+@always_inline
 def _on_chassis(chassis, x, reaction):
     force, torque = reaction
     arm = subtract(x.position_world, chassis.position_world)

@@ -22,7 +22,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     evaluate,
 )
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -51,13 +51,13 @@ class SlungMotion(NamedTuple):
     load_velocity: Vec3  # [m/s]
 
 
-@leaf
+@always_inline
 def seen(layout, x):
     """The Motion of the vehicle."""
     return x.vehicle
 
 
-@leaf
+@always_inline
 def tension(sling, away, speed_away):
     """(force [N] that pulls the hook towards the load, length [m]): none while the cable is slack.
 
@@ -74,7 +74,7 @@ def tension(sling, away, speed_away):
     return scale(max(pull, 0.0) / distance, away), distance
 
 
-@leaf
+@always_inline
 def cable(sling, R_world_body, x):
     """(force [N] in the world on the vehicle, torque [N m] on it in the body)."""
     v = x.vehicle
@@ -85,7 +85,7 @@ def cable(sling, R_world_body, x):
     return force, cross(sling.hook_body, apply_transposed(R_world_body, force))
 
 
-@leaf
+@always_inline
 def ground(sling, position, velocity):
     """Force [N] of the ground on the load: a spring with a damper that does not pull, and Coulomb's friction."""
     height, normal = surface(sling.terrain, position[0], position[1])
@@ -99,7 +99,7 @@ def ground(sling, position, velocity):
     return subtract(scale(press, normal), scale(FRICTION * press / max(norm(sliding), SLIDING), sliding))
 
 
-@leaf
+@always_inline
 def load_acceleration(sling, field, air, pull, x):
     """[m/s^2] of the load, which the cable pulls back with the force `pull` [N]."""
     wind = subtract(air.wind_world, x.load_velocity)
@@ -121,7 +121,7 @@ def rate(drive, t, x):
     return SlungMotion(tangent, x.load_velocity, load_acceleration(sling, field, s.air, pull, x))
 
 
-@leaf
+@always_inline
 def _itself(_, x):
     return x
 
@@ -136,7 +136,7 @@ def accelerations(drive, t, x):
 FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations)
 
 
-@leaf
+@always_inline
 def cable_force(layout, x):
     """Force [N] in the world of the cable on the load."""
     force, _ = cable(layout.bodies, rotation_matrix(x.vehicle.attitude), x)

@@ -6,10 +6,10 @@ import sys
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.integrators import SHORTEST, shorter
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorDrive, MultirotorParameters, evaluate, seen
-from lapwing.kernels import apart as never_inlined
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each, implements
-from lapwing.kernels.state_tree import apart, finite
+from lapwing.kernels import always_inline
+from lapwing.kernels import noinline as never_inlined
+from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.state_tree import finite, relative_difference
 
 FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
 
@@ -18,7 +18,7 @@ def _step(method, drive, t, x, h):
     raise NotImplementedError("compiled code only")
 
 
-@implements(_step, inline=True)
+@overload_for(_step, inline=True)
 def _step_inlined(method, drive, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     form = FORMS[x.instance_class]
@@ -27,13 +27,13 @@ def _step_inlined(method, drive, t, x, h):
     return lambda method, drive, t, x, h: held(drive, one_step(its_rate, drive, t, x, h))
 
 
-@leaf
+@always_inline
 def within(limit, voltage, _):
     """The nearest voltage [V] that the controllers can ask for."""
     return min(max(voltage, 0.0), limit)
 
 
-@leaf
+@always_inline
 def _airborne(p, body, memory, voltage):
     """The drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
@@ -41,7 +41,7 @@ def _airborne(p, body, memory, voltage):
     return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, kept, voltage)
 
 
-@leaf
+@always_inline
 def _awake_step(method, drive, t, x, h):
     """(state's form, memory) a step later with every effect taking part."""
     x = _step(method, drive, t, x, h)
@@ -72,7 +72,7 @@ def _stiff_steps(method, drive, t, x, h, end):
             else:
                 start = t + half
         sound = finite(y)
-        error = max(apart(y, whole), apart(settled, at_once)) if sound else math.inf
+        error = max(relative_difference(y, whole), relative_difference(settled, at_once)) if sound else math.inf
         if taken > smallest and (error > allowed or hooks.all_events(p.effects, memory, settled)):
             part = shorter(taken, error, allowed)
             continue
@@ -84,30 +84,30 @@ def _stiff_steps(method, drive, t, x, h, end):
             part = 2.0 * taken
 
 
-@leaf
+@always_inline
 def begin(p, key, tick, state, command, interval):
     """The drive of the exchange interval `tick`, with what effects draw for it; arguments as of `advance`."""
     layout, memory = p.layout, state.memory
-    voltage = each(within, layout.max_voltage, command, command)
+    voltage = map_tuple(within, layout.max_voltage, command, command)
     before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
     s, rotors, _, _ = evaluate(before, tick * interval, seen(layout, state.motion))
     memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
     return MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
 
 
-@leaf
+@always_inline
 def parts(layout, h):
     """How many parts a step of h [s] is split into for the motors' lag."""
     return max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
 
 
-@leaf
+@always_inline
 def airborne_step(method, drive, t, x, h):
     """The state's form a step later, without the effects that can sleep."""
     return _step(method, _airborne(drive.parameters, drive.body, drive.memory, drive.voltage), t, x, h)
 
 
-@leaf
+@always_inline
 def steps(method, drive, x, start, end, h, first, n):
     """(state's form, memory) at the `end` [s] of an interval that begins at `start`, from step `first` of its n on."""
     p, body, memory, voltage = drive

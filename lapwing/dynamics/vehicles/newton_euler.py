@@ -3,8 +3,8 @@
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import FullMassProperties, OffsetMassProperties
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, scale, subtract
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import overload_for
 
 
 def angular_acceleration(body, omega, torque):
@@ -12,17 +12,17 @@ def angular_acceleration(body, omega, torque):
     raise NotImplementedError("compiled code only")
 
 
-@implements(angular_acceleration, inline=True)
+@overload_for(angular_acceleration, inline=True)
 def _angular_acceleration_of_class(body, omega, torque):
     return _with_products if body.instance_class is FullMassProperties else _about_principal_axes
 
 
-@leaf
+@always_inline
 def _with_products(body, omega, torque):
     return apply(body.inverse_inertia, subtract(torque, cross(omega, apply(body.inertia, omega))))
 
 
-@leaf
+@always_inline
 def _about_principal_axes(body, omega, torque):
     gyration, inverse = body.gyration, body.inverse_inertia
     return (
@@ -38,17 +38,17 @@ def newton_euler(body, drive, s, force, torque):
     raise NotImplementedError("compiled code only")
 
 
-@implements(newton_euler, inline=True)
+@overload_for(newton_euler, inline=True)
 def _newton_euler_of_class(body, drive, s, force, torque):
     return _about_offset_centre if body.instance_class is OffsetMassProperties else _about_centre
 
 
-@leaf
+@always_inline
 def _about_centre(body, drive, s, force, torque):
     return scale(body.inverse_mass, force), angular_acceleration(body, s.motion.omega_body, torque)
 
 
-@leaf
+@always_inline
 def _about_offset_centre(body, drive, s, force, torque):
     """With the centre of mass at c from the position: gravity alone acts there (theory.md, eq. (2.42))."""
     R, omega, c = s.R_world_body, s.motion.omega_body, body.centre_body

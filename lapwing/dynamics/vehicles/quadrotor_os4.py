@@ -10,7 +10,7 @@ from typing import NamedTuple
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 Four = tuple[float, float, float, float]  # one for each rotor
 
@@ -52,13 +52,13 @@ def hover_speed(p: Os4Parameters) -> float:
     return math.sqrt(p.mass * p.gravity / (4.0 * p.lift_constant))
 
 
-@leaf
+@always_inline
 def _acceleration(p, motors, speed, voltage):
     current = (voltage - motors.constant * speed) / motors.resistance
     return (motors.constant * current - p.drag_constant * speed * speed) / p.rotor_inertia
 
 
-@leaf
+@always_inline
 def rotor_acceleration(p, motors, speed):
     """Rotor accelerations [rad/s^2]: shaft torque less drag, over the inertia; zero without motors (eq. (7.14))."""
     if motors is None:
@@ -72,7 +72,7 @@ def rotor_acceleration(p, motors, speed):
     )
 
 
-@leaf
+@always_inline
 def rotor_loads(p, speed):
     """(thrust [N] along body z, torque [N m] in the body) of the rotors (theory.md, eq. (7.11))."""
     w1, w2, w3, w4 = speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3]
@@ -84,13 +84,13 @@ def rotor_loads(p, speed):
     )
 
 
-@leaf
+@always_inline
 def residual(four):
     """Sum over the rotors, signed by their sense of rotation about body z."""
     return -four[0] + four[1] - four[2] + four[3]
 
 
-@leaf
+@always_inline
 def net_force(p, x):
     """Force on the centre of mass without drag [N] in the world: thrust and weight (theory.md, eq. (7.13))."""
     m = rotation_matrix(x.attitude)
@@ -98,7 +98,7 @@ def net_force(p, x):
     return add(scale(thrust, (m[2], m[5], m[8])), (0.0, 0.0, -p.mass * p.gravity))
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """Newton and Euler with the rotors' momentum (theory.md, eqs. (7.12) and (7.13))."""
     o = x.omega_body

@@ -7,8 +7,8 @@ from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
 from lapwing.dynamics.vehicles import cooperative_load as formation
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_index
 
 
 class ReleasedLoadParameters(NamedTuple):
@@ -42,28 +42,28 @@ def release(p: CooperativeLoadParameters, x: CooperativeLoadState) -> tuple[Rele
     )
 
 
-@leaf
+@always_inline
 def _acceleration(p, x, i):
     force = formation.thrust_world(x, p.drive.thrust, i)
     return add(scale(1.0 / p.quad_mass[i], force), (0.0, 0.0, -p.gravity))
 
 
-@leaf
+@always_inline
 def _body_rate(p, x, i):
     inertia, o = p.quad_inertia[i], x.omega_body[i]
     return divide(add(p.drive.moment_body[i], cross(multiply(inertia, o), o)), inertia)
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """Tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
     return ReleasedLoadState(
         x.load_velocity,
         (0.0, 0.0, -p.gravity),
         x.omega_body,
-        each_index(_body_rate, x.quad_position, p, x),
+        map_index(_body_rate, x.quad_position, p, x),
         x.quad_velocity,
-        each_index(_acceleration, x.quad_position, p, x),
+        map_index(_acceleration, x.quad_position, p, x),
     )
 
 

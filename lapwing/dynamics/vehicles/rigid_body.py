@@ -5,7 +5,7 @@ from typing import NamedTuple
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import Vec3, cross, divide, multiply
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class RigidBody(NamedTuple):
@@ -26,7 +26,7 @@ class FreeBodyParameters(NamedTuple):
         return True
 
 
-@leaf
+@always_inline
 def rate(p, t, x):
     """omega' = I^-1 (I omega x omega)."""
     o = x.omega_body

@@ -12,8 +12,8 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
 from lapwing.dynamics.vehicles.unloading_contact_points import CORNERS, ROLLERS, SIDES, Y, contacts, frames
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_index
 
 LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] at which somebody takes the pack up, [s] in which he gets it moving
 Surface = tuple[float, float, float, float]  # stiffness [N/m], damping [N s/m], static and dynamic friction
@@ -61,7 +61,7 @@ class UnloadingState(NamedTuple):
     on_ground: tuple[Vec3, ...]  # eight corners
 
 
-@leaf
+@always_inline
 def _wrench(touches, x):
     """Sum of the forces [N] and of their torques about the pack's middle [N m], world frame."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -71,12 +71,12 @@ def _wrench(touches, x):
     return force, torque
 
 
-@leaf
+@always_inline
 def _sum(a, b):
     return add(a[0], b[0]), add(a[1], b[1])
 
 
-@leaf
+@always_inline
 def door_acceleration(p, t, x, f, on_pack):
     """Angular acceleration of the door [rad/s^2] under the pack's reaction `on_pack` (theory.md, eq. (9.9))."""
     angle, rate = x.door
@@ -96,7 +96,7 @@ def door_acceleration(p, t, x, f, on_pack):
     return (weight + spring + ground - push) * 3.0 / (p.door_mass * p.door_length * p.door_length)
 
 
-@leaf
+@always_inline
 def _bristle_rate(touches, i):
     return touches[i].bristle_rate
 
@@ -122,9 +122,9 @@ def rate(p, t, x):
         acceleration,
         angular,
         (x.door[1], door_acceleration(p, t, x, f, found.door)),
-        each_index(_bristle_rate, x.on_rollers, found.rollers),
-        each_index(_bristle_rate, x.on_door, found.door),
-        each_index(_bristle_rate, x.on_ground, found.ground),
+        map_index(_bristle_rate, x.on_rollers, found.rollers),
+        map_index(_bristle_rate, x.on_door, found.door),
+        map_index(_bristle_rate, x.on_ground, found.ground),
     )
 
 
@@ -149,7 +149,7 @@ def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:
     )
 
 
-@leaf
+@always_inline
 def _force(touches, i):
     return touches[i].force
 
@@ -158,7 +158,7 @@ def _force(touches, i):
 def forces_on_pack(p, t, x):
     """World forces [N]: (at the ten places on rollers and hinge, of the door, of the ground, of the walls)."""
     found = contacts(p, t, x)
-    rollers = each_index(_force, x.on_rollers, found.rollers)
+    rollers = map_index(_force, x.on_rollers, found.rollers)
     return rollers, _wrench(found.door, x)[0], _wrench(found.ground, x)[0], _wrench(found.walls, x)[0]
 
 

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3, add, dot, norm, scale, subtract
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 STRIBECK_SPEED = 0.01  # [m/s] where friction falls from static to dynamic
 BRISTLE = 5.0e3  # [1/m] stiffness over the normal force: bristles bend 0.1 mm before they slide
@@ -25,7 +25,7 @@ class Touch(NamedTuple):
     bristle_rate: Vec3  # [m/s]
 
 
-@leaf
+@always_inline
 def friction(friction_static, friction_dynamic, bristle, slip):
     """(friction force over the normal force, rate of the bristle [m/s]) at the velocity `slip` [m/s]."""
     speed = norm(slip)
@@ -37,7 +37,7 @@ def friction(friction_static, friction_dynamic, bristle, slip):
     return (scale(limit / over, force) if over > limit else force), rate
 
 
-@leaf
+@always_inline
 def touch(surface, depth, normal, place, velocity, bristle):
     """The force on the pack where it is `depth` [m] inside of something.
 

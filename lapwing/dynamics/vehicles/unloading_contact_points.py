@@ -9,8 +9,8 @@ from typing import NamedTuple
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 from lapwing.dynamics.vehicles.unloading_contact import Touch, touch
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_index
 
 ROLLERS, CORNERS = 4, 8
 SIDES = (-0.8, 0.8)  # where along the pack's width it rests on a roller or an edge, of half its width
@@ -31,13 +31,13 @@ class Frames(NamedTuple):
     rolling: float  # [rad/s]
 
 
-@leaf
+@always_inline
 def roller_speed(p, t):
     """Speed of the rollers at time t [rad/s]: a ramp."""
     return p.roller_speed * min(max((t - p.ramp_start) / p.ramp_duration, 0.0), 1.0)
 
 
-@leaf
+@always_inline
 def frames(p, t, x):
     """The frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
     c, s = math.cos(p.tilt), math.sin(p.tilt)
@@ -50,13 +50,13 @@ def frames(p, t, x):
     return Frames(pack, apply(pack, x.omega_body), forward, upward, hinge, along, inward, roller_speed(p, t))
 
 
-@leaf
+@always_inline
 def material_velocity(x, f, place):
     """Velocity of the pack's material at a place [m/s]."""
     return add(x.velocity_world, cross(f.spin_world, subtract(place, x.position_world)))
 
 
-@leaf
+@always_inline
 def bar(p, x, f, surface, centre, radius, rolling, velocity, bristle):
     """Contact with a cylinder along y through `centre`, which turns at `rolling` [rad/s] (theory.md, eq. (9.7))."""
     h = p.pack_half
@@ -87,7 +87,7 @@ def roller_touch(p, x, f, i):
     return bar(p, x, f, p.on_rollers, centre, radius, rolling, (0.0, 0.0, 0.0), x.on_rollers[i])
 
 
-@leaf
+@always_inline
 def corner(p, x, f, i):
     """Corner i of the pack in the world [m]."""
     return add(x.position_world, apply(f.pack, multiply(SIGNS[i], p.pack_half)))
@@ -147,8 +147,8 @@ def contacts(p, t, x):
     """All contacts of the pack at time t."""
     f = frames(p, t, x)
     return Contacts(
-        each_index(roller_touch, x.on_rollers, p, x, f),
-        each_index(door_touch, x.on_door, p, x, f),
-        each_index(ground_touch, x.on_ground, p, x, f),
-        each_index(wall_touch, x.on_ground, p, x, f),
+        map_index(roller_touch, x.on_rollers, p, x, f),
+        map_index(door_touch, x.on_door, p, x, f),
+        map_index(ground_touch, x.on_ground, p, x, f),
+        map_index(wall_touch, x.on_ground, p, x, f),
     )

@@ -93,14 +93,14 @@ class _Failed(NamedTuple):
     excinfoptr: Any
 
 
-def is_whole(fndesc: Any) -> bool:
+def uses_value_call_conv(fndesc: Any) -> bool:
     """Whether the function of a descriptor is called by `ValueCallConv`."""
     return fndesc.mangled_name.endswith(WHOLE)
 
 
 def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
     """Let code that numba writes call an inner function, which it knows by its entry from Python."""
-    if not is_whole(fndesc):
+    if not uses_value_call_conv(fndesc):
         context.insert_user_function(entry, fndesc, [library])
         return
 
@@ -152,11 +152,11 @@ class InnerLower(KernelLower):
     @property
     def call_conv(self) -> CPUCallConv:
         """Of the function itself."""
-        return ValueCallConv(self.context) if is_whole(self.fndesc) else super().call_conv
+        return ValueCallConv(self.context) if uses_value_call_conv(self.fndesc) else super().call_conv
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin the function."""
-        if not is_whole(fndesc):
+        if not uses_value_call_conv(fndesc):
             super().setup_function(fndesc)
             return
         self.function = ValueCallConv(self.context).declare(self.module, fndesc)
@@ -168,7 +168,7 @@ class InnerLower(KernelLower):
 
     def lower_inst(self, inst: Any) -> None:
         """Write one instruction."""
-        if isinstance(inst, ir.Return) and is_whole(self.fndesc):
+        if isinstance(inst, ir.Return) and uses_value_call_conv(self.fndesc):
             self.call_conv.return_value(self.builder, self.loadvar(inst.value.name))
         else:
             super().lower_inst(inst)

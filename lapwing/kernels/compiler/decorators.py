@@ -22,7 +22,7 @@ def _compile(function: Callable, **options: Any) -> Any:
     return compiled
 
 
-def unkept(function: Any) -> Any:
+def uncached(function: Any) -> Any:
     """Compile a function that every process makes anew, and of which nothing is kept on the disk; a kernel as it is."""
     if isinstance(function, KernelDispatcher):
         return function
@@ -30,7 +30,7 @@ def unkept(function: Any) -> Any:
 
 
 @cache
-def uncompiled(function: F) -> F:
+def python_function(function: F) -> F:
     """The Python function of a kernel, on those of the kernels that it calls by name.
 
     For numpy arrays instead of numbers, and for single numbers in Python code: the first call of anything compiled
@@ -39,7 +39,7 @@ def uncompiled(function: F) -> F:
     python: Any = getattr(function, "py_func", function)
     known = python.__globals__
     called = {
-        name: uncompiled(known[name])
+        name: python_function(known[name])
         for name in python.__code__.co_names
         if isinstance(known.get(name), KernelDispatcher)
     }
@@ -53,7 +53,7 @@ def kernel(function: F) -> F:
     return _compile(function)
 
 
-def apart(function: F) -> F:
+def noinline(function: F) -> F:
     """The same for large functions that others call: never inlined, so that LLVM looks at them once, not at each copy.
 
     A function that is not marked so inherits from the first that calls it whether it is always inlined.
@@ -62,7 +62,7 @@ def apart(function: F) -> F:
     return _compile(function, forceinline=False)
 
 
-def vectorised(function: F) -> F:
+def vectorise_loops(function: F) -> F:
     """The same for a kernel with a loop over members side by side, which LLVM is to vectorise.
 
     Loops that call functions look small until those are inlined; unrolled by then, they cannot be vectorised.
@@ -71,7 +71,7 @@ def vectorised(function: F) -> F:
     return _compile(function)
 
 
-def uncounted(function: F) -> F:
+def no_refcount(function: F) -> F:
     """The same for a kernel that is called by its address alone, and changes arrays in place or not at all.
 
     What it is given belongs to its caller until it returns, so that no references need to be counted: half of the time
@@ -81,6 +81,6 @@ def uncounted(function: F) -> F:
     return _compile(function)
 
 
-def leaf(function: F) -> F:
+def always_inline(function: F) -> F:
     """The same for small functions that are always inlined into their caller."""
     return _compile(function, forceinline=True)

@@ -21,7 +21,7 @@ from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 
-from lapwing.kernels.compiler.call_convention import InnerLower, KernelLower, is_whole, offer
+from lapwing.kernels.compiler.call_convention import InnerLower, KernelLower, offer, uses_value_call_conv
 from lapwing.kernels.compiler.code_libraries import InnerLibrary, KernelLibrary
 from lapwing.kernels.compiler.file_locks import released_at_end
 
@@ -147,7 +147,7 @@ class InnerLowering(KernelLowering):
         state.library.forwards = state.flags.forceinline and _forwards(state.func_ir)
         super().run_pass(state)
         entry, lowered = _refusal(state.targetctx), state["cr"]
-        if hasattr(state.func_id.func, "__apart__") and is_whole(lowered.fndesc):
+        if hasattr(state.func_id.func, "__apart__") and uses_value_call_conv(lowered.fndesc):
             state.library.apart = lowered.fndesc.mangled_name
         offer(state.targetctx, entry, lowered.fndesc, state.library)
         state.reload_init.extend(state.library._reload_init)

@@ -7,12 +7,12 @@ from typing import Any
 from numba.core import types
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from lapwing.kernels.compiler.decorators import uncompiled
+from lapwing.kernels.compiler.decorators import python_function
 
 
 def exported(kernel: Any) -> Callable[..., Any]:
     """Return the plain Python function of a kernel of floats, which stands for the kernel in compiled code."""
-    plain: Callable[..., Any] = uncompiled(kernel)
+    plain: Callable[..., Any] = python_function(kernel)
     compiled_as(plain, kernel)
     return plain
 

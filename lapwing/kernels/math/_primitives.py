@@ -17,7 +17,7 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from lapwing.kernels.compiler.decorators import leaf
+from lapwing.kernels.compiler.decorators import always_inline
 
 SPLITTER = 134217729.0  # 2**27 + 1
 ROUNDER = 6755399441055744.0  # 1.5 * 2**52: added and subtracted, it rounds to an integer
@@ -79,14 +79,14 @@ def table(name: str, values: tuple) -> Callable[[int], Any]:
     return look_up
 
 
-@leaf
+@always_inline
 def split(a):
     """Return the upper 26 bits of a double of magnitude below 2**996, rounded to nearest."""
     c = SPLITTER * a
     return c - (c - a)
 
 
-@leaf
+@always_inline
 def two_sum(a, b):
     """Return a + b rounded, and the error (Knuth)."""
     s = a + b
@@ -94,14 +94,14 @@ def two_sum(a, b):
     return s, (a - (s - v)) + (b - v)
 
 
-@leaf
+@always_inline
 def quick_two_sum(a, b):
     """Return a + b rounded, and the error, if |a| >= |b| or a is 0 (Dekker)."""
     s = a + b
     return s, b - (s - a)
 
 
-@leaf
+@always_inline
 def exact_square(a):
     """Return a * a rounded, and the error."""
     p = a * a
@@ -110,7 +110,7 @@ def exact_square(a):
     return p, ((a1 * a1 - p) + 2.0 * (a1 * a2)) + a2 * a2
 
 
-@leaf
+@always_inline
 def product(a, b):
     """Return a * b rounded, and the error."""
     p = a * b
@@ -119,7 +119,7 @@ def product(a, b):
     return p, ((a1 * b1 - p) + (a1 * b2 + a2 * b1)) + a2 * b2
 
 
-@leaf
+@always_inline
 def quotient(n, n_low, d, d_low):
     """Return (n + n_low) / (d + d_low) as the sum of a number of 26 bits and a rest, to about 75 bits."""
     inverse = 1.0 / d
@@ -129,19 +129,19 @@ def quotient(n, n_low, d, d_low):
     return first, rest * inverse
 
 
-@leaf
+@always_inline
 def nearest(x):
     """Return x of magnitude below 2**51 rounded to an integer, ties to even."""
     return (x + ROUNDER) - ROUNDER
 
 
-@leaf
+@always_inline
 def with_sign(x, y):
     """Return the magnitude of x with the sign of y."""
     return from_bits((bits(x) & MAGNITUDE) | (bits(y) & SIGN))
 
 
-@leaf
+@always_inline
 def is_negative(x):
     """Return True if the sign bit of x is set."""
     return bits(x) < 0

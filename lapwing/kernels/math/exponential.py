@@ -4,7 +4,7 @@ exp(x) = 2**(k/64) exp(r) with |r| <= ln(2) / 128, by a table and a polynomial (
 the exponential function in IEEE floating-point arithmetic", ACM TOMS 15(2), 1989; of expm1, TOMS 18(2), 1992).
 """
 
-from lapwing.kernels.compiler.decorators import apart, leaf
+from lapwing.kernels.compiler.decorators import always_inline, noinline
 from lapwing.kernels.math._primitives import (
     ROUNDER,
     bits,
@@ -23,7 +23,7 @@ _E3, _E4, _E5, _E6, _E7 = EXP
 _powers = table("powers", POWERS)
 
 
-@leaf
+@always_inline
 def _reduced(x):
     """Return k, and r + r_low with x = k ln(2) / 64 + r + r_low, for |x| < 1e4."""
     shifted = x * STEPS_PER_LN2 + ROUNDER
@@ -31,13 +31,13 @@ def _reduced(x):
     return bits(shifted) - bits(ROUNDER), x - k * _STEP, -(k * _STEP_LOW)
 
 
-@leaf
+@always_inline
 def _two_to(n):
     """Return 2**n for -1022 <= n <= 1023."""
     return from_bits((n + 1023) << 52)
 
 
-@leaf
+@always_inline
 def exp_parts(x, x_low):
     """Return exp(x + x_low) as a, b and n: (a + b) 2**n with a near 1, or beyond the range of doubles one beyond it.
 
@@ -61,14 +61,14 @@ def exp_parts(x, x_low):
     return first, rest, k >> 6
 
 
-@leaf
+@always_inline
 def scaled(value, n):
     """Return value * 2**n for -2000 <= n <= 2000, rounded once if value is exact."""
     half = n >> 1
     return value * _two_to(half) * _two_to(n - half)
 
 
-@apart
+@noinline
 def exp(x):
     """Return the exponential function."""
     if x != x:
@@ -77,7 +77,7 @@ def exp(x):
     return scaled(first + rest, n)
 
 
-@leaf
+@always_inline
 def expm1_parts(x):
     """Return exp(x) - 1 as two numbers, for -40 < x < 710."""
     k, r, r_low = _reduced(x)
@@ -98,7 +98,7 @@ def expm1_parts(x):
     return b, ((base_low + a_low) + b_low) + (rest + t * growth)
 
 
-@apart
+@noinline
 def expm1(x):
     """Return exp(x) - 1, precise for small x."""
     if x != x or x == 0.0:
@@ -112,7 +112,7 @@ def expm1(x):
     return first + rest
 
 
-@apart
+@noinline
 def tanh(x):
     """Return the hyperbolic tangent."""
     if x != x or x == 0.0:

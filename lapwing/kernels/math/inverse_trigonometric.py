@@ -7,7 +7,7 @@ cosine are arc tangents of x and sqrt(1 - x**2), whose square is exact as the su
 
 import math
 
-from lapwing.kernels.compiler.decorators import apart, leaf
+from lapwing.kernels.compiler.decorators import always_inline, noinline
 from lapwing.kernels.math._primitives import (
     ROUNDER,
     bits,
@@ -28,7 +28,7 @@ _A3, _A5, _A7, _A9 = ATAN
 _atans = table("atans", ATANS)
 
 
-@leaf
+@always_inline
 def _angle(n, n_low, d, d_low, ratio):
     """Return atan((n + n_low) / (d + d_low)) as upper and lower part of a table value, 26 bits, and a rest.
 
@@ -53,7 +53,7 @@ def _angle(n, n_low, d, d_low, ratio):
     return _atans(j), _atans(j + 1), first, rest + h * z * (_A3 + z * (_A5 + z * (_A7 + z * _A9)))
 
 
-@leaf
+@always_inline
 def _placed(base, base_low, sign, t, t_low, first, rest):
     """Return base + sign * (t + first) of numbers with rests."""
     a, a_low = quick_two_sum(base, sign * t)
@@ -61,7 +61,7 @@ def _placed(base, base_low, sign, t, t_low, first, rest):
     return b + ((a_low + b_low) + (base_low + sign * (t_low + rest)))
 
 
-@leaf
+@always_inline
 def _direction(y, y_low, x, x_low, back, unscaled):
     """Return the angle of a point with coordinates of two doubles each, above or on the x axis.
 
@@ -83,7 +83,7 @@ def _direction(y, y_low, x, x_low, back, unscaled):
     return _placed(base, base_low, 1.0 if steep == back else -1.0, t, t_low, first, rest)
 
 
-@apart
+@noinline
 def atan2(y, x):
     """Return the angle of the point (x, y) [rad] in [-pi, pi]; zeros and infinities as of C."""
     if x != x or y != y:
@@ -99,7 +99,7 @@ def atan2(y, x):
     return with_sign(_direction(b * scale, 0.0, a * scale, 0.0, is_negative(x), ratio), y)
 
 
-@apart
+@noinline
 def atan(x):
     """Return the arc tangent [rad]."""
     size = abs(x)
@@ -110,7 +110,7 @@ def atan(x):
     return result if x == x else x
 
 
-@leaf
+@always_inline
 def _other_leg(x):
     """Return sqrt(1 - x**2) as two doubles, for 0 <= x <= 1."""
     p, p_low = exact_square(x)
@@ -121,7 +121,7 @@ def _other_leg(x):
     return root, 0.5 * (((w - q) - q_low) + w_low) / (root if root > 0.0 else 1.0)
 
 
-@apart
+@noinline
 def asin(x):
     """Return the arc sine [rad]; NaN beyond [-1, 1]."""
     size = abs(x)
@@ -132,7 +132,7 @@ def asin(x):
     return with_sign(_direction(size, 0.0, leg, leg_low, False, ratio), x)
 
 
-@apart
+@noinline
 def acos(x):
     """Return the arc cosine [rad] in [0, pi]; NaN beyond [-1, 1]."""
     size = abs(x)

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable
 
-from lapwing.kernels.compiler.decorators import uncompiled
+from lapwing.kernels.compiler.decorators import python_function
 from lapwing.kernels.math import roots
 from lapwing.kernels.math._export import compiled_as
 
-_hypot = uncompiled(roots.hypot)
+_hypot = python_function(roots.hypot)
 
 
 def hypot(*coordinates: float) -> float:

@@ -7,7 +7,7 @@ TOMS 16(4), 1990). The logarithm has about 70 bits, so that x**y = exp(y log(x))
 
 import math
 
-from lapwing.kernels.compiler.decorators import apart, leaf
+from lapwing.kernels.compiler.decorators import always_inline, noinline
 from lapwing.kernels.math._primitives import (
     bits,
     from_bits,
@@ -27,7 +27,7 @@ _L3, _L4, _L5, _L6, _L7, _L8, _L9 = LOG
 _logs = table("logs", LOGS)  # short reciprocal, upper and lower part of its logarithm
 
 
-@leaf
+@always_inline
 def _parts(x, x_low, has_low):
     """Return log(x + x_low) as two numbers.
 
@@ -59,7 +59,7 @@ def _parts(x, x_low, has_low):
     return b, (a_low + b_low) + (rest + series)
 
 
-@apart
+@noinline
 def log(x):
     """Return the natural logarithm; -inf of 0, NaN of what is below."""
     if not x > 0.0:
@@ -70,7 +70,7 @@ def log(x):
     return first + rest
 
 
-@apart
+@noinline
 def log1p(x):
     """Return log(1 + x), precise for small x; -inf of -1, NaN of what is below."""
     if not x > -1.0:
@@ -82,7 +82,7 @@ def log1p(x):
     return first + rest
 
 
-@apart
+@noinline
 def pow(x, y):
     """Return x to the power y; special cases as of IEEE 754-2019, section 9.2.1 (no error is raised)."""
     if y == 0.0 or x == 1.0:
@@ -110,7 +110,7 @@ def pow(x, y):
     return -result if odd else result
 
 
-@leaf
+@always_inline
 def _is_integer(x):
     """Return True if a positive number is an integer."""
     return x >= 4503599627370496.0 or (x + 4503599627370496.0) - 4503599627370496.0 == x

@@ -7,7 +7,7 @@ no double is below 2**-62 of a step, so that its relative error is below 2**-64 
 edition, section 11.3.2).
 """
 
-from lapwing.kernels.compiler.decorators import apart, leaf
+from lapwing.kernels.compiler.decorators import always_inline, noinline
 from lapwing.kernels.math._primitives import (
     MAGNITUDE,
     MANTISSA,
@@ -28,7 +28,7 @@ _LIMB = 0xFFFFFF
 _limb = table("turn_limbs", TURN_LIMBS)
 
 
-@leaf
+@always_inline
 def reduced(x):
     """Return k modulo 128 and r + r_low with x = k pi / 64 + r + r_low and |r| <= pi / 128.
 
@@ -45,7 +45,7 @@ def reduced(x):
     return bits(shifted) & 127, r, r_low
 
 
-@apart
+@noinline
 def reduced_large(x):
     """Return what `reduced` returns, for a magnitude of at least 2**15 (Payne and Hanek)."""
     if x - x != 0.0:

@@ -8,7 +8,7 @@ import numpy as np
 
 from lapwing.dynamics import integrators
 from lapwing.dynamics.integrators import adapt, rate, record
-from lapwing.kernels import kernel, uncompiled
+from lapwing.kernels import kernel, python_function
 from lapwing.kernels.state_tree import flatten, unflatten
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.problem import SolverMethod, SolverRun
@@ -29,7 +29,7 @@ def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, row
         return rate(p, t, state)
 
     for t, row in zip(times, rows, strict=True):
-        uncompiled(method.step)(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
+        python_function(method.step)(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
     return calls / len(times)
 
 

@@ -14,8 +14,8 @@ from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
-from lapwing.kernels import kernel, leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
@@ -31,7 +31,7 @@ FINEST = 64  # steps in an exchange interval, of the reference; the runs that ar
 TICK = 1000  # of the first exchange, so that random effects have begun
 
 
-@leaf
+@always_inline
 def _wave(t: float, volts: float, phase: float) -> float:
     return volts * (1.0 + 0.02 * math.sin(3.0 * t + phase))
 
@@ -54,7 +54,7 @@ def flight(
     for row in range(out.shape[0]):
         if row > 0:
             for _ in range(every):
-                state = advance(method, p, key, tick, state, each(_wave, tick * n * h, volts, phase), h, n)
+                state = advance(method, p, key, tick, state, map_tuple(_wave, tick * n * h, volts, phase), h, n)
                 tick += 1
         numbers = flatten(seen(p.layout, state.motion))
         for i in range(len(numbers)):

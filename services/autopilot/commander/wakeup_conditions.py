@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander import failsafes
 from lapwing.services.autopilot.commander.commander_input import POSITION_LOST
 from lapwing.services.autopilot.commander.transitions import Context
@@ -37,7 +37,7 @@ def quiet_time(context: Context) -> float:
     return min(link_left, setpoints_left)
 
 
-@leaf
+@always_inline
 def needs_attention(
     thresholds: BatteryThresholds,
     health: int,

@@ -9,8 +9,8 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf, uncompiled
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import Controller, estimate_of, outcome, setpoint_of
 from lapwing.services.autopilot.custom.controller_output import NO_WRENCH, ControllerOutput, command, demand, off
@@ -53,7 +53,7 @@ def start(p: CustomController) -> CustomState:
     """Before the first tick."""
     watch = p.common.watch
     held = off(len(watch.roll_arm))
-    return CustomState(INITIAL_STAGE, p.own_start, held, uncompiled(motor_failure.start)(watch), 0, float("nan"))
+    return CustomState(INITIAL_STAGE, p.own_start, held, python_function(motor_failure.start)(watch), 0, float("nan"))
 
 
 def _ask(
@@ -69,13 +69,13 @@ def _ask(
     raise NotImplementedError("compiled code only")
 
 
-@leaf
+@always_inline
 def _demanded(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
     """State and output of the user's step, the output as a demand."""
     return given[0], demand(given[1], none)
 
 
-@implements(_ask, inline=True)
+@overload_for(_ask, inline=True)
 def _ask_of(
     p: types.Type,
     s: types.Type,
@@ -91,7 +91,7 @@ def _ask_of(
     return lambda p, s, time, estimate, setpoint, by_port, none: _demanded(found(p, s, time, estimate, setpoint), none)
 
 
-@leaf
+@always_inline
 def step(
     p: CustomController, s: CustomState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CustomState, tuple, int]:

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from numba import types
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import define, each, implements
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, map_tuple, overload_for
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.interface import Command, PerRotor
 from lapwing.services.autopilot.land_detector import FLYING, LANDED
@@ -69,7 +69,7 @@ def _numbers(what: str, given: Iterable[float], n: int) -> Any:
     return found
 
 
-@implements(demand, inline=True)
+@overload_for(demand, inline=True)
 def _demand(output: types.Type, none: types.Type) -> Callable:
     told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
     roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
@@ -77,17 +77,17 @@ def _demand(output: types.Type, none: types.Type) -> Callable:
         given = "True, output[0], (0.0, 0.0, 0.0, 0.0)"
     else:
         given = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
-    return define(
+    return compile_source(
         "demand(output, none)", {"ControllerOutput": ControllerOutput}, f"return Demand({given}, {roll_pitch})"
     )
 
 
-@leaf
+@always_inline
 def _thrust_at(motor: Motor, volts: float, _: float) -> float:
     return thrust_at(motor, volts)
 
 
-@leaf
+@always_inline
 def command(
     law: control.Parameters,
     lift: float,
@@ -115,7 +115,7 @@ def command(
         return Command(none, none, 0.0, 0.0, yaw, stage == LANDED)
     if asked.to_motors:
         volts = possible(asked.volts, voltage_max)
-        thrust = each(_thrust_at, law.motor, volts, volts)
+        thrust = map_tuple(_thrust_at, law.motor, volts, volts)
     else:
         shares, w = shares_in_force(law.shares, failed), asked.wrench
         part = 1.0 / lift

@@ -7,7 +7,7 @@ from typing import Any
 from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
 from lapwing.services.autopilot.custom.controller_output import DEMAND, demand, off
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
@@ -16,8 +16,8 @@ from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common import ports
 from lapwing.services.common.controller_api import VehicleModel
 
-_advance_stage, _estimate_of = uncompiled(advance_stage), uncompiled(estimate_of)
-_setpoint_of = uncompiled(setpoint_of)
+_advance_stage, _estimate_of = python_function(advance_stage), python_function(estimate_of)
+_setpoint_of = python_function(setpoint_of)
 
 
 class PythonControllerBlock(PeriodicPart):

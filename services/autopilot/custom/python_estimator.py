@@ -8,7 +8,7 @@ from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
 from lapwing.services.autopilot.service_config import CustomCode
@@ -51,7 +51,7 @@ class HeldEstimate(NamedTuple):
     attention: WakeupParameters
 
 
-@leaf
+@always_inline
 def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The estimate that holds at `tick`; it has no state of its own."""
     held, battery, flight = inputs

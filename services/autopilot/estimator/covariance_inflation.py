@@ -6,7 +6,7 @@ widens the covariance of what the source speaks about, until its readings are ta
 
 import numpy as np
 
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
@@ -29,7 +29,7 @@ _LONE = 3.0  # [s] the same for the position of a receiver that gives no velocit
 _LONG = 10.0  # [s] any other source
 
 
-@leaf
+@always_inline
 def _widen(c: np.ndarray, start: int, deviation: float) -> None:
     for i in range(start, start + 3):
         c[i, i] += deviation * deviation

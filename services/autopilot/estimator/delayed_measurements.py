@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Mat3, Vec3, dot
-from lapwing.kernels import apart, leaf
+from lapwing.kernels import always_inline, noinline
 from lapwing.services.autopilot.estimator.filter_state import POSITION, SIZE, VELOCITY, WANDER, Memory
 from lapwing.services.autopilot.estimator.fuse import FLOOR, acceleration_row, clear, innovation_variance
 
@@ -18,7 +18,7 @@ class Noise(NamedTuple):
     attitude_position: float  # [rad^2 s^4] the same of a late position
 
 
-@leaf
+@always_inline
 def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30)).
 
@@ -31,7 +31,7 @@ def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
     acceleration_row(m, force_world, r, axis, 0.5 * delay * delay)
 
 
-@leaf
+@always_inline
 def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Row of the velocity `delay` seconds ago; `force_world` is the mean specific force since."""
     clear(m)
@@ -39,7 +39,7 @@ def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
     acceleration_row(m, force_world, r, axis, -delay)
 
 
-@apart
+@noinline
 def late_innovation_variances(
     m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
 ) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.common.ports import StateEstimate
 
@@ -79,7 +79,7 @@ class State(NamedTuple):
     memory: Memory
 
 
-@leaf
+@always_inline
 def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
     """Attitude at rest from gravity and the magnetic field (theory.md, eq. (3.20))."""
     up = scale(1.0 / norm(specific_force_body), specific_force_body)
@@ -145,7 +145,7 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False), m)
 
 
-@leaf
+@always_inline
 def three(array: np.ndarray, start: int) -> Vec3:
     """Three neighbouring elements of an array as a vector."""
     return (array[start], array[start + 1], array[start + 2])
@@ -171,7 +171,7 @@ def corrected(s: State) -> State:
     return State(nominal, s.inertial, s.memory)
 
 
-@leaf
+@always_inline
 def _deviations(covariance: np.ndarray, start: int) -> Vec3:
     return (
         math.sqrt(covariance[start, start]),
@@ -180,7 +180,7 @@ def _deviations(covariance: np.ndarray, start: int) -> Vec3:
     )
 
 
-@leaf
+@always_inline
 def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
     """Standard deviation of the attitude error about an axis."""
     total = 0.0
@@ -190,7 +190,7 @@ def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
     return math.sqrt(total)
 
 
-@leaf
+@always_inline
 def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> tuple[int, int]:
     health = 0
     rejected = 0

@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import Mat3, Vec3, cross, dot
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
     FLOW,
@@ -22,7 +22,7 @@ from lapwing.services.autopilot.estimator.measurement_checks import judge, repea
 _ALIKE = 100.0  # readings, 2 s of them, after which an error of scale counts as a new one
 
 
-@leaf
+@always_inline
 def flow_row(m: Memory, r: Mat3, velocity_world: Vec3, axis: int, distance: float) -> float:
     """Fill the row of the flow about the body's x (axis 0) or y (1); returns the flow that is expected [rad/s]."""
     k = 1.0 / distance if axis == 0 else -1.0 / distance

@@ -5,24 +5,24 @@ the rows of one reading are all taken about the same estimate.
 """
 
 from lapwing.dynamics.vector import Mat3, Vec3
-from lapwing.kernels import apart, kernel, leaf
-from lapwing.kernels.simd import load, spread, store
+from lapwing.kernels import always_inline, kernel, noinline
+from lapwing.kernels.simd import load, splat, store
 from lapwing.services.autopilot.estimator.filter_state import ACCELEROMETER, SIZE, THETA, Memory
 
 FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
 
 
-@leaf
+@always_inline
 def clear(m: Memory) -> None:
     """Empty the row."""
     m.row[:] = 0.0
 
 
-@apart
+@noinline
 def innovation_variance(m: Memory, variance: float) -> float:
     """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
     for i in range(0, SIZE, 4):
-        store(m.product, i, spread(0.0))
+        store(m.product, i, splat(0.0))
     for j in range(SIZE):
         h = m.row[j]
         if h != 0.0:  # of most rows only a few are not
@@ -41,7 +41,7 @@ def fuse(m: Memory, innovation: float, variance: float) -> float:
     return absorb(m, innovation, innovation_variance(m, variance))
 
 
-@apart
+@noinline
 def absorb(m: Memory, innovation: float, s: float) -> float:
     """`fuse` with the innovation's variance s, and its covariance with the error in `m.product`."""
     y = innovation

@@ -3,7 +3,7 @@
 from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.estimator.covariance_inflation import doubt
 from lapwing.services.autopilot.estimator.delayed_measurements import (
     Noise,
@@ -17,7 +17,7 @@ from lapwing.services.autopilot.estimator.fuse import absorb
 from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
 
 
-@leaf
+@always_inline
 def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float, Vec3, Vec3]:
     """Position and velocity `age` ticks ago, from the estimate now and the IMU readings since.
 
@@ -41,7 +41,7 @@ def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float, Vec3, Ve
     return position, velocity, delay, weighted, mean
 
 
-@leaf
+@always_inline
 def _noise_since(p: Estimator, s: State, age: int) -> Noise:
     """What the last `age` ticks added to the covariance of velocity, position and attitude."""
     tick, history = s.inertial.tick, s.memory.history
@@ -58,7 +58,7 @@ def _noise_since(p: Estimator, s: State, age: int) -> Noise:
     return Noise(v, vp, pp, av, ap)
 
 
-@leaf
+@always_inline
 def _wander_variance(p: Estimator, axis: int) -> float:
     return (p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal) ** 2
 

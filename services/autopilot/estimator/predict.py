@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.simd import load, store
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
@@ -34,7 +34,7 @@ _STRAIGHT = 0.1  # of a jolt: up to it two readings are taken to lie on a straig
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 
 
-@leaf
+@always_inline
 def _transformed(
     theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
 ) -> tuple[Any, Any, Any]:
@@ -46,19 +46,19 @@ def _transformed(
     )
 
 
-@leaf
+@always_inline
 def _loaded(c: np.ndarray, i: int, j: int) -> Any:
     """The rows i to i + 2 of c, in lanes the columns j to j + 3."""
     return load(c, SIZE * i + j), load(c, SIZE * (i + 1) + j), load(c, SIZE * (i + 2) + j)
 
 
-@leaf
+@always_inline
 def _stored(c: np.ndarray, i: int, j: int, rows: Any) -> None:
     for k in range(3):
         store(c, SIZE * (i + k) + j, rows[k])
 
 
-@leaf
+@always_inline
 def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
     """c <- F c F^T for a symmetric c."""
     for j in range(0, SIZE, 4):
@@ -82,7 +82,7 @@ def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
             c[i, j] = c[j, i]
 
 
-@leaf
+@always_inline
 def _fade(c: np.ndarray, keep: float) -> None:
     """First-order decay of the receiver's wander."""
     for i in range(WANDER, WANDER + 3):
@@ -91,7 +91,7 @@ def _fade(c: np.ndarray, keep: float) -> None:
             c[j, i] *= keep
 
 
-@leaf
+@always_inline
 def _held(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
     """Whether a reading is a spike: it jumps away from a reading that was itself trusted."""
     return not i.held and (

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.failure_types import OFF, STUCK, WRONG
 from lapwing.services.common.ports import BatteryReading
 
@@ -14,7 +14,7 @@ class BatteryInjection(NamedTuple):
     faults: Any  # cell of `Faults`
 
 
-@leaf
+@always_inline
 def step(
     p: BatteryInjection, s: BatteryReading, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[BatteryReading, tuple, int]:

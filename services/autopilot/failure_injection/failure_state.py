@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.noise import Key, uniform, uniform4
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.failure_types import INTERMITTENT, OFF, SLOW
 
 SLOWED = 20  # readings of which a slow sensor gives one
@@ -19,7 +19,7 @@ class Memory(NamedTuple):
     readings: int  # so far
 
 
-@leaf
+@always_inline
 def silent(kind: int, key: Key, lane: int, count: int) -> bool:
     """Whether this reading does not arrive; `lane` tells two instruments of one reading apart."""
     if kind == INTERMITTENT:
@@ -27,7 +27,7 @@ def silent(kind: int, key: Key, lane: int, count: int) -> bool:
     return kind == OFF or (kind == SLOW and count % SLOWED != 0)
 
 
-@leaf
+@always_inline
 def garbage(key: Key, tick: int, lane: int, reach: float) -> Vec3:
     """Three numbers within +-reach that mean nothing."""
     a, b, c, _ = uniform4(key, tick, lane)

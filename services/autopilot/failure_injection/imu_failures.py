@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot.failure_injection.failure_state import Memory, garbage, silent
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 from lapwing.services.common.ports import ImuReading
@@ -22,7 +22,7 @@ class ImuInjection(NamedTuple):
     key: Key  # of random numbers
 
 
-@leaf
+@always_inline
 def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: Vec3) -> Vec3:
     if kind == STUCK:
         return stuck
@@ -33,7 +33,7 @@ def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: 
     return random if kind == GARBAGE else now
 
 
-@leaf
+@always_inline
 def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
     r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer

@@ -3,8 +3,8 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each, each_index
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_index, map_tuple
 from lapwing.services.autopilot.failure_injection.failure_state import SLOWED, Memory
 from lapwing.services.autopilot.motor import Motor, thrust_at
 from lapwing.services.common.failure_types import OFF, SLOW, STUCK, WRONG
@@ -28,7 +28,7 @@ class MotorInjection(NamedTuple):
     motor: Motor
 
 
-@leaf
+@always_inline
 def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int, k: int) -> float:
     """The command that motor k follows: a stuck one its last, a slow one hears one of `SLOWED`."""
     if kinds[k] == STUCK or (kinds[k] == SLOW and count % SLOWED != 0):
@@ -36,7 +36,7 @@ def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int
     return volts[k]
 
 
-@leaf
+@always_inline
 def _supplied(_: float, kind: int, volts: float) -> float:
     """The voltage [V] that a motor gets."""
     if kind == OFF:
@@ -44,17 +44,17 @@ def _supplied(_: float, kind: int, volts: float) -> float:
     return WEAKENED * volts if kind == WRONG else volts
 
 
-@leaf
+@always_inline
 def _thrust_at(motor: Motor, volts: float, _: float) -> float:
     return thrust_at(motor, volts)
 
 
-@leaf
+@always_inline
 def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """The command that reaches the motors; the controller is told nothing of it."""
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     asked = d.motor_voltage if d.on else c.motor_voltage
-    thrust = each(_thrust_at, p.motor, asked, asked) if d.on else c.thrust
-    heard = each_index(_heard, asked, kinds, s.last, asked, s.readings)
-    volts = each(_supplied, 0.0, kinds, heard)
+    thrust = map_tuple(_thrust_at, p.motor, asked, asked) if d.on else c.thrust
+    heard = map_index(_heard, asked, kinds, s.last, asked, s.readings)
+    volts = map_tuple(_supplied, 0.0, kinds, heard)
     return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.noise import Key
-from lapwing.kernels import DispatchTable, leaf
+from lapwing.kernels import DispatchTable, always_inline
 from lapwing.services.autopilot.failure_injection.failure_state import garbage
 from lapwing.services.common.failure_types import Faults
 from lapwing.services.common.ports import (
@@ -34,88 +34,88 @@ class Failure(NamedTuple):
     garbage: Callable[[Any, Key, int], Any]  # the reading with random numbers at a tick
 
 
-@leaf
+@always_inline
 def _barometer_kind(faults: Faults) -> int:
     return faults.barometer
 
 
-@leaf
+@always_inline
 def _wrong_barometer(r: BarometerReading) -> BarometerReading:
     return BarometerReading(r.pressure + EXCESS_PRESSURE, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _garbage_barometer(r: BarometerReading, key: Key, tick: int) -> BarometerReading:
     return BarometerReading(abs(garbage(key, tick, 0, PRESSURES)[0]), r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _distance_kind(faults: Faults) -> int:
     return faults.distance_sensor
 
 
-@leaf
+@always_inline
 def _wrong_distance(r: DistanceReading) -> DistanceReading:
     return DistanceReading(r.range + EXCESS_RANGE, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _garbage_distance(r: DistanceReading, key: Key, tick: int) -> DistanceReading:
     return DistanceReading(abs(garbage(key, tick, 0, RANGES)[0]), r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _flow_kind(faults: Faults) -> int:
     return faults.optical_flow
 
 
-@leaf
+@always_inline
 def _wrong_flow(r: OpticalFlowReading) -> OpticalFlowReading:
     return OpticalFlowReading((r.flow[0] + EXCESS_FLOW, r.flow[1]), r.rate, r.distance, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _garbage_flow(r: OpticalFlowReading, key: Key, tick: int) -> OpticalFlowReading:
     x, y, _ = garbage(key, tick, 0, FLOWS)
     return OpticalFlowReading((x, y), r.rate, r.distance, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _airspeed_kind(faults: Faults) -> int:
     return faults.airspeed
 
 
-@leaf
+@always_inline
 def _wrong_airspeed(r: AirspeedReading) -> AirspeedReading:
     return AirspeedReading(r.pressure + EXCESS_DYNAMIC, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _garbage_airspeed(r: AirspeedReading, key: Key, tick: int) -> AirspeedReading:
     return AirspeedReading(garbage(key, tick, 0, DYNAMICS)[0], r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _magnetometer_kind(faults: Faults) -> int:
     return faults.magnetometer
 
 
-@leaf
+@always_inline
 def _wrong_magnetometer(r: MagnetometerReading) -> MagnetometerReading:
     return MagnetometerReading((-r.field_body[1], r.field_body[0], r.field_body[2]), r.variance, r.valid)  # by 90 deg
 
 
-@leaf
+@always_inline
 def _garbage_magnetometer(r: MagnetometerReading, key: Key, tick: int) -> MagnetometerReading:
     return MagnetometerReading(garbage(key, tick, 0, FIELDS), r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _gps_kind(faults: Faults) -> int:
     return faults.gps
 
 
-@leaf
+@always_inline
 def _wrong_gps(r: GpsReading) -> GpsReading:
     return GpsReading(
         r.latitude_deg + NORTH, r.longitude_deg, r.height, r.position_variance,
@@ -123,7 +123,7 @@ def _wrong_gps(r: GpsReading) -> GpsReading:
     )  # fmt: skip
 
 
-@leaf
+@always_inline
 def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
     x, y, z = garbage(key, tick, 0, 1.0)
     return GpsReading(

@@ -7,8 +7,8 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import define, implements
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.services.autopilot.failure_injection.failure_state import Memory, silent
 from lapwing.services.autopilot.failure_injection.reading_failures import FAILURES
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG, Faults
@@ -26,7 +26,7 @@ def kind_of(faults: Faults, r: Any) -> int:
     raise NotImplementedError("compiled code only")
 
 
-@implements(kind_of, inline=True)
+@overload_for(kind_of, inline=True)
 def _kind_by(faults: types.Type, r: types.Type) -> Callable:
     found = FAILURES[r.instance_class].kind
     return lambda faults, r: found(faults)
@@ -37,7 +37,7 @@ def wrong(r: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(wrong, inline=True)
+@overload_for(wrong, inline=True)
 def _wrong_by(r: types.Type) -> Any:
     return FAILURES[r.instance_class].wrong
 
@@ -47,7 +47,7 @@ def nonsense(r: Any, key: Key, tick: int) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(nonsense, inline=True)
+@overload_for(nonsense, inline=True)
 def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
     return FAILURES[r.instance_class].garbage
 
@@ -57,13 +57,13 @@ def lost(r: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(lost, inline=True)
+@overload_for(lost, inline=True)
 def _lost_by(r: types.Type) -> Callable:
     kept = "".join(f"r.{field}, " for field in r.fields if field != "valid")  # `valid` is the last of every reading
-    return define("lost(r)", {"Reading": r.instance_class}, f"return Reading({kept}False)")
+    return compile_source("lost(r)", {"Reading": r.instance_class}, f"return Reading({kept}False)")
 
 
-@leaf
+@always_inline
 def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
     r, late = inputs[0].value, inputs[1]

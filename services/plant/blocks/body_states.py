@@ -11,8 +11,8 @@ from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.common.ports import BodyMotions, PerRotor
 
 
@@ -29,14 +29,14 @@ def on_se3(x: Any) -> FiveBodies:
     raise NotImplementedError("compiled code only")
 
 
-@implements(on_se3)
+@overload_for(on_se3)
 def _on_se3(x: types.Type) -> Callable:
     if x.instance_class is FiveBodies:
         return lambda x: x
     return lambda x: multirotor_euler.five(x)
 
 
-@leaf
+@always_inline
 def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
     """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
     actuators = inputs[0]

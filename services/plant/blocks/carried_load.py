@@ -9,8 +9,8 @@ from lapwing.dynamics.integrators import RATES, march
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, load_acceleration, tension
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.common.ports import BodyMotions
 
 
@@ -40,7 +40,7 @@ class LoadDrive(NamedTuple):
     start: float  # [s]
 
 
-@leaf
+@always_inline
 def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
     """Force [N] of a cable on its hook, which goes on as it was accelerated at the beginning of the interval."""
     x, ahead = c
@@ -51,16 +51,16 @@ def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
     return force
 
 
-@leaf
+@always_inline
 def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
     """Force [N] of the load on all cables together, at time t [s]."""
     total = (0.0, 0.0, 0.0)
-    for force in each(_pull, (x, t - p.start), p.load.slings, p.carriers):
+    for force in map_tuple(_pull, (x, t - p.start), p.load.slings, p.carriers):
         total = add(total, force)
     return total
 
 
-@leaf
+@always_inline
 def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
     """Tangent of the load (theory.md, eq. (1.23))."""
     air = Air(p.carriers[0].air_density, p.carriers[0].wind_world)
@@ -70,19 +70,19 @@ def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
 RATES[LoadDrive] = rate
 
 
-@leaf
+@always_inline
 def _presence(_: float, received: InputSample, same: InputSample) -> NeighbourState:
     return received.value
 
 
-@leaf
+@always_inline
 def step(
     p: LoadPlant, s: LoadMotion, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[LoadMotion, tuple[NeighbourState, BodyMotions], int]:
     """The load at `tick`, given where its carriers were a tick ago; and the force of the cables on it."""
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
-        drive = LoadDrive(p, each(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
+        drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
         x = march(p.method, drive, drive.start, x, p.step, p.steps)
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))

@@ -6,8 +6,8 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, seen
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.common.ports import ContactForces
 
 
@@ -17,19 +17,19 @@ class ContactView(NamedTuple):
     vehicle: MultirotorParameters
 
 
-@leaf
+@always_inline
 def _place(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
     return push[0]
 
 
-@leaf
+@always_inline
 def _force(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
     return push[1]
 
 
-@leaf
+@always_inline
 def step(p: ContactView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[ContactForces], int]:
     """Where each point of the vehicle is at `tick`, and what the ground does to it."""
     vehicle, state = p.vehicle, s.vehicle
     pushes = hooks.all_contact_forces(vehicle.effects, state.memory, seen(vehicle.layout, state.motion))
-    return s, (ContactForces(each(_place, 0.0, pushes, pushes), each(_force, 0.0, pushes, pushes)),), CONTINUE
+    return s, (ContactForces(map_tuple(_place, 0.0, pushes, pushes), map_tuple(_force, 0.0, pushes, pushes)),), CONTINUE

@@ -13,8 +13,8 @@ from lapwing.dynamics.vehicles.cooperative_load import (
     quad_position,
     quad_velocity,
 )
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_index
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BodyMotions, RotorWrenches, TrueState
 from lapwing.services.plant.blocks.termination import signal
@@ -32,12 +32,12 @@ class CooperativePlant(NamedTuple):
     off: RotorWrenches  # before the first command
 
 
-@leaf
+@always_inline
 def _zero(values: tuple, i: int) -> Vec3:
     return ZERO
 
 
-@leaf
+@always_inline
 def step(
     p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
@@ -53,11 +53,11 @@ def step(
     truth = TrueState(
         x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO
     )
-    nothing = each_index(_zero, x.link, x.link)
+    nothing = map_index(_zero, x.link, x.link)
     bodies = BodyMotions(
-        (x.load_position,) + each_index(quad_position, x.link, g, x),  # noqa: RUF005 (compiled tuples have no unpacking)
+        (x.load_position,) + map_index(quad_position, x.link, g, x),  # noqa: RUF005 (compiled tuples have no unpacking)
         (NO_ROTATION,) + x.attitude,  # noqa: RUF005
-        (x.load_velocity,) + each_index(quad_velocity, x.link, g, x),  # noqa: RUF005
+        (x.load_velocity,) + map_index(quad_velocity, x.link, g, x),  # noqa: RUF005
         (ZERO,) + x.omega_body,  # noqa: RUF005
         (ZERO,) + nothing,  # noqa: RUF005
         (ZERO,) + nothing,  # noqa: RUF005

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from numba import types
 
 from lapwing.dynamics.effects.payload import RELEASED, Payload
-from lapwing.kernels.codegen import define, implements
+from lapwing.kernels.codegen import compile_source, overload_for
 
 
 def let_go(effects: tuple, memory: tuple) -> tuple:
@@ -13,9 +13,9 @@ def let_go(effects: tuple, memory: tuple) -> tuple:
     raise NotImplementedError("compiled code only")
 
 
-@implements(let_go, inline=True)
+@overload_for(let_go, inline=True)
 def _let_go(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
     carried = [getattr(kind, "instance_class", None) is Payload for kind in effects]
     parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
     body = f"return ({parts})" if any(carried) else "return memory"
-    return define("let_go(effects, memory)", {"gone": RELEASED}, body)
+    return compile_source("let_go(effects, memory)", {"gone": RELEASED}, body)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState, all_interactions
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
-from lapwing.kernels import leaf
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_index
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 
 
@@ -17,17 +17,17 @@ class Interaction(NamedTuple):
     interval: float  # [s] a tick
 
 
-@leaf
+@always_inline
 def _presence(inputs: tuple[InputSample, ...], i: int) -> NeighbourState:
     return inputs[i].value
 
 
-@leaf
+@always_inline
 def step(p: Interaction, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """The plant's state with what its effects make of the vehicles around, itself the first, a tick ago."""
     vehicle = s.vehicle
     if inputs[0].due:
-        others = each_index(_presence, inputs[1:], inputs[1:])
+        others = map_index(_presence, inputs[1:], inputs[1:])
         memory = all_interactions(p.effects, vehicle.memory, inputs[0].value, others, p.interval)
         vehicle = MultirotorState(vehicle.motion, memory)
     return MultirotorPlantState(vehicle, s.last), (), CONTINUE

@@ -7,7 +7,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
 from lapwing.services.plant.blocks.gripper import let_go
@@ -37,7 +37,7 @@ class MultirotorPlantState(NamedTuple):
     last: int  # tick of the run
 
 
-@leaf
+@always_inline
 def step(
     p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:

@@ -10,7 +10,7 @@ from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import add, apply, cross
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class PresenceView(NamedTuple):
@@ -21,7 +21,7 @@ class PresenceView(NamedTuple):
     interval: float  # [s] a tick
 
 
-@leaf
+@always_inline
 def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[NeighbourState], int]:
     """The presence at `tick`, by the truth of that tick."""
     truth, vehicle = inputs[0].value, p.vehicle

@@ -3,12 +3,12 @@
 from lapwing.dynamics.integrators import rate
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import TrueState
 from lapwing.services.plant.blocks.uncontrolled import TOLD
 
 
-@leaf
+@always_inline
 def told(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
     """The state, its acceleration, thrusts and torques of the rotors."""
     a, b, c, d = x.rotor_speed

@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.multirotor_equations import RotorLayout
 from lapwing.dynamics.vehicles.multirotor_slung import cable_force
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import BodyMotions
 
 
@@ -16,7 +16,7 @@ class SlungLoadView(NamedTuple):
     layout: RotorLayout
 
 
-@leaf
+@always_inline
 def step(p: SlungLoadView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
     """The motion of the load at `tick`, a point that does not turn, and the force of the cable on it."""
     x, zero = s.vehicle.motion, ((0.0, 0.0, 0.0),)

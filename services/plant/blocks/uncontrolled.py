@@ -7,8 +7,8 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics.integrators import StepDoubling, march, march_controlled
-from lapwing.kernels import DispatchTable, leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import overload_for
 from lapwing.kernels.state_tree import finite
 from lapwing.services.plant.blocks.termination import signal
 
@@ -33,7 +33,7 @@ TOLD = DispatchTable()
 """The compiled function of `told` by the class of a system's parameters."""
 
 
-@implements(told, inline=True)
+@overload_for(told, inline=True)
 def _told(p: types.Type, t: types.Type, x: types.Type) -> Any:
     return TOLD[p.instance_class]
 
@@ -42,14 +42,14 @@ def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-@implements(_marched, inline=True)
+@overload_for(_marched, inline=True)
 def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
     if getattr(method, "instance_class", None) is StepDoubling:
         return lambda method, p, t, x: march_controlled(method, p.system, t, x, p.step, t + p.interval)
     return lambda method, p, t, x: march(method, p.system, t, x, p.step, p.steps)
 
 
-@leaf
+@always_inline
 def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
     """March to `tick`; at tick 0 leave the system where it is."""
     x = s

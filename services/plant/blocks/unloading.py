@@ -2,12 +2,12 @@
 
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import TrueState
 from lapwing.services.plant.blocks.uncontrolled import TOLD
 
 
-@leaf
+@always_inline
 def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState]:
     """The pack's motion."""
     return (

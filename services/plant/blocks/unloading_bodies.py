@@ -8,7 +8,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale
 from lapwing.dynamics.vehicles import unloading, unloading_contact_points
 from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.common.ports import BodyMotions
 
 NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_contact_points.ROLLERS)], "ground")
@@ -21,7 +21,7 @@ class UnloadingView(NamedTuple):
     interval: float  # [s] a tick
 
 
-@leaf
+@always_inline
 def _roller(p: UnloadingParameters, i: int) -> Vec3:
     """Place of the axis of a roller [m]."""
     forward = (math.cos(p.tilt), 0.0, -math.sin(p.tilt))
@@ -30,13 +30,13 @@ def _roller(p: UnloadingParameters, i: int) -> Vec3:
     return add((0.0, 0.0, p.floor_height), add(behind, scale(p.roller_radius, upward)))
 
 
-@leaf
+@always_inline
 def _on_roller(rollers: tuple[Vec3, ...], i: int) -> Vec3:
     """Force of the pack on a roller [N]."""
     return scale(-1.0, add(add(ZERO, rollers[2 * i]), rollers[2 * i + 1]))
 
 
-@leaf
+@always_inline
 def step(
     p: UnloadingView, s: UnloadingState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[UnloadingState, tuple[BodyMotions], int]:

@@ -10,7 +10,7 @@ import pytest
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder, due_ticks, encode
-from lapwing.kernels.row_packing import reader, to_row
+from lapwing.kernels.row_packing import pack_row, row_unpacker
 from lapwing.messages import Setpoint, header
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, of_all
@@ -96,12 +96,12 @@ def check_every_topic(setup, random):
         trajectory = setup.services.get("trajectory")
         texts = trajectory.parameters.phases if wire.port == "trajectory" else given.phases
         values = [fitting(random_value(port.like, random), texts, random) for _ in ticks]
-        rows = np.array([to_row(value) for value in values])
+        rows = np.array([pack_row(value) for value in values])
         pages = list(encode(wire, port, setup, ticks, rows))
         found = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
         assert sum(len(page.ticks) for page in pages) == len(found) == len(ticks)
         for tick, value in zip(ticks, values, strict=True):
-            assert reader(port.like)(to_row(value)) == value
+            assert row_unpacker(port.like)(pack_row(value)) == value
             expected = BUILDERS[wire.topic](given, int(tick) * setup.interval_ns, value)
             assert found[tick] == expected.encode(), wire.topic.name
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE
-from lapwing.kernels import apart, kernel, leaf
+from lapwing.kernels import always_inline, kernel, noinline
 
 
 class Mean(NamedTuple):
@@ -27,7 +27,7 @@ class Sum(NamedTuple):
     number: float
 
 
-@apart
+@noinline
 def _weighted(p, s):
     total = 0.0
     for i in range(len(p.weights)):
@@ -35,7 +35,7 @@ def _weighted(p, s):
     return total, s
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """The sum, the tick taken in."""
     s.ticks[tick % len(s.ticks)] = tick

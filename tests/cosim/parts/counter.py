@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Counter(NamedTuple):
@@ -13,7 +13,7 @@ class Counter(NamedTuple):
     fails: int = 10_000  # tick
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """The steps so far."""
     return s + 1, (s,), NON_FINITE if tick == p.fails else FINISHED if tick >= p.last else CONTINUE

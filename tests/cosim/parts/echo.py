@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Echo(NamedTuple):
@@ -20,7 +20,7 @@ class Heard(NamedTuple):
     sign: float
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """Give the input's message on."""
     r = inputs[0]

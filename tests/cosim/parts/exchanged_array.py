@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from tests.cosim.parts.arrays import Last, Sum
 
 
@@ -15,7 +15,7 @@ class Exchange(NamedTuple):
     weights: np.ndarray  # (n,)
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """The first of what is remembered."""
     return Last(p.weights, s.count + 1), (Sum(s.ticks[0]),), CONTINUE

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Place(NamedTuple):
@@ -43,7 +43,7 @@ def expected(factor, tick, count):
     return Reading(factor * t, tick % 5 == 0, -count, (near, far), (count, 3 - tick))
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """Count, and give what comes of the tick and the count."""
     n, t = s + 1, float(tick)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Number(NamedTuple):
@@ -18,7 +18,7 @@ class RunningSum(NamedTuple):
     weight: float
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """Add the message that is due."""
     s += p.weight * inputs[0].value.value if inputs[0].due else 0.0

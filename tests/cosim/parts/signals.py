@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, WAKE_PYTHON
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class Signals(NamedTuple):
@@ -13,7 +13,7 @@ class Signals(NamedTuple):
     last: int  # tick
 
 
-@leaf
+@always_inline
 def step(p, s, tick, inputs):
     """It gives nothing."""
     return s, (), FINISHED if tick >= p.last else WAKE_PYTHON if tick == p.look else CONTINUE

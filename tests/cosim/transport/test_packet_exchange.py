@@ -11,13 +11,13 @@ from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port, due
 from lapwing.cosim.transport.packet_exchange import PacketSender, sources
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 
 LAST = 120  # [tick]
 PERIODS = (1, 2, 5, 25, 4)
 NAMES = tuple(f"port{i}" for i in range(len(PERIODS)))
 
-due = uncompiled(due)
+due = python_function(due)
 
 
 class Bus:

@@ -4,7 +4,7 @@ from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.transport.packet_layout import columns, layout
 from lapwing.cosim.transport.packets import StepPacketCodec
-from lapwing.kernels.row_packing import to_row
+from lapwing.kernels.row_packing import pack_row
 from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.common.ports import MotorCommand
 from lapwing.services.process_table import create_all
@@ -13,7 +13,7 @@ from lapwing.services.scene_resolver import load, resolve
 
 def test_columns_are_named_in_the_order_of_a_row():
     like = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
-    named = dict(zip(columns(like), to_row(like), strict=True))
+    named = dict(zip(columns(like), pack_row(like), strict=True))
     assert named["motor_voltage.2"] == 3.0
     assert named["armed"] == 1.0
     assert named["attitude_reference.0"] == 9.0

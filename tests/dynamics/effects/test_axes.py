@@ -14,7 +14,7 @@ from lapwing.dynamics.validation import fault
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, evaluate
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 
 SPEED = (310.0, 290.0, 330.0, 270.0)  # [rad/s]
 VOLTAGE = (33.0, 29.0, 31.0, 30.0)  # [V], so that the rotors speed up and slow down
@@ -48,7 +48,7 @@ def flown(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1.5), omega
     attitude = Quaternion(*map(float, R.as_quat(scalar_first=True)))
     motion = Motion((0.0, 0.0, 50.0), attitude, tuple(velocity), tuple(map(float, omega)), SPEED)
     drive = MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
-    _, rotors, force, torque = uncompiled(evaluate)(drive, 0.0, motion)
+    _, rotors, force, torque = python_function(evaluate)(drive, 0.0, motion)
     return Flown(R.inv().apply(force), np.array(torque), *map(np.array, rotors[:3]))
 
 

@@ -12,9 +12,9 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.inflow import thrust_in_wake
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 
-share = uncompiled(thrust_in_wake)
+share = python_function(thrust_in_wake)
 GAP = 0.10  # [m]
 
 
@@ -59,7 +59,7 @@ def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0), exp(turn), 0.0, velocity)
     motion = state.motion._replace(rotor_speed=speeds)
     drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * 8)
-    rotors = uncompiled(evaluate)(drive, 0.0, motion)[1]
+    rotors = python_function(evaluate)(drive, 0.0, motion)[1]
     return np.array(rotors.thrust), np.array(rotors.torque)
 
 

@@ -14,10 +14,10 @@ from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.terrain import LEVEL, relief, touch
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, norm, scale, subtract
-from lapwing.kernels import kernel, uncompiled
+from lapwing.kernels import kernel, python_function
 
 add, apply, apply_transposed, cross, dot, norm, scale, subtract, rotation_matrix = map(
-    uncompiled, (add, apply, apply_transposed, cross, dot, norm, scale, subtract, quaternion.rotation_matrix)
+    python_function, (add, apply, apply_transposed, cross, dot, norm, scale, subtract, quaternion.rotation_matrix)
 )
 STEP = 1e-3
 GROUNDS = {"level": LEVEL, "relief": relief((2e-4, -1e-4), bump_height=2e-5, bump_length=0.7)}

@@ -8,7 +8,7 @@ import pytest
 from lapwing.dynamics.integrators import RATES, erk4m, march, rkmk54
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, log
 from lapwing.dynamics.vector import Vec3, add, scale
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class RampParameters(NamedTuple):
@@ -22,7 +22,7 @@ class RampState(NamedTuple):
     attitude: Quaternion
 
 
-@leaf
+@always_inline
 def ramp_rate(p, t, x):
     return RampState(add(p.start, scale(t, p.slope)))
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import pytest
 
 from lapwing.dynamics.integrators import RATES, get, march
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class LagParameters(NamedTuple):
@@ -18,7 +18,7 @@ class LagState(NamedTuple):
     distance: float
 
 
-@leaf
+@always_inline
 def lag_rate(p, t, x):
     return LagState(p.rate * (p.target - x.speed), 1e-3)
 

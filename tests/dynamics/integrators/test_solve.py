@@ -9,7 +9,7 @@ import pytest
 from lapwing.dynamics.integrators import RATES, get, simulate, solve
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 
 
 class BlowUpParameters(NamedTuple):
@@ -22,7 +22,7 @@ class NumberState(NamedTuple):
     level: float
 
 
-@leaf
+@always_inline
 def blow_up_rate(p, t, x):
     return NumberState(math.nan if t > p.end else x.level * x.level)
 

@@ -15,7 +15,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vehicles import multirotor_slung as slung
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.common.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 
@@ -64,7 +64,7 @@ def test_on_a_fixed_hook_it_is_a_pendulum():
 
     def slope(_, s):
         away, velocity = tuple(s[:3]), tuple(s[3:])
-        pull = np.array(uncompiled(slung.tension)(sling, away, velocity)[0])
+        pull = np.array(python_function(slung.tension)(sling, away, velocity)[0])
         return [*velocity, *(np.array([0.0, 0.0, -G]) - pull / sling.load_mass)]
 
     def lowest(_, s):
@@ -105,7 +105,7 @@ def test_what_it_pulls_with_when_it_comes_taut_is_bounded_by_its_stiffness():
     x, most = begin(p, (0.0, 0.0, 98.2), (0.0, 0.0, -speed)), 0.0
     for _ in range(250):
         x = flown(p, x, 1e-3, 2.5e-4)
-        most = max(most, math.hypot(*uncompiled(slung.cable)(sling, (1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), x)[0]))
+        most = max(most, math.hypot(*python_function(slung.cable)(sling, (1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), x)[0]))
     reduced = 1.0 / (1.0 / sling.load_mass + 1.0 / QUAD.mass.total)
     assert most == pytest.approx(speed * math.sqrt(sling.stiffness * reduced), rel=2e-3)
     apart = x.load_velocity[2] - x.vehicle.velocity_world[2]
@@ -114,9 +114,9 @@ def test_what_it_pulls_with_when_it_comes_taut_is_bounded_by_its_stiffness():
 
 def test_a_damped_cable_pulls_and_never_pushes():
     sling = SLING._replace(damping=500.0)
-    closing, _ = uncompiled(slung.tension)(sling, (0.0, 0.0, -2.001), (0.0, 0.0, 3.0))
+    closing, _ = python_function(slung.tension)(sling, (0.0, 0.0, -2.001), (0.0, 0.0, 3.0))
     assert closing == (0.0, 0.0, 0.0)
-    opening, _ = uncompiled(slung.tension)(sling, (0.0, 0.0, -2.001), (0.0, 0.0, -1.0))
+    opening, _ = python_function(slung.tension)(sling, (0.0, 0.0, -2.001), (0.0, 0.0, -1.0))
     assert opening[2] == pytest.approx(-502.0)
 
 

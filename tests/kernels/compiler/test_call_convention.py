@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lapwing.kernels import apart, kernel
-from lapwing.kernels.codegen import each_index
+from lapwing.kernels import kernel, noinline
+from lapwing.kernels.codegen import map_index
 
 
 @kernel
@@ -30,7 +30,7 @@ def indexed(table, i):
 
 @kernel
 def with_a_table_of_one(table):
-    return each_index(indexed, (0.0, 0.0), table)
+    return map_index(indexed, (0.0, 0.0), table)
 
 
 def test_what_stands_for_arguments_may_be_of_one_length():
@@ -90,14 +90,14 @@ def test_recursion_optional_results_generators_and_errors_stay_numbas_own():
     assert (caught(rows, 2), caught(rows, 7)) == (2.0, -1.0)
 
 
-@apart
+@noinline
 def cubed(x):
     if x < 0.0:
         raise ValueError("below zero")
     return x * x * x
 
 
-@apart
+@noinline
 def of_cubes(a):
     return cubed(a[0]) + cubed(a[1])
 

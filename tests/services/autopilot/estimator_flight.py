@@ -10,7 +10,7 @@ from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.noise import TURN_ON, normal3, stream_key
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import cross, norm, scale
-from lapwing.kernels import kernel, leaf
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot import estimator
 from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
 from lapwing.services.sensors.delay_line import Fault
@@ -27,7 +27,7 @@ NIS, HEALTH, REJECTED, COVARIANCE = 9, 15, 16, 17
 COLUMNS = COVARIANCE + 81
 
 
-@leaf
+@always_inline
 def bump(amplitude, frequency, t):
     """amplitude (1 - cos)^2 and its first two derivatives: starts from rest, without a step in acceleration."""
     c, s = math.cos(frequency * t), math.sin(frequency * t)
@@ -38,7 +38,7 @@ def bump(amplitude, frequency, t):
     )
 
 
-@leaf
+@always_inline
 def attitude_at(t, agility):
     """Upright along the thrust that the path needs, turned by a smooth yaw."""
     tau = max(t - STAND, 0.0)
@@ -128,7 +128,7 @@ def fly(p, memory, instruments, keys, ticks, agility, start, use_velocity, out):
     return estimator.estimate(p, s)
 
 
-@leaf
+@always_inline
 def write(row, p, s, truth):
     """Errors and their consistency now."""
     n = s.nominal

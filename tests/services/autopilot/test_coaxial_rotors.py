@@ -9,7 +9,7 @@ import pytest
 from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import demand_effects
 from lapwing.services.autopilot.motor import thrust_at
@@ -40,7 +40,7 @@ def wrench(scene, thrust):
     speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / known.motor.thrust_coefficient)))
     motion = state.motion._replace(rotor_speed=speeds)
     drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * len(speeds))
-    _, _, force, torque = uncompiled(evaluate)(drive, 0.0, motion)
+    _, _, force, torque = python_function(evaluate)(drive, 0.0, motion)
     return np.array([force[2], *torque])
 
 
@@ -90,7 +90,7 @@ def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
     scene.write_text(f"{text}\n[effects.coaxial_wash]\n[airframe]\n{table}\n")
     known = known_airframe(load(scene))
     assert known == known_airframe(load("hover", X8))
-    ideal = uncompiled(thrust_at)(known.motor, known.voltage_max) / controller_parameters.hover_thrust(known)
+    ideal = python_function(thrust_at)(known.motor, known.voltage_max) / controller_parameters.hover_thrust(known)
     computed = {row.name: row.computed for row in card(scene)}["thrust over weight"]
     assert 0.85 * ideal < computed < ideal
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.autopilot import motor_failure as watch
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.motor import Motor
@@ -19,7 +19,7 @@ HOVER = 0.25 * FRAME.mass * FRAME.gravity
 def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
     """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
     p, omega = watch.build(FRAME), np.zeros(3)
-    s = uncompiled(watch.start)(p)
+    s = python_function(watch.start)(p)
     random = np.random.default_rng(seed)
     thrust = np.full(4, HOVER)
     x, y = np.array(FRAME.rotor_x), np.array(FRAME.rotor_y)

@@ -7,7 +7,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.effects._axes import thrust_wrench
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import effectiveness, tilted_effectiveness
 from lapwing.services.autopilot.nominal_airframe import known_airframe
@@ -24,7 +24,7 @@ def test_the_autopilot_knows_the_force_and_the_torques_of_the_plant():
     known, frame = known_airframe(scene), airframe(scene)
     thrust = np.array([3.0, 4.0, 5.0, 2.0, 3.5, 4.5])
     loads = Loads(tuple(map(float, thrust)), tuple(map(float, known.torque_per_thrust * thrust)))
-    force, torque = uncompiled(thrust_wrench)(multirotor.parameters(frame).layout, loads)
+    force, torque = python_function(thrust_wrench)(multirotor.parameters(frame).layout, loads)
     assert controller_parameters.rotor_effectiveness(known) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
 
 

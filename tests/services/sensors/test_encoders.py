@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lapwing.cosim.diagram.topic_encoder import encode
-from lapwing.kernels.row_packing import to_row
+from lapwing.kernels.row_packing import pack_row
 from lapwing.messages import stamp_ns
 from lapwing.messages import topics as topic
 from lapwing.services.process_table import create_all
@@ -17,7 +17,7 @@ def test_a_fix_is_stamped_with_its_moment_and_never_before_the_start(which):
     wire = next(w for service in create_all(setup) for w in service.wires if w.topic is which)
     port = setup.port(wire.port)
     ticks = wire.period * np.arange(4)
-    rows = np.array([to_row(port.like._replace(age=0.2))] * len(ticks))
+    rows = np.array([pack_row(port.like._replace(age=0.2))] * len(ticks))
     payloads = [payload.tobytes() for page in encode(wire, port, setup, ticks, rows) for payload in page.payloads]
     stamps = [stamp_ns(which.message.decode(payload).header) for payload in payloads]
     assert stamps == [0, 0, 0, 100_000_000]

@@ -25,7 +25,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, Mult
 from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import unloaded
 from lapwing.kernels import kernel
-from lapwing.kernels.codegen import implements
+from lapwing.kernels.codegen import overload_for
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
@@ -61,7 +61,7 @@ def _of_euler(p: Any, x: Any) -> float:
     return _of_five(p, multirotor_euler.five(x))
 
 
-@implements(gap)
+@overload_for(gap)
 def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
     found = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
     return lambda p, x: found(p, x)

@@ -9,7 +9,7 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import exp, rotate_back
 from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
@@ -36,7 +36,7 @@ class HeavyTopParameters(NamedTuple):
         return True
 
 
-@leaf
+@always_inline
 def rate(p: HeavyTopParameters, t: float, x: RigidBody) -> RigidBody:
     """I omega' = I omega x omega + r x R^T weight."""
     o = x.omega_body

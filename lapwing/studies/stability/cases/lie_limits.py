@@ -6,7 +6,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from lapwing.dynamics.lie import ratios, so3
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "dexp inverse at angles towards 0 and towards its pole at 2 pi; the logarithm of rotations by nearly pi"
@@ -56,7 +56,7 @@ def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Relative errors of ours and of the naive ratio at these angles [rad], (k,) each."""
     vectors = [tuple(float(c) for c in a * AXIS) for a in angles]
     true = np.array([exact(v) for v in vectors])
-    ours, naive = (np.array([f(v) for v in vectors]) for f in (uncompiled(ratios.cotangent_ratio), naive_ratio))
+    ours, naive = (np.array([f(v) for v in vectors]) for f in (python_function(ratios.cotangent_ratio), naive_ratio))
     return np.abs(ours / true - 1.0), np.abs(naive / true - 1.0)
 
 

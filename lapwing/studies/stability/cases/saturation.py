@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.kernels import uncompiled
+from lapwing.kernels import python_function
 from lapwing.messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot import pid
 from lapwing.services.autopilot.gains import GainSet
@@ -38,7 +38,7 @@ def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
     frame, gains = known_airframe(of), pid.Pid(*of[GainSet].altitude)
     most = thrust_at(frame.motor, frame.voltage_max)
     weight = 0.25 * frame.mass * frame.gravity
-    integrate, output = uncompiled(pid.integrate), uncompiled(pid.output)
+    integrate, output = python_function(pid.integrate), python_function(pid.output)
     z = v = integral = cut = 0.0
     thrust, found = weight, []
     times = np.arange(0.0, 30.0, STEP)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import DispatchTable, leaf
-from lapwing.kernels.codegen import implements
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import overload_for
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator, State
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -21,22 +21,22 @@ class Correction(NamedTuple):
     filter: Estimator
 
 
-@leaf
+@always_inline
 def _barometer(p: Estimator, x: State, r: BarometerReading) -> State:
     return estimator.update_barometer(p, x, r.pressure, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _magnetometer(p: Estimator, x: State, r: MagnetometerReading) -> State:
     return estimator.update_magnetometer(p, x, r.field_body, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _distance(p: Estimator, x: State, r: DistanceReading) -> State:
     return estimator.update_sonar(p, x, r.range, r.variance, r.valid)
 
 
-@leaf
+@always_inline
 def _flow(p: Estimator, x: State, r: OpticalFlowReading) -> State:
     return estimator.update_flow(p, x, r.flow, r.rate, r.distance, r.variance, r.valid)
 
@@ -54,12 +54,12 @@ def update(p: Estimator, x: State, r: Reading) -> State:
     raise NotImplementedError("compiled code only")
 
 
-@implements(update, inline=True)
+@overload_for(update, inline=True)
 def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
     return UPDATES[r.instance_class]
 
 
-@leaf
+@always_inline
 def step(
     p: Correction, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
 from lapwing.services.autopilot.estimator import Estimator
@@ -19,7 +19,7 @@ class FilterEstimate(NamedTuple):
     before: StateEstimate  # the filter has begun
 
 
-@leaf
+@always_inline
 def step(
     p: FilterEstimate, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[StateEstimate], int]:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -17,7 +17,7 @@ class GpsFusion(NamedTuple):
     height_variance: float  # [m^2] by which its height is doubted: 0 where it is the reference
 
 
-@leaf
+@always_inline
 def step(
     p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
 from lapwing.dynamics.vector import ZERO
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
 from lapwing.services.common.ports import StateEstimate
 
@@ -15,7 +15,7 @@ class TrueEstimate(NamedTuple):
     attention: WakeupParameters
 
 
-@leaf
+@always_inline
 def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """The true state at `tick`; it has no state of its own."""
     truth, battery, flight = inputs

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, norm
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -23,7 +23,7 @@ class InertialNavigation(NamedTuple):
     standstill_every: int  # ticks between two corrections by a vehicle that is known to stand
 
 
-@leaf
+@always_inline
 def step(
     p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import leaf
+from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -16,7 +16,7 @@ class GroundReference(NamedTuple):
     filter: Estimator
 
 
-@leaf
+@always_inline
 def step(
     p: GroundReference, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from lapwing.kernels import kernel, leaf, uncompiled
+from lapwing.kernels import always_inline, kernel, python_function
 
 
-@leaf
+@always_inline
 def doubled(x):
     return 2.0 * x
 
 
-@leaf
+@always_inline
 def raised(x):
     return doubled(x) + 1.0
 
@@ -21,12 +21,12 @@ def outer(x):
 
 
 def test_nothing_is_compiled_for_it():
-    python = uncompiled(outer)
+    python = python_function(outer)
     assert python(3.0) == 42.0
     np.testing.assert_array_equal(python(np.array([0.0, 3.0])), [0.0, 42.0])
     assert not any(function.signatures for function in (outer, raised, doubled))
-    assert uncompiled(outer) is python
+    assert python_function(outer) is python
 
 
 def test_it_gives_what_the_compiled_one_gives():
-    assert outer(0.1) == uncompiled(outer)(0.1)
+    assert outer(0.1) == python_function(outer)(0.1)
