@@ -32,9 +32,9 @@ def outer(x):
 """,
     "plant/table.py": """
 from numba.extending import overload
-from lapwing.kernels import ByClass, kernel
+from lapwing.kernels import DispatchTable, kernel
 
-FORCES = ByClass()
+FORCES = DispatchTable()
 
 def force(p):
     raise NotImplementedError
