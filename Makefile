@@ -1,46 +1,43 @@
-# Every target sets itself up on a fresh machine with Python 3.11+ (with venv), make and git.
+# Every target sets up its environment on a machine with Python 3.11 or newer (with venv), make and git.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-# Without their byte code on the disk, processes take half a second longer to start, and tests start many.
+# Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test quick check stability bench wheel sbom audit docker-build docker-test clean
+.PHONY: mission test test-all check stability bench docs wheel release sbom audit docker-build docker-test clean
 
-# The lock file pins what was tested, by version and hash. pip takes no hashes where it installs a folder, so what is
-# installed with this one has the versions alone.
+# The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
+# with the same versions as constraints.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
 $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "installing the pinned packages into $(VENV) (once, 1 to 3 minutes)"
 	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
 	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' deploy/requirements.lock > $(VENV)/versions.txt
 	$(PINNED) ".[dev]"
 	touch $@
 
 mission: $(VENV)/.installed
-	$(BIN)/lapwing run lapwing/scenes/delivery_mission.toml
+	$(BIN)/lapwing run delivery_mission
 
-# Ground stations and ROS 2 nodes that the tests fly with; where they cannot be had, those tests say so and are skipped.
-# zenoh-ros2-sdk has a folder to itself: it brings a package `messages`, which would stand before ours.
+# Ground stations and ROS 2 nodes for the tests; where they cannot be installed, their tests are skipped with a reason.
 $(VENV)/.clients: $(VENV)/.installed
 	-$(PINNED) ".[clients]"
-	-$(INSTALL) --no-deps --target $(VENV)/ros2-sdk "zenoh-ros2-sdk>=0.1.8"
 	touch $@
 
-# Two workers more than cores: tests wait for a third of their time; those of `quick` for less.
+# Two workers more than cores: tests wait for other processes a third of their time.
 CORES := $(shell getconf _NPROCESSORS_ONLN)
 WORKERS ?= $(shell expr $(CORES) + 2)
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 20 --durations-min 1
 
-test: $(VENV)/.clients
-	$(PYTEST)
-
-# What a change most likely breaks: all but the tests that are marked long.
-quick: WORKERS = $(shell expr $(CORES) + 1)
-quick: $(VENV)/.installed
+test: $(VENV)/.installed
 	$(PYTEST) -m "not long"
+
+test-all: $(VENV)/.clients
+	$(PYTEST)
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
@@ -59,8 +56,23 @@ $(VENV)/.bench: $(VENV)/.installed
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
 
-# What images ship, for those who must know: a bill of materials in CycloneDX's form, and the known faults of it (asks a
-# database on the network).
+# The site, into build/site; a broken link or reference fails.
+$(VENV)/.docs: $(VENV)/.installed
+	$(PINNED) ".[docs]"
+	touch $@
+
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/python -m mkdocs build --strict
+
+# Source archive and wheel in dist/, checked, installed into empty environments and flown.
+release: $(VENV)/.installed
+	rm -rf dist
+	$(INSTALL) "build>=1.2" "twine>=6"
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/python deploy/check_release.py dist/*.whl
+
+# Contents of the images as CycloneDX bill of materials, and its known vulnerabilities (asks a database on the network).
 SHIPPED := $(filter-out %-tests.lock,$(wildcard deploy/requirements*.lock))
 $(VENV)/audit/bin/pip-audit:
 	$(PYTHON) -m venv $(VENV)/audit
@@ -74,11 +86,11 @@ sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
 DATABASE := https://api.osv.dev/v1/vulns/OSV-2020-111
 audit: $(VENV)/audit/bin/pip-audit
 	@$(VENV)/audit/bin/python -c "from urllib.request import urlopen; urlopen('$(DATABASE)', timeout=15)" 2> /dev/null || \
-		{ echo "audit: $(DATABASE) gives no answer: known faults cannot be looked up from here" >&2; exit 2; }
+		{ echo "audit: $(DATABASE) does not answer; run it on a machine with network access" >&2; exit 2; }
 	$(VENV)/audit/bin/pip-audit --vulnerability-service osv --strict --require-hashes --disable-pip $(addprefix --requirement ,$(SHIPPED))
 
-# A wheel that has the kernels of a scene with it, for processors like this one's; others compile their own.
-SHIPS ?= lapwing/scenes/delivery_mission.toml
+# A wheel that contains the compiled kernels of a scene for processors like this machine's; others compile their own.
+SHIPS ?= delivery_mission
 wheel: $(VENV)/.installed
 	LAPWING_CACHE=lapwing/kernels/shipped $(BIN)/lapwing warm $(SHIPS)
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .

@@ -3,7 +3,7 @@
     lapwing keys keys
     python deploy/kubernetes.py delivery_mission | kubectl apply -f -
 
-docs/hosts.md tells the rest.
+docs/guides/several_hosts.md tells the rest.
 """
 
 import argparse

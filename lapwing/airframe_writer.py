@@ -55,7 +55,8 @@ def written(name: str, v: Values, known: set[str]) -> str:
     motor = ("speed_constant", "gear_ratio", "no_load_current", "resistance", "time_constant")
     units = {figure.name: figure.unit for figure in FIGURES}
     lines = [
-        f"# {name}, written by `lapwing new vehicle`; docs/new_airframe.md says how each figure is measured. SI units.",
+        f"# {name}, written by `lapwing new vehicle`. SI units.",
+        "# docs/guides/new_airframe.md describes how each figure is measured.",
         f"# Guessed, not measured: {guessed or 'nothing'}.",
         "",
         "[mass]",

@@ -1,4 +1,4 @@
-"""The same work in Lapwing and in others: wall time for every error, side by side (docs/accuracy.md)."""
+"""The same work in Lapwing and in others: wall time for every error, side by side (docs/explanation/accuracy.md)."""
 
 from pathlib import Path
 

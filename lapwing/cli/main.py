@@ -8,7 +8,6 @@ import typer
 from lapwing.cli import (  # noqa: F401 (they register themselves)
     campaign_commands,
     certificates_command,
-    docs_command,
     log_commands,
     log_playback,
     new_command,
@@ -16,6 +15,7 @@ from lapwing.cli import (  # noqa: F401 (they register themselves)
     protocol,
     run_command,
     scene_commands,
+    schema_command,
     service_command,
     study_commands,
 )

@@ -28,7 +28,8 @@ def vehicle(
 ) -> None:
     """An airframe of your own: vehicles/NAME.toml in this folder, from figures that a workshop can measure.
 
-    In a terminal it asks for each figure and says how to measure it (docs/new_airframe.md has more); elsewhere, figures
+    In a terminal it asks for each figure and says how to measure it (docs/guides/new_airframe.md has more);
+    elsewhere, figures
     that are not given with --set are guessed from the others, and marked so in the file.
     """
     with user_errors():

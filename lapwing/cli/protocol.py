@@ -19,7 +19,7 @@ def protocol(
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as JSON, with the whole set-up")] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the services and what they hand on")] = None,
 ) -> None:
-    """What each service of a scene takes and gives: ports, periods, columns (docs/protocol.md)."""
+    """What each service of a scene takes and gives: ports, periods, columns (docs/reference/protocol.md)."""
     import json as json_module
 
     from lapwing.cosim.transport.packet_layout import layout

@@ -67,7 +67,7 @@ def test_is_documented(name):
     text = effects.parameter_class(name).__doc__
     assert "Valid" in text
     equation = re.search(r"theory\.md,\s+eq\.\s+(\(\d+\.\d+\))", text).group(1)
-    assert f"**{equation}**" in (ROOT / "docs/theory.md").read_text()
+    assert f"**{equation}**" in (ROOT / "docs/explanation/theory.md").read_text()
 
 
 @pytest.mark.parametrize("name", effects.names())

@@ -39,7 +39,8 @@ def test_scene_is_valid_and_says_what_it_is(scene):
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
 def test_no_part_makes_arrays(scene, monkeypatch):
-    """One that does counts references, which took half of a flight's time (docs/benchmarks.md, "Campaign")."""
+    """One that does counts references, which took half of a flight's time (docs/reference/benchmarks.md,
+    "Campaign")."""
     made = 0
 
     def watched(*arguments):

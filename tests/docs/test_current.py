@@ -1,4 +1,4 @@
-"""The pages that are made from the code are what the code gives, and links between pages lead somewhere."""
+"""Documentation: schemas are current, the Python page lists the public names, links between pages resolve."""
 
 import json
 import re
@@ -7,43 +7,26 @@ from pathlib import Path
 import pytest
 
 import lapwing
-from lapwing.docs.api_page import api
-from lapwing.docs.json_schema import SCHEMAS
-from lapwing.docs.reference_page import reference
+from lapwing.file_schemas.json_schema import SCHEMAS
 
 DOCS = Path(__file__).parents[2] / "docs"
+GENERATED = {"commands.md", "scene.md", "airframe.md", "gains.md"}  # by docs/site/reference.py
 
 
-def test_the_scene_reference_is_current():
-    assert (DOCS / "reference.md").read_text() == reference(), "lapwing docs reference --out docs/reference.md"
-
-
-def test_the_api_reference_is_current():
-    assert (DOCS / "api.md").read_text() == api(), "lapwing docs api --out docs/api.md"
-
-
-def test_the_api_reference_says_all_that_can_be_imported_with_its_units_and_errors():
-    page = api()
-    for name in lapwing.__all__:
-        assert f"### lapwing.{name}\n" in page or f"### {name}\n" in page, name
-    said = (
-        "- `controller`: ",
-        "| `volts` | `tuple[float, ...]` | V |",
-        "shape (n, 6)",
-        "- `SceneError`: ",
-    )
-    assert all(words in page for words in said)
+def test_python_page_lists_public_names():
+    listed = {line.rpartition(".")[2] for line in (DOCS / "reference/python.md").read_text().splitlines()}
+    assert set(lapwing.__all__) <= listed
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
-def test_schemas_are_current(kind):
-    path = DOCS / f"{kind}.schema.json"
-    assert json.loads(path.read_text()) == SCHEMAS[kind](), f"lapwing docs schema --of {kind} --out docs/{path.name}"
+def test_schema_is_current(kind):
+    path = DOCS / f"schemas/{kind}.schema.json"
+    assert json.loads(path.read_text()) == SCHEMAS[kind](), f"lapwing schema {kind} --out docs/schemas/{path.name}"
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.name)
-def test_links_lead_somewhere(page):
+def test_links_resolve(page):
     text = re.sub(r"```.*?```|`[^`\n]*`|\$[^$\n]*\$", "", page.read_text(), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if not target.startswith(("http", "#")):
+        if not target.startswith(("http", "#")) and Path(target).name.partition("#")[0] not in GENERATED:
             assert (page.parent / target.partition("#")[0]).exists(), target

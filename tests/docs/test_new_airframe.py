@@ -8,16 +8,16 @@ import jsonschema
 import numpy as np
 import pytest
 
-from lapwing.docs.json_schema import airframe_schema
 from lapwing.dynamics.vehicles import performance
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.airframe_tables import Propeller
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.file_schemas.json_schema import airframe_schema
 from lapwing.services.scene_resolver import load
 
 pytestmark = pytest.mark.long
 
-PAGE = (Path(__file__).parents[2] / "docs/new_airframe.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs/guides/new_airframe.md").read_text()
 EXAMPLE = tomllib.loads(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])
 
 

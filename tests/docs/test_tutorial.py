@@ -10,7 +10,7 @@ import lapwing
 
 pytestmark = pytest.mark.long
 
-PAGE = (Path(__file__).parents[2] / "docs/tutorial.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs/tutorials/first_flight.md").read_text()
 BLOCKS = re.findall(r'```python(?: title="(.*?)")?\n(.*?)```', PAGE, re.DOTALL)
 
 
@@ -32,5 +32,5 @@ def test_the_tutorial_runs(folder):
         if title:
             (folder / title).write_text(block)
         else:
-            exec(compile(block, "docs/tutorial.md", "exec"), names)
+            exec(compile(block, "docs/tutorials/first_flight.md", "exec"), names)
     assert {path.name for path in folder.iterdir()} >= {"flights.png", "windy.mcap", "windy.html"}

@@ -2,7 +2,7 @@
 
 A mark is the publisher's identifier in the attachment. A run on one machine makes the marks from a secret that its
 launcher draws and hands over on standard input. Participants that were started separately share no secret: there a
-mark only tells one run from another, and certificates keep strangers out (docs/security.md).
+mark only tells one run from another, and certificates keep strangers out (docs/explanation/security.md).
 """
 
 import hashlib

@@ -178,7 +178,7 @@ def advance(memory: Any, tick: int) -> int:
 
 @kernel
 def advance_counted(memory: Any, tick: int) -> int:
-    """The same for parts that may put an array in another's place (docs/decisions/0017)."""
+    """The same for parts that may put an array in another's place (docs/explanation/decisions/0017)."""
     return advance(memory, tick)
 
 

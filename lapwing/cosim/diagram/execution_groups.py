@@ -1,7 +1,7 @@
 """Who steps when: all parts of a graph tick by tick, or where nothing couples its vehicles one vehicle after the other.
 
 A vehicle that goes through a page of ticks by itself stays in the processor's cache; where 32 take turns at every tick
-each step costs a tenth more (docs/benchmarks.md). What comes of it is the same to the bit.
+each step costs a tenth more (docs/reference/benchmarks.md). What comes of it is the same to the bit.
 """
 
 from collections.abc import Callable, Sequence

@@ -135,7 +135,7 @@ def pin(core: int) -> None:
     """Keep all threads of this process on one core.
 
     In sequential lock step only one process works at a time; handing over on one core costs half of what waking
-    another core costs (docs/benchmarks.md).
+    another core costs (docs/reference/benchmarks.md).
     """
     if hasattr(os, "sched_setaffinity"):
         for thread in os.listdir("/proc/self/task"):
@@ -146,7 +146,7 @@ def batch() -> None:
     """Let the scheduler take this process for batch work, where it is an ordinary one.
 
     What it wakes then runs when it waits, instead of interrupting it: on a core that all services share that spares a
-    third of the switches from one thread to another (docs/benchmarks.md).
+    third of the switches from one thread to another (docs/reference/benchmarks.md).
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         for thread in os.listdir("/proc/self/task"):

@@ -20,7 +20,7 @@ from lapwing.cosim.transport.session_settings import session_settings
 from lapwing.cosim.transport.subscription import Message, Subscription
 from lapwing.messages.attachment import pack, time_and_gid
 
-# One runtime thread instead of six: the largest single gain in latency (see docs/benchmarks.md).
+# One runtime thread instead of six: the largest single gain in latency (see docs/reference/benchmarks.md).
 _RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
 os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 

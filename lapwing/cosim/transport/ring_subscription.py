@@ -1,6 +1,7 @@
 """What one sender publishes on one key, kept by Zenoh itself until it is taken.
 
-Zenoh's thread runs no Python for such a message and waits for no lock of Python's (docs/decisions/0018-inboxes.md).
+Zenoh's thread runs no Python for such a message and waits for no lock of Python's
+(docs/explanation/decisions/0018-inboxes.md).
 """
 
 import time

@@ -3,7 +3,8 @@
 Of every function, however small, numba makes machine code and two wrappers, for calls from Python and from C. A kernel
 calls hundreds that end up inlined in it, so that most of the compile time went there. Here such a function is an
 `InnerLibrary`: optimised LLVM code, linked into its caller as numba links any, which takes its arguments whole
-(`_calls`). The outermost kernel's own code does the same with or without (docs/benchmarks.md, "Compile time").
+(`_calls`). The outermost kernel's own code does the same with or without (docs/reference/benchmarks.md, "Compile
+time").
 """
 
 import gc

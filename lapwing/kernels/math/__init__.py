@@ -2,7 +2,8 @@
 
     from lapwing.kernels import math
 
-Functions that the C library would round in its own way are computed here (docs/elementary_functions.md); the others,
+Functions that the C library would round in its own way are computed here
+(docs/explanation/elementary_functions.md); the others,
 which IEEE 754 or integer arithmetic determines, and the constants are those of Python's `math`. In compiled code every
 function is a kernel. Called from Python it runs as plain Python on the same operations, with the same result.
 Differences from Python's `math`: where it raises a ValueError or OverflowError, the result is NaN or infinite.

@@ -1,6 +1,7 @@
 """What QGroundControl's buttons do: its messages, one by one, to the vehicle that flies.
 
-The messages are those that its PX4 plug-in sends (PX4FirmwarePlugin.cc, Vehicle.cc); docs/mavlink.md has them as a
+The messages are those that its PX4 plug-in sends (PX4FirmwarePlugin.cc, Vehicle.cc); docs/reference/mavlink.md has
+them as a
 table, whose buttons are the methods of `QGroundControl`.
 """
 
@@ -222,7 +223,7 @@ def test_arming_and_the_gripper(station):
 
 
 def test_the_table_in_the_documentation_has_these_buttons():
-    text = Path("docs/mavlink.md").read_text()
+    text = Path("docs/reference/mavlink.md").read_text()
     table = text[text.index("| button ") :].split("\n\n")[0]
     buttons = [name.strip() for row in table.splitlines()[2:] for name in row.split("|")[1].split(",")]
     said = {name.lower().replace(" ", "_") for name in buttons if not name.startswith("shown where")}

@@ -1,0 +1,42 @@
+"""Install a wheel into an empty environment for each Python found, check its top-level names, and fly."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PYTHONS = ("python3.11", "python3.12", "python3.13", "python3.14")
+
+
+def check(python: str, wheel: Path) -> None:
+    """Install the wheel and fly hover with it from an empty folder.
+
+    Raises:
+        subprocess.CalledProcessError: a step failed.
+        SystemExit: the wheel installs another top-level name than `lapwing`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        environment, work = Path(folder) / "venv", Path(folder) / "work"
+        work.mkdir()
+        subprocess.run([python, "-m", "venv", environment], check=True)
+        pip = [environment / "bin/python", "-m", "pip", "--quiet", "--disable-pip-version-check"]
+        site = Path(
+            subprocess.check_output(
+                [*pip[:1], "-c", "import site; print(site.getsitepackages()[0])"], text=True
+            ).strip()
+        )
+        before = {path.name for path in site.iterdir()}
+        subprocess.run([*pip, "install", "--no-deps", wheel], check=True)
+        added = {path.name for path in site.iterdir()} - before
+        if {name for name in added if not name.endswith(".dist-info")} != {"lapwing"}:
+            raise SystemExit(f"{wheel.name}: installs {', '.join(sorted(added))}; expected lapwing alone")
+        subprocess.run([*pip, "install", wheel], check=True)
+        subprocess.run([environment / "bin/lapwing", "run", "hover", "--mode", "single"], cwd=work, check=True)
+        print(f"{python}: {wheel.name} installs one package and flies")
+
+
+if __name__ == "__main__":
+    found = [path for name in PYTHONS if (path := shutil.which(name))]
+    for python in found or [sys.executable]:
+        check(python, Path(sys.argv[1]).resolve())

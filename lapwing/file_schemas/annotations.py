@@ -1,0 +1,106 @@
+"""From an annotation with its bounds to a JSON schema (draft 7, which TOML editors read)."""
+
+import math
+import types
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from lapwing.file_schemas.key_docs import REQUIRED, Key, is_table, keys
+
+Schema = dict[str, Any]
+PLAIN = {float: "number", int: "integer", str: "string", bool: "boolean", dict: "object"}
+BOUNDS = {
+    "ge": "minimum",
+    "gt": "exclusiveMinimum",
+    "le": "maximum",
+    "lt": "exclusiveMaximum",
+    "min_length": "minItems",
+    "max_length": "maxItems",
+    "pattern": "pattern",
+}
+
+
+def table_schema(cls: type, leave_out: Iterable[str] = ()) -> Schema:
+    """The schema of a table that a class declares, without some of its keys."""
+    found = [key for key in keys(cls) if key.name not in leave_out]
+    return {
+        **closed({key.name: key_schema(key) for key in found}),
+        **required([key.name for key in found if key.default is REQUIRED]),
+    }
+
+
+def closed(properties: Mapping[str, Schema]) -> Schema:
+    """A table with these keys and no others."""
+    return {"type": "object", "properties": dict(properties), "additionalProperties": False}
+
+
+def required(names: list[str]) -> Schema:
+    """The part of a table's schema that says which keys it must have."""
+    return {"required": names} if names else {}
+
+
+def key_schema(key: Key) -> Schema:
+    """The schema of a key with its description and default."""
+    found = schema_of(key.hint)
+    description = " ".join(filter(None, (f"[{key.unit}]" if key.unit else "", key.meaning)))
+    if description:
+        found["description"] = description
+    if (plain := _plain(key.default)) is not None:
+        found["default"] = plain
+    return found
+
+
+def _plain(default: Any) -> Any:
+    """A default as JSON has it; None where it is none, or a table, or not finite."""
+    if default is REQUIRED or is_table(type(default)) or isinstance(default, dict):
+        return None
+    if isinstance(default, float) and not math.isfinite(default):
+        return None
+    return list(default) if isinstance(default, tuple) else default
+
+
+def schema_of(hint: Any) -> Schema:
+    """The schema of what an annotation allows; None stands for a key that is left out."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _bounded(schema_of(arguments[0]), arguments[1:])
+    if origin in (Union, types.UnionType):
+        members = [schema_of(member) for member in arguments if member is not type(None)]
+        return members[0] if len(members) == 1 else {"anyOf": members}
+    if origin is Literal:
+        return {"enum": list(arguments)}
+    if origin is dict:
+        return _mapping(*arguments)
+    if origin in (tuple, list):
+        return _array(arguments, origin is list or arguments[-1] is Ellipsis)
+    if isinstance(hint, type) and is_table(hint):
+        return table_schema(hint)
+    return {"type": PLAIN[hint]}
+
+
+def _bounded(found: Schema, metadata: Iterable[Any]) -> Schema:
+    flat = [part for m in metadata for part in (m.metadata if isinstance(m, FieldInfo) else [m])]
+    for part in flat:
+        for attribute, word in BOUNDS.items():
+            value = getattr(part, attribute, None)
+            if value is not None:
+                text = word.endswith("Items") and found.get("type") == "string"
+                found[word.replace("Items", "Length") if text else word] = value
+    return found
+
+
+def _mapping(name: Any, value: Any) -> Schema:
+    if get_origin(name) is Literal:
+        return closed({choice: schema_of(value) for choice in get_args(name)})
+    return {"type": "object", "additionalProperties": schema_of(value)}
+
+
+def _array(arguments: tuple, open_ended: bool) -> Schema:
+    """A list of equal items; all tuples of tables are such."""
+    items = schema_of(arguments[0])
+    if open_ended:
+        return {"type": "array", "items": items}
+    assert all(schema_of(other) == items for other in arguments), arguments
+    return {"type": "array", "items": items, "minItems": len(arguments), "maxItems": len(arguments)}

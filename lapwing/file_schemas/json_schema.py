@@ -1,0 +1,145 @@
+"""JSON schemas of the TOML files that people write: scenes, airframes, gain sets."""
+
+from collections.abc import Callable
+from typing import Any
+
+from lapwing.cosim.scene import SceneTable
+from lapwing.cosim.scene.vehicle_scenes import MOST
+from lapwing.dynamics import integrators
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.file_schemas.annotations import Schema, closed, required, table_schema
+from lapwing.file_schemas.catalogue import effect_tables, flight_parameters, sensor_tables
+from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.common.autopilot_parameters import Parameter
+from lapwing.services.plant import models
+from lapwing.services.scene_resolver import vocabulary
+from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
+from lapwing.services.trajectory.segments import KINDS
+from lapwing.services.trajectory.trajectory_compiler import CHANNELS
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+TEXT: Schema = {"type": "string"}
+OWN: Schema = {
+    "type": "object",
+    "description": "one of the user's own, with parameters of its own",
+    "properties": {"module": {**TEXT, "description": "that declares it"}},
+    "required": ["module"],
+}
+
+
+def scene_schema() -> Schema:
+    """The JSON schema of a scene as it is written, before the files that it names become part of it."""
+    known = vocabulary().sections
+    sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
+    tables = {name: _section(section) for name, section in sections.items()}
+    tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
+    tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
+    tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
+    tables["vehicle"]["properties"]["model"]["enum"] = list(models.names())
+    tables["autopilot"]["properties"]["parameters"] = _parameters()
+    for name, section in sections.items():
+        if section.FROM_FILE:  # what a scene says of it is laid over the file's content
+            tables[name] = _optional(tables[name])
+    phase = tables["trajectory"]["properties"]["phase"]["items"]["properties"]
+    segment = {"$ref": "#/definitions/segment"}
+    for channel in CHANNELS:
+        unit = "rad" if channel == "yaw" else "m"
+        phase[channel] = {
+            "description": f"[{unit}] a segment, or a list of them",
+            "anyOf": [segment, {"type": "array", "items": segment}],
+        }
+    tables["vehicle"] = {"anyOf": [tables["vehicle"], _fleet(tables, sections)]}
+    needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
+    found = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
+    return {**found, "definitions": {"segment": {"anyOf": [_segment(kind) for kind in KINDS]}}}
+
+
+def airframe_schema() -> Schema:
+    """The JSON schema of an airframe's file."""
+    return {**_head("Lapwing airframe"), **table_schema(Airframe)}
+
+
+def gains_schema() -> Schema:
+    """The JSON schema of a gain set's file."""
+    return {**_head("Lapwing gain set"), **table_schema(GainSet)}
+
+
+SCHEMAS: dict[str, Callable[[], Schema]] = {
+    "scene": scene_schema,
+    "airframe": airframe_schema,
+    "gains": gains_schema,
+}
+
+
+def _head(title: str) -> Schema:
+    return {"$schema": DRAFT, "title": title}
+
+
+def _section(section: type[SceneTable]) -> Schema:
+    return {"description": " ".join((section.__doc__ or "").split()), **table_schema(section)}
+
+
+def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
+    """Several vehicles: each has the keys of a vehicle, and what it says of the tables that it need not share."""
+    names = [name for name, section in sections.items() if name != "vehicle" and not section.SHARED]
+    own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}
+    properties = dict(tables["vehicle"]["properties"])
+    properties["airframe"] = {"anyOf": [properties["airframe"], own.pop("airframe")]}
+    items = closed({**properties, **own})
+    text = "several vehicles: the tables of each are laid over those of the scene"
+    return {"type": "array", "minItems": 1, "maxItems": MOST, "items": items, "description": text}
+
+
+def _partial(schema: Schema, place: str) -> Schema:
+    """A schema at a place of the document without what is required, by reference where nothing is."""
+    optional: Schema = _optional(schema)
+    if optional == schema:
+        return {"$ref": place}
+    if "properties" in schema:
+        inner = {key: _partial(value, f"{place}/properties/{key}") for key, value in schema["properties"].items()}
+        return {**optional, "properties": inner}
+    return optional
+
+
+def _or_own(tables: dict[str, Schema]) -> Schema:
+    """These tables, and others that name a module."""
+    return {**closed(tables), "additionalProperties": OWN}
+
+
+def _sensor(module: Any, cls: type) -> Schema:
+    """A preset, keys that differ from it, and faults."""
+    fault = table_schema(FaultTable)
+    fault["properties"]["channel"] = {"enum": ["all", *module.CHANNELS], "default": "all"}
+    faults = {"type": "array", "items": fault, "maxItems": SLOTS, "description": "by schedule"}
+    table = table_schema(cls, leave_out=["faults"])
+    preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
+    return closed({"preset": preset, **table["properties"], "faults": faults})
+
+
+def _parameters() -> Schema:
+    """Values of the autopilot's parameters, or the name of a file of them."""
+    fixed, by_gains = flight_parameters()
+    properties = {p.name: _parameter(p) for p in fixed} | {p.name: {"type": "number"} for p in by_gains}
+    return {"description": "values by name, or the name of a file of them", "anyOf": [closed(properties), TEXT]}
+
+
+def _parameter(p: Parameter) -> Schema:
+    kind = "integer" if p.whole else "number"
+    unit = f"[{p.unit}] " if p.unit else ""
+    return {"type": kind, "minimum": p.least, "maximum": p.most, "default": p.default, "description": unit + p.meaning}
+
+
+def _segment(kind: str) -> Schema:
+    """A segment of one kind; the points of a table may be in a file."""
+    table = table_schema(KINDS[kind])
+    table["description"] = " ".join((KINDS[kind].__doc__ or "").split())
+    table["properties"]["kind"] = {"enum": [kind]}
+    needed = [name for name in table.get("required", []) if name != "points"]
+    return {**table, "required": ["kind", *needed]}
+
+
+def _optional(schema: Any) -> Any:
+    """A schema none of whose keys is required."""
+    if isinstance(schema, dict):
+        return {key: _optional(value) for key, value in schema.items() if key != "required"}
+    return schema

@@ -1,0 +1,116 @@
+"""The schemas that editors use: they take what ships and refuse what the loader refuses."""
+
+import copy
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.file_schemas.json_schema import SCHEMAS
+from lapwing.services.scene_resolver import load
+
+ROOT = Path(__file__).parents[2]
+FILES = {
+    "scene": sorted((ROOT / "lapwing/scenes").glob("*.toml")),
+    "airframe": sorted((ROOT / "lapwing/scenes/vehicles").glob("*.toml")),
+    "gains": sorted((ROOT / "services/autopilot/gains").glob("*.toml")),
+}
+VALIDATORS = {kind: jsonschema.Draft7Validator(make()) for kind, make in SCHEMAS.items()}
+MISSION = tomllib.loads((ROOT / "lapwing/scenes/delivery_mission.toml").read_text())
+
+
+def faults(kind, tree):
+    return [error.message for error in VALIDATORS[kind].iter_errors(tree)]
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_it_is_a_schema_and_there_is_something_to_try_it_on(kind):
+    jsonschema.Draft7Validator.check_schema(VALIDATORS[kind].schema)
+    assert FILES[kind]
+
+
+@pytest.mark.parametrize(("kind", "path"), [(k, p) for k, ps in FILES.items() for p in ps], ids=lambda x: Path(x).stem)
+def test_what_ships_is_valid(kind, path):
+    assert faults(kind, tomllib.loads(path.read_text())) == []
+
+
+WRONG = {
+    "table": ("runn", {}),
+    "key": ("run.sed", 1),
+    "effect": ("effects.gravty", {}),
+    "effect's key": ("effects.gravity.g", 9.81),
+    "effect's bound": ("effects.wind_random.sigma", -1.0),
+    "effect's length": ("effects.wind_random.mean", [1.0, 2.0]),
+    "sensor": ("sensors.imuu", {}),
+    "preset": ("sensors.imu.preset", "mpu"),
+    "sensor's key": ("sensors.imu.gyro", {"noise": 0.1}),
+    "fault's kind": ("sensors.imu.faults", [{"kind": "frozen"}]),
+    "fault's channel": ("sensors.gps.faults", [{"kind": "bias", "channel": "gyro"}]),
+    "integrator": ("solver.integrator", "rk5"),
+    "model": ("vehicle.model", "reducd"),
+    "choice": ("exchange.coupling", "both"),
+    "type": ("exchange.rate", "250"),
+    "airframe's key": ("airframe.mass", {"totl": 9.0}),
+    "gain": ("gains.lft", [1.0, 0.0, 0.0]),
+    "parameter": ("autopilot.parameters", {"MPC_XY_CRUIS": 3.0}),
+    "parameter's bound": ("autopilot.parameters", {"MPC_XY_CRUISE": 99.0}),
+    "figure": ("published.rmse", {"w": 0.1}),
+    "phase's key": ("trajectory.phase.0.lasts", 3.0),
+    "kind of segment": ("trajectory.phase.1.z.kind", "rmp"),
+    "segment's key": ("trajectory.phase.1.z.too", 3.0),
+}
+
+
+def changed(key, value):
+    tree = copy.deepcopy(MISSION)
+    at, (*parents, last) = tree, key.split(".")
+    for parent in parents:
+        at = at[int(parent)] if isinstance(at, list) else at.setdefault(parent, {})
+    at[last] = value
+    return tree
+
+
+@pytest.mark.parametrize(("key", "value"), WRONG.values(), ids=WRONG)
+def test_what_the_loader_refuses_is_invalid(key, value):
+    with pytest.raises(SceneError):
+        load("delivery_mission", {key: value})
+    assert faults("scene", changed(key, value))
+
+
+RIGHT = {
+    "part of an airframe": ("airframe", {"mass": {"total": 9.0}}),
+    "part of a gain set": ("gains", {"tilt_limit": 0.5}),
+    "a file of parameters": ("autopilot.parameters", "mine.params"),
+    "several segments": ("trajectory.phase.0.x", [{"kind": "hold", "duration": 1.0}, {"kind": "step", "to": 0.1}]),
+    "a file of points": ("trajectory.phase.0.x", {"kind": "table", "file": "points.csv"}),
+    "whole numbers": ("effects.wind_random.mean", [3, 1, 0]),
+}
+
+
+@pytest.mark.parametrize(("key", "value"), RIGHT.values(), ids=RIGHT)
+def test_what_a_scene_may_write_is_valid(key, value):
+    assert faults("scene", changed(key, value)) == []
+
+
+def test_a_misspelt_key_of_an_airframe_or_gain_set_is_invalid():
+    frame = tomllib.loads(FILES["airframe"][0].read_text())
+    frame["mass"]["totl"] = frame["mass"].pop("total")
+    assert len(faults("airframe", frame)) == 2  # one that is unknown, one that is missing
+    gains = tomllib.loads(FILES["gains"][0].read_text())
+    assert faults("gains", {**gains, "tiltlimit": 0.5})
+
+
+def test_keys_are_explained():
+    keys = VALIDATORS["scene"].schema["properties"]["effects"]["properties"]["wind_random"]["properties"]
+    assert keys["mean"]["description"] == "[m/s] world"
+    assert keys["sigma"]["default"] == 1.0
+
+
+@pytest.mark.parametrize("kind", ["effects", "sensors"])
+def test_what_is_the_users_own_names_a_module_and_has_keys_of_its_own(kind):
+    own = {**MISSION, kind: {**MISSION[kind], "my_own": {"module": "my_module", "strength": 2.0}}}
+    assert faults("scene", own) == []
+    del own[kind]["my_own"]["module"]
+    assert faults("scene", own) != []
