@@ -9,7 +9,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
-from lapwing.cli.output_paths import check_writable
+from lapwing.cli.output_paths import claim
 
 
 class Kind(Enum):
@@ -33,5 +33,5 @@ def schema(
         if out is None:
             typer.echo(text, nl=False)
         else:
-            check_writable(out)
+            claim(out)
             out.write_text(text, encoding="utf-8")
