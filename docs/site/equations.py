@@ -6,7 +6,14 @@ from typing import Any
 
 from latex2mathml.converter import convert
 
+_DISPLAYED = re.compile(r"^\$\$(.*?)\$\$[ \t]*(?:\n\*\*\([^)]+\)\*\*$)?", re.DOTALL | re.MULTILINE)
+_TAG = re.compile(r"\\tag\{([^}]*)\}")
 _EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Return a page's Markdown with displayed equations as paragraphs of their own."""
+    return _DISPLAYED.sub(lambda match: f"\n\n$$\n{match[1].strip()}\n$$\n\n", markdown)
 
 
 def on_page_content(content: str, **_: Any) -> str:
@@ -16,5 +23,8 @@ def on_page_content(content: str, **_: Any) -> str:
 
 def _mathml(match: re.Match[str]) -> str:
     tag, opening, latex = match.groups()
-    display = "block" if opening == "[" else "inline"
-    return f"<{tag}>{convert(html.unescape(latex), display=display)}</{tag}>"
+    latex = html.unescape(latex)
+    number = _TAG.search(latex)
+    equation = convert(_TAG.sub("", latex), display="block" if opening == "[" else "inline")
+    right = f'<span style="float:right">({number[1]})</span>' if number else ""
+    return f"<{tag}>{right}{equation}</{tag}>"

@@ -6,7 +6,7 @@ from typing import Any
 
 import mkdocs_gen_files
 import typer
-from lapwing.docs.json_schema import SCHEMAS
+from lapwing.file_schemas.json_schema import SCHEMAS
 from typer.cli import get_docs_for_click
 
 from lapwing.cli.main import app
