@@ -102,8 +102,8 @@ def take_part(given: ProcessSpec) -> None:
     with ZenohBus(endpoints, connect, entry.mode, gid, security, awaits=False) as bus:
         watched = MONITOR in given.peers and not given.with_parent
         others = [*process_table.needed(setup, given.external or ()), *([MONITOR] if MONITOR in given.peers else [])]
-        if given.with_parent and process_table.ROUTER in given.peers:
-            others.append(process_table.ROUTER)  # one that cannot listen ends the run
+        if given.with_parent:  # the run begins when each auxiliary process has opened its links
+            others += [name for name in process_table.optional() if name in given.peers]
         # all that one launcher has started have the same set-up; a program of somebody else's may have another
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)

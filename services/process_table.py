@@ -67,6 +67,11 @@ def usual() -> list[str]:
     return [p.name for p in PROCESSES if not p.optional]
 
 
+def optional() -> list[str]:
+    """Return the names of the auxiliary processes, which a run has if an option asks for them."""
+    return [p.name for p in PROCESSES if p.optional]
+
+
 def encoded(name: str) -> str:
     """The service whose messages the process of this name makes, "" for any other process."""
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""

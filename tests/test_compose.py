@@ -246,6 +246,7 @@ def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
         assert station, (tmp_path / "groundstation.txt").read_text()
 
         def order(number, *params):
+            station.mav.heartbeat_send(6, 8, 0, 0, 0)
             station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
             while (ack := station.recv_match(type="COMMAND_ACK", blocking=True, timeout=60)).command != number:
                 pass

@@ -45,8 +45,8 @@ def check_links(urls: list[str] | None, key: Path | None) -> None:
         if key:
             raise ValueError("--mavlink-key: expected with --mavlink URL")
         return
-    from lapwing.services.mavlink.channel import read_key
     from lapwing.services.mavlink.links import check
+    from lapwing.services.mavlink.signing import read_key
 
     for url in urls:
         check(url)
@@ -70,9 +70,9 @@ def mavlink_options(
     urls: list[str] | None, key: Path | None, insecure: bool, log: Path, speed: float | None
 ) -> "Options":
     """The link that a replay of a log opens."""
-    from lapwing.services.mavlink.channel import read_key
     from lapwing.services.mavlink.link_options import Options
+    from lapwing.services.mavlink.signing import read_key
 
     if not urls:
         raise ValueError("--mavlink: expected at least one URL")
-    return Options(tuple(urls), read_key(key) if key else None, insecure, log, speed)
+    return Options(tuple(urls), read_key(key) if key else None, insecure, log, speed=speed)

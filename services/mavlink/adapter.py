@@ -8,7 +8,7 @@ from typing import Any
 from lapwing.messages import CommandAcks, OperatorInput, header
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
 from lapwing.services.mavlink.announcements import Announcements
-from lapwing.services.mavlink.channel import Channel, Signature
+from lapwing.services.mavlink.channel import Channel
 from lapwing.services.mavlink.clock import Clock, Instant
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.dialect import mavlink
@@ -17,6 +17,7 @@ from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.session import Session
+from lapwing.services.mavlink.signing import Signature, TimeStampStore
 from lapwing.services.mavlink.telemetry.system_status import heartbeat
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
@@ -40,6 +41,7 @@ class Adapter:
         key: bytes | None = None,
         insecure: bool = False,
         log: Path | None = None,
+        time_stamps: Path | None = None,
     ):
         """An adapter that nobody has connected to.
 
@@ -49,6 +51,10 @@ class Adapter:
             key: signs what is sent, and refuses what is not signed with it.
             insecure: commands are taken from other machines without a key.
             log: of the run, which endpoints may download.
+            time_stamps: file that keeps the time stamps of signed frames, None to keep them in memory only.
+
+        Raises:
+            ValueError: that file cannot be written.
         """
         self.vehicle = VehicleCache(description)
         self.clock = Clock()
@@ -61,15 +67,23 @@ class Adapter:
         self.vehicle.mission = lambda: self.missions.held[mavlink.MAV_MISSION_TYPE_MISSION]
         self.parameters = ParameterStore(description, flavour, self.commands, self.broadcast, self.counts)
         self.sessions: dict[Endpoint, Session] = {}
-        self.signature = Signature(key) if key else None
+        store = TimeStampStore(time_stamps, key, description.system) if key and time_stamps else None
+        self.signature = Signature(key, store) if key else None
         self._insecure, self._log = insecure, log
         self._announcements = Announcements(self.vehicle, self.broadcast)
         self._next_link = 0
         self._next_heartbeat = 0.0  # [s] of wall time, before the vehicle speaks
 
-    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None]) -> Endpoint:
-        """A new endpoint; `local`: on this machine, `datagrams`: no frame spans two pieces of its bytes."""
-        channel = Channel(self.vehicle.description.system, self.signature, datagrams, self.counts)
+    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None], strict: bool = False) -> Endpoint:
+        """Return a new endpoint.
+
+        Args:
+            local: it is on this machine.
+            datagrams: no frame continues in the next piece of its bytes.
+            put: sends bytes to it.
+            strict: read nothing of it if its first bytes are not MAVLink.
+        """
+        channel = Channel(self.vehicle.description.system, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
         self.sessions[endpoint] = Session(
             endpoint,
@@ -91,10 +105,16 @@ class Adapter:
         self.missions.forget(endpoint)
 
     def trusts(self, endpoint: Endpoint) -> bool:
-        """Whether its commands are taken: signed ones always, unsigned ones from this machine."""
-        if self.signature or endpoint.local or self._insecure:
+        """Return True if commands of an endpoint are accepted; count the command otherwise.
+
+        An endpoint is accepted after its first heartbeat, if its frames are signed or it is on this machine.
+        """
+        if not (self.signature or endpoint.local or self._insecure):
+            self.counts["command from another machine"] += 1
+        elif endpoint.last_heartbeat is None:
+            self.counts["command before a heartbeat"] += 1
+        else:
             return True
-        self.counts["command from another machine"] += 1
         return False
 
     def receive(self, endpoint: Endpoint, data: bytes) -> int:
@@ -161,6 +181,11 @@ class Adapter:
             if wall >= self._next_heartbeat:
                 self._next_heartbeat = wall + HEARTBEAT_INTERVAL
                 self.broadcast(heartbeat(self.vehicle))
+
+    def close(self) -> None:
+        """Close the file of time stamps."""
+        if self.signature:
+            self.signature.close()
 
     def broadcast(self, message: Any) -> None:
         """Send a message to every endpoint."""

@@ -30,6 +30,11 @@ class Endpoint:
         """ "system/component", as commands bear it."""
         return f"{self.system}/{self.component}"
 
+    @property
+    def foreign(self) -> bool:
+        """Return True if its first bytes were not MAVLink."""
+        return self._channel.foreign
+
     def decode(self, data: bytes) -> Iterator[Any]:
         """The sound messages in bytes that have come from it."""
         return self._channel.decode(data)

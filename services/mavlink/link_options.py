@@ -11,4 +11,5 @@ class Options(NamedTuple):
     key: bytes | None = None  # signs what is sent, and refuses what is not signed with it
     insecure: bool = False  # commands are taken from other machines without a key
     log: Path | None = None  # that endpoints may download
+    time_stamps: Path | None = None  # file that keeps the time stamps of signed frames
     speed: float | None = 1.0  # simulated seconds per second; None: as fast as it goes

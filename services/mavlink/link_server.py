@@ -49,7 +49,7 @@ class LinkServer:
             operate(OperatorInput(header(0, description.name), (command,)).encode())
 
         operator = put if operate else None
-        self.adapter = Adapter(description, operator, options.key, options.insecure, options.log)
+        self.adapter = Adapter(description, operator, options.key, options.insecure, options.log, options.time_stamps)
         self._pacing = Pacing(options.speed)
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
         self.selector: selectors.BaseSelector = beside.selector if beside else selectors.DefaultSelector()
@@ -110,6 +110,7 @@ class LinkServer:
         if self._owns:
             self.selector.close()
         os.close(self._woken)
+        self.adapter.close()
 
     def __enter__(self) -> "LinkServer":
         return self

@@ -16,10 +16,10 @@ from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import unpack_batch
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, of_all
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
-from lapwing.services.mavlink.channel import read_key
 from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.links import numbered
+from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
 
 ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # of which no message is left out
 
@@ -34,7 +34,8 @@ def run(process: Participant, given: Any) -> None:
     flown = [member for member in members(setup) if "mavlink" in member.beside]
     if not flown:
         raise ValueError("--mavlink: nobody steers in this scene; expected one with [autopilot]")
-    key = read_key(given.mavlink_key) if given.mavlink_key else None
+    key = read_key(Path(given.mavlink_key)) if given.mavlink_key else None
+    time_stamps = state_folder() / TIME_STAMPS
     log = Path(given.log) if given.log else None
     # A run as fast as it goes is slowed by every message that wakes somebody; the batches come often enough for it.
     at_once = process.speed is not None
@@ -43,7 +44,7 @@ def run(process: Participant, given: Any) -> None:
         hubs: dict[str, LinkServer] = {}
         for i, member in enumerate(flown):
             urls = tuple(numbered(url, i) for url in given.mavlink)
-            options = Options(urls, key, given.insecure, log, process.speed)
+            options = Options(urls, key, given.insecure, log, time_stamps, process.speed)
             first = next(iter(hubs.values()), None)
             hub = LinkServer(member.beside["mavlink"], options, lambda payload: put(payload, 0), first)
             hubs[member.vehicle] = stack.enter_context(hub)

@@ -111,6 +111,8 @@ def _follow(
         for name, child in everybody.items():
             if child.poll() == REFUSED:
                 raise ValueError(f"{name}{_last_words(errors[name])}")
+            if name not in needed | watch.present and child.poll():
+                raise ValueError(f"{name}: cannot start ({_reason(child.poll())}){_last_words(errors[name])}")
         for name, child in children.items():
             code = child.poll()
             if code is None or (code != 0 and (watch.diverged or _diverges(watch))):
@@ -121,14 +123,15 @@ def _follow(
             raise RunFailed(f"{', '.join(lost)}: gone {_at(watch)}")
         _note_stopped(children, stopped)
         starvation.look({name: child.pid for name, child in children.items()}, time.monotonic() - watch.last_news)
-        culprit = watch.frozen(needed, starvation.of) if needed <= watch.present else None
+        awaited = needed if watch.began else needed | set(everybody)
+        culprit = watch.frozen(needed, starvation.of) if awaited <= watch.present else None
         if stopped and (culprit or time.monotonic() - min(stopped.values()) > STALL):
             raise RunFailed(f"{', '.join(sorted(stopped))}: stopped for {STALL:g} s, {_at(watch)}")
         if culprit:
             if not _let_go(everybody, needed):
                 raise RunFailed(culprit)
             watch.last_news = time.monotonic()
-        if not watch.present >= needed:
+        if not watch.present >= awaited:
             watch.last_news, ended_at = time.monotonic(), None
         if observe(watch):
             return

@@ -21,13 +21,24 @@ class ByteStream:
         selector: BaseSelector,
         affords: Callable[[], bool],
         gone: Callable[[], None],
+        strict: bool = False,
     ):
-        """`affords` says whether one more piece may be read; `gone` is called when the stream has ended."""
+        """Register the descriptor.
+
+        Args:
+            descriptor: non-blocking.
+            local: its other end is on this machine.
+            adapter: of the vehicle.
+            selector: that waits for it.
+            affords: returns True if one more piece may be read.
+            gone: called when the stream has ended.
+            strict: end the stream if its first bytes are not MAVLink.
+        """
         self._descriptor, self._adapter, self._selector = descriptor, adapter, selector
         self._affords, self._gone = affords, gone
         self._pending = bytearray()
         self._broken = False
-        self._endpoint = adapter.connect(local, False, self._put)
+        self._endpoint = adapter.connect(local, False, self._put, strict)
         selector.register(descriptor, EVENT_READ, self.read)
 
     def _put(self, data: bytes) -> None:
@@ -60,6 +71,7 @@ class ByteStream:
                 return
             if self._affords():
                 self._adapter.receive(self._endpoint, data)
+                self._broken |= self._endpoint.foreign
 
     def end(self) -> None:
         """Forget the endpoint."""

@@ -47,7 +47,7 @@ class TcpIn(Link):
             connection.close()
 
         self._streams[connection] = ByteStream(
-            connection.fileno(), is_loopback(address[0]), self.adapter, self.selector, self.affords, gone
+            connection.fileno(), is_loopback(address[0]), self.adapter, self.selector, self.affords, gone, strict=True
         )
 
     def close(self) -> None:

@@ -36,7 +36,7 @@ class _Udp(Link):
             except OSError:  # nobody listens there now, or the way is full: UDP may lose what it likes
                 self.adapter.counts["not sent"] += 1
 
-        return self.adapter.connect(is_loopback(address[0]), True, put)
+        return self.adapter.connect(is_loopback(address[0]), True, put, strict=True)
 
     def read(self) -> None:
         """Take what has come, within bounds."""

@@ -81,6 +81,8 @@ def execute(session: Session, command: Command) -> None:
         session.count("unsupported command")
     elif command.number not in READ_ONLY and not session.trusted:
         outcome = DENIED
+        if session.endpoint.last_heartbeat is None:
+            session.say("command rejected: send a HEARTBEAT first")
     else:
         try:
             outcome = function(session, command)

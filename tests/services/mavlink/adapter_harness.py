@@ -53,7 +53,7 @@ class Bench:
 class Station:
     """A client; on its way to and from it a share of the datagrams gets lost, and some come twice."""
 
-    def __init__(self, bench, loss=0.0, twice=0.0, seed=0, local=True, system=255, key=None, link=0):
+    def __init__(self, bench, loss=0.0, twice=0.0, seed=0, local=True, system=255, key=None, link=0, heartbeat=True):
         self.codec = mavlink.MAVLink(None, system, 190)
         self.codec.robust_parsing = True
         if key:
@@ -64,6 +64,8 @@ class Station:
         self.random = random.Random(seed)
         self.got, self.sent = [], []
         self.endpoint = bench.adapter.connect(local, True, self._hear)
+        if heartbeat:  # without which no command is accepted
+            self.endpoint.last_heartbeat = bench.adapter.clock.now
         self.watch = lambda message: None  # called with each message
 
     def _times(self):

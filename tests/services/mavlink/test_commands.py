@@ -64,6 +64,7 @@ def test_what_the_autopilot_refuses_is_refused(number):
 def test_progress_is_passed_on_before_the_end():
     bench = Bench()
     results = iter([CommandAck(result=CommandAck.IN_PROGRESS, progress=0.4)])
+    bench.vehicle.deaf = {"link"}
     bench.vehicle.handle = lambda c: next(results)._replace(id=c.id, source=c.source)
     station = bench.station()
     station.send("command_long", 1, 1, 300, 0, *(0.0,) * 7)
@@ -189,7 +190,7 @@ def test_every_setpoint_is_followed_or_refused_by_name(name, flavour):
             bench.vehicle.mode, bench.vehicle.position = "hold", [0.0, 0.0, 3.0]
             bench.step()
             refused = frame not in legal or bool(mask & 512) or (mask | 512) == 4095
-            assert bool(kinds) != refused, (frame, mask)
+            assert bool(set(kinds) - {"link"}) != refused, (frame, mask)
             assert bool(station.last("STATUSTEXT")) == refused
             if refused:
                 assert name in "".join(m.text for m in station.all("STATUSTEXT"))

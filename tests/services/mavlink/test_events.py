@@ -249,7 +249,7 @@ def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
     one.told.clear()
     bench.step(300)
     assert not one.told
-    two = bench.station(system=254)
+    two = bench.station(system=254, heartbeat=False)
     two.send("heartbeat", 6, 8, 0, 0, 0, 3)
     bench.step(2)
     assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]

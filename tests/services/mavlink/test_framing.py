@@ -7,10 +7,11 @@ from collections import Counter
 import pytest
 from adapter_harness import Bench
 
-from lapwing.services.mavlink.channel import Channel, Signature
+from lapwing.services.mavlink.channel import Channel
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import MAX_DATAGRAM
 from lapwing.services.mavlink.framing import frame
+from lapwing.services.mavlink.signing import Signature
 
 SYSTEM = 7
 SIZES = {"b": 8, "B": 8, "h": 16, "H": 16, "i": 32, "I": 32, "q": 64, "Q": 64}

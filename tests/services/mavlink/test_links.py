@@ -44,6 +44,7 @@ def test_a_serial_line_is_watched_but_its_commands_are_refused():
     with flying(f"serial:{os.ttyname(slave)}:57600") as running:
         os.write(master, frame())
         assert heard(lambda: os.read(master, 4096))
+        os.write(master, mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(mavlink.MAVLink(None, 255, 190)))
         arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1.0, *(0.0,) * 6).pack(mavlink.MAVLink(None, 255, 190))
         os.write(master, arm)
         assert until(lambda: running.counts["command from another machine"])

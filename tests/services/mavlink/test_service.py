@@ -127,6 +127,7 @@ def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
     command += ["--listen", endpoint, "--mavlink", f"udpout:127.0.0.1:{port}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         heard(station, "HEARTBEAT")
+        station.mav.heartbeat_send(6, 8, 0, 0, 0)
         station.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
         assert heard(station, "COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
         while heard(station, "GLOBAL_POSITION_INT").relative_alt < 500:

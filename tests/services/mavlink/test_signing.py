@@ -5,8 +5,8 @@ import hashlib
 import pytest
 from adapter_harness import Bench
 
-from lapwing.services.mavlink.channel import read_key
 from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.mavlink.signing import TimeStampStore, read_key
 
 KEY = hashlib.sha256(b"correct horse").digest()
 REFUSED = "unsigned, forged or replayed"
@@ -79,6 +79,58 @@ def test_without_a_key_other_machines_watch_but_do_not_command():
 def test_insecure_takes_commands_from_anywhere():
     bench = Bench(insecure=True)
     assert bench.station(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_command_needs_a_heartbeat_of_its_endpoint():
+    bench = Bench()
+    bench.station()
+    station = bench.station(heartbeat=False)
+    assert station.command(400, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert "HEARTBEAT" in station.last("STATUSTEXT").text
+    station.send("set_mode", 1, 1, 4 << 16 | 5 << 24)
+    station.send("manual_control", 1, 1000, 0, 500, 0, 0)
+    bench.step(3)
+    assert set(bench.vehicle.kinds) <= {"link"}
+    station.send("heartbeat", 6, 8, 0, 0, 0, 3)
+    assert station.command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_replayed_packet_is_rejected_after_restart(tmp_path):
+    path = tmp_path / "state" / "stamps"
+    bench = Bench(key=KEY, time_stamps=path)
+    station = bench.station(key=KEY)
+    station.send("command_long", *ARM)
+    bench.step(3)
+    assert bench.vehicle.armed
+    bench = Bench(key=KEY, time_stamps=path)  # the first one was not closed, as after a kill
+    thief = bench.station()
+    thief.raw(station.sent[0])
+    bench.step(3)
+    assert not bench.vehicle.armed
+    assert bench.counts[REFUSED] == 1
+    station = bench.station(key=KEY)
+    station.send("command_long", *ARM)
+    bench.step(3)
+    assert bench.vehicle.armed
+    assert path.stat().st_mode & 0o077 == 0
+
+
+def test_stored_time_stamps_belong_to_key_and_vehicle(tmp_path):
+    store = TimeStampStore(tmp_path / "stamps", KEY, 1)
+    store.put((0, 255, 190), 7)
+    store.put((0, 255, 190), 5)
+    assert store.load() == {(0, 255, 190): 7}
+    assert TimeStampStore(tmp_path / "stamps", KEY, 2).load() == {}
+    assert TimeStampStore(tmp_path / "stamps", bytes(32), 1).load() == {}
+
+
+def test_new_stream_older_than_a_minute_is_rejected():
+    bench = Bench(key=KEY)
+    old = bench.station(key=KEY)
+    old.codec.signing.timestamp -= 61 * 10**5
+    old.send("command_long", *ARM)
+    bench.step(3)
+    assert not bench.vehicle.armed
 
 
 def test_a_key_file_holds_one_passphrase(tmp_path):
