@@ -1,13 +1,11 @@
-"""The decorator of every compiled function, and where its machine code is kept.
+"""Decorators of compiled functions, and the cache of their machine code; see README.md of this folder.
 
-No fast-math flag is set: contraction would let the same source round differently where it is inlined differently, and
-the three speeds (processes, single, batch) must give the same bits.
+No fast-math flag is set: contraction would round the same source differently at different call sites, and the three
+executors (multi-process, single-process, batch) must give bit-for-bit identical results.
 
-Machine code is kept in the folder `LAPWING_CACHE`, by default ~/.cache/lapwing, by a cache of this package's own; what
-numba keeps for other functions is left alone. It is found again while no source that can be in it has changed (see
-`_key`); what another process is compiling is waited for (`_locks`). Compiled anew in every process are kernels in a
-script or notebook itself (`__main__`), and versions for arguments that are functions or whose class cannot be imported
-by name: put kernels and classes into modules.
+Machine code is stored in the folder `LAPWING_CACHE`, by default ~/.cache/lapwing, and is valid until a source that can
+be in it changes. Compiled again in every process: kernels of a script or notebook itself (`__main__`), and versions for
+arguments that are functions or whose class cannot be imported by name. Put kernels and classes into modules.
 """
 
 from lapwing.kernels.compiler.cache import Statistics, on_compile, statistics
@@ -22,14 +20,12 @@ from lapwing.kernels.compiler.decorators import (
     vectorise_loops,
 )
 from lapwing.kernels.compiler.dispatch_table import DispatchTable
-from lapwing.kernels.compiler.pipeline import Pipeline
 from lapwing.kernels.compiler.source_digest import digest as source_digest
 from lapwing.kernels.compiler.source_digest import forget as forget_sources
 from lapwing.kernels.compiler.start_time import BEGAN  # noqa: F401 (first of all)
 
 __all__ = [
     "DispatchTable",
-    "Pipeline",
     "Statistics",
     "always_inline",
     "cache_folder",

@@ -15,8 +15,6 @@ from numba.core.serialize import dumps
 
 from lapwing.kernels.compiler import cache_files, file_locks, source_digest
 from lapwing.kernels.compiler.cache_key import Key, NotKeptError, key
-from lapwing.kernels.compiler.code_libraries import InnerLibrary
-from lapwing.kernels.compiler.pipeline import is_nested, reduced, restored
 
 
 class Statistics(NamedTuple):
@@ -79,7 +77,7 @@ class KernelCache(_Cache):
             for listener in _listeners:
                 listener(self._label)
             if found:
-                file_locks.acquire(f"{self._folder}/{self._file(found, is_nested())}-{found.sources}")
+                file_locks.acquire(f"{self._folder}/{self._file(found, self._is_inner())}-{found.sources}")
                 result = self._loaded(found, sig, target_context)
         if result is not None:
             _counted["loaded"] += 1
@@ -93,20 +91,32 @@ class KernelCache(_Cache):
             return
         found = self._key(sig, data.codegen) if self._enabled else None
         if found is not None:
-            name = self._file(found, isinstance(data.library, InnerLibrary))
-            cache_files.write(self._folder, name, found.sources, dumps((found, reduced(data))))
+            name = self._file(found, self._is_inner(data))
+            cache_files.write(self._folder, name, found.sources, dumps((found, self._reduce(data))))
 
     def _loaded(self, found: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
-        inner = is_nested()
+        inner = self._is_inner()
         content = cache_files.read(self._folder, self._file(found, inner), found.sources) if found else None
         if content is None:
             return None
         with contextlib.suppress(Exception):  # whatever it is, compiling mends it
             kept, payload = pickle.loads(content)
-            result = restored(target_context, payload) if inner else CompileResult._rebuild(target_context, *payload)
+            result = self._rebuild(target_context, payload)
             if kept == found and result.signature.args == sigutils.normalize_signature(sig)[0]:
                 return result
         return None
+
+    def _is_inner(self, result: CompileResult | None = None) -> bool:
+        """Return True if a result, or else the next one, is code for other kernels only."""
+        return False
+
+    def _reduce(self, result: CompileResult) -> tuple:
+        """Return the stored parts of a result."""
+        return result._reduce()
+
+    def _rebuild(self, target_context: Any, payload: tuple) -> CompileResult:
+        """Return the result from its stored parts."""
+        return CompileResult._rebuild(target_context, *payload)
 
     def _file(self, found: Key, inner: bool) -> str:
         return f"{self._name}-{'inner-' if inner else ''}{found.made_of}"

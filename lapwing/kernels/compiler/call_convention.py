@@ -123,7 +123,7 @@ class KernelLower(Lower):
     def setup_function(self, fndesc: Any) -> None:
         """Begin the function."""
         super().setup_function(fndesc)
-        if self.library.vectorises:
+        if self.library.vectorise_loops:
             set.add(self.function.attributes, WIDEST)  # which llvmlite would refuse as unknown
 
     def incref(self, typ: types.Type, val: Any) -> None:
@@ -160,7 +160,7 @@ class InnerLower(KernelLower):
             super().setup_function(fndesc)
             return
         self.function = ValueCallConv(self.context).declare(self.module, fndesc)
-        if hasattr(self.func_ir.func_id.func, "__apart__"):
+        if hasattr(self.func_ir.func_id.func, "__noinline__"):
             self.function.attributes.add("noinline")
         self.entry_block = self.function.append_basic_block("entry")
         self.builder = llvm.IRBuilder(self.entry_block)

@@ -1,4 +1,8 @@
-"""The decorators of compiled functions."""
+"""Decorators of compiled functions.
+
+With a version of numba or llvmlite that is not known to work with the compile pipeline, numba's own passes compile: the
+decorators then differ in compile time only, not in results.
+"""
 
 from collections.abc import Callable
 from functools import cache
@@ -7,8 +11,14 @@ from typing import Any, TypeVar
 
 from numba.core import config
 
-from lapwing.kernels.compiler.cache import KernelCache
-from lapwing.kernels.compiler.pipeline import KernelDispatcher, Pipeline
+from lapwing.kernels.compiler import numba_versions
+
+if numba_versions.is_supported():
+    from lapwing.kernels.compiler.pipeline import KernelDispatcher as _Dispatcher
+    from lapwing.kernels.compiler.pipeline import PipelineCache as _Cache
+else:
+    from lapwing.kernels.compiler.plain_dispatcher import PlainCache as _Cache  # type: ignore[assignment]
+    from lapwing.kernels.compiler.plain_dispatcher import PlainDispatcher as _Dispatcher  # type: ignore[assignment]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -17,31 +27,29 @@ def _compile(function: Callable, **options: Any) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return function
     options = {"nopython": True, "nogil": True, "error_model": "numpy", **options}
-    compiled = KernelDispatcher(py_func=function, targetoptions=options, pipeline_class=Pipeline)
-    compiled._cache = KernelCache(compiled)
+    compiled = _Dispatcher(py_func=function, targetoptions=options)
+    compiled._cache = _Cache(compiled)
     return compiled
 
 
 def uncached(function: Any) -> Any:
-    """Compile a function that every process makes anew, and of which nothing is kept on the disk; a kernel as it is."""
-    if isinstance(function, KernelDispatcher):
-        return function
-    return KernelDispatcher(py_func=function, targetoptions={"nopython": True}, pipeline_class=Pipeline)
+    """Compile a function without storing its code on disk; return a kernel unchanged."""
+    return function if isinstance(function, _Dispatcher) else _Dispatcher(function, targetoptions={"nopython": True})
 
 
 @cache
 def python_function(function: F) -> F:
-    """The Python function of a kernel, on those of the kernels that it calls by name.
+    """Return the Python function of a kernel, which calls the Python functions of the kernels that it names.
 
-    For numpy arrays instead of numbers, and for single numbers in Python code: the first call of anything compiled
-    takes a process a quarter of a second.
+    Use it for numpy arrays in place of numbers, and for single evaluations: the first call of a compiled function takes
+    a process a quarter of a second.
     """
     python: Any = getattr(function, "py_func", function)
     known = python.__globals__
     called = {
         name: python_function(known[name])
         for name in python.__code__.co_names
-        if isinstance(known.get(name), KernelDispatcher)
+        if isinstance(known.get(name), _Dispatcher)
     }
     if not called:
         return python
@@ -49,38 +57,38 @@ def python_function(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """Compile a pure function: cached on disk, releases the GIL, divides as IEEE 754 says (no ZeroDivisionError)."""
+    """Compile a pure function: cached on disk, without the GIL, division by IEEE 754 (no ZeroDivisionError)."""
     return _compile(function)
 
 
 def noinline(function: F) -> F:
-    """The same for large functions that others call: never inlined, so that LLVM looks at them once, not at each copy.
+    """Compile a large helper without inlining, so that LLVM optimises it once instead of at every call site.
 
-    A function that is not marked so inherits from the first that calls it whether it is always inlined.
+    A function without this decorator is always inlined if the first function that calls it is.
     """
-    function.__apart__ = True  # type: ignore[attr-defined]
+    function.__noinline__ = True  # type: ignore[attr-defined]
     return _compile(function, forceinline=False)
 
 
 def vectorise_loops(function: F) -> F:
-    """The same for a kernel with a loop over members side by side, which LLVM is to vectorise.
+    """Compile a kernel whose loop over batch elements LLVM vectorises.
 
-    Loops that call functions look small until those are inlined; unrolled by then, they cannot be vectorised.
+    A loop that calls functions looks small until these are inlined; unrolled before that, it cannot be vectorised.
     """
-    function.__vectorised__ = True  # type: ignore[attr-defined]
+    function.__vectorise_loops__ = True  # type: ignore[attr-defined]
     return _compile(function)
 
 
 def no_refcount(function: F) -> F:
-    """The same for a kernel that is called by its address alone, and changes arrays in place or not at all.
+    """Compile a kernel without reference counting, which takes half of the time of a flight.
 
-    What it is given belongs to its caller until it returns, so that no references need to be counted: half of the time
-    of a flight. It must not put an array in another's place; one that makes arrays counts as any other.
+    Call it by its address only. Its arguments belong to its caller until it returns; it may change arrays in place but
+    not replace one. A kernel that allocates arrays counts references all the same.
     """
-    function.__uncounted__ = True  # type: ignore[attr-defined]
+    function.__no_refcount__ = True  # type: ignore[attr-defined]
     return _compile(function)
 
 
 def always_inline(function: F) -> F:
-    """The same for small functions that are always inlined into their caller."""
+    """Compile a small function that is always inlined into its caller."""
     return _compile(function, forceinline=True)

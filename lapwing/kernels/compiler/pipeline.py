@@ -22,6 +22,7 @@ from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 
+from lapwing.kernels.compiler.cache import KernelCache
 from lapwing.kernels.compiler.call_convention import InnerLower, KernelLower, offer, uses_value_call_conv
 from lapwing.kernels.compiler.code_libraries import InnerLibrary, KernelLibrary
 from lapwing.kernels.compiler.file_locks import released_at_end
@@ -62,26 +63,6 @@ def is_nested() -> bool:
     return _depth.value > 0
 
 
-def reduced(result: CompileResult) -> tuple:
-    """What is kept of a result."""
-    parts = result._reduce()
-    return (*parts[:-1], result.library.environments()) if isinstance(result.library, InnerLibrary) else parts
-
-
-def restored(target_context: Any, reduced: tuple) -> CompileResult:
-    """The result of compiling an inner function, from what `CompileResult._reduce` gave of it."""
-    serialised, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = reduced
-    for reload in reload_init:
-        reload()
-    library = InnerLibrary.restored(target_context.codegen(), serialised)
-    return CompileResult(
-        typing_context=target_context.typing_context, target_context=target_context, library=library,
-        environment=environment, entry_point=_refusal(target_context), fndesc=fndesc, type_annotation=annotation,
-        signature=signature, objectmode=objectmode, lifted=lifted, typing_error=None, call_helper=None, metadata=None,
-        reload_init=reload_init, referenced_envs=environments,
-    )  # fmt: skip
-
-
 @numba.njit
 def _refuse() -> None:
     raise RuntimeError("compiled for other kernels only")
@@ -92,6 +73,31 @@ def _refusal(target_context: Any) -> Any:
     _refuse.compile(())
     result = _refuse.overloads[()]
     return target_context.get_executable(result.library, result.fndesc, result.environment)
+
+
+class PipelineCache(KernelCache):
+    """Kernel cache that also stores inner functions: optimised LLVM code without an entry from Python."""
+
+    def _is_inner(self, result: CompileResult | None = None) -> bool:
+        return is_nested() if result is None else isinstance(result.library, InnerLibrary)
+
+    def _reduce(self, result: CompileResult) -> tuple:
+        parts = super()._reduce(result)
+        return (*parts[:-1], result.library.environments()) if self._is_inner(result) else parts
+
+    def _rebuild(self, target_context: Any, payload: tuple) -> CompileResult:
+        if not is_nested():
+            return super()._rebuild(target_context, payload)
+        serialised, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = payload
+        for reload in reload_init:
+            reload()
+        library = InnerLibrary.restored(target_context.codegen(), serialised)
+        return CompileResult(
+            typing_context=target_context.typing_context, target_context=target_context, library=library,
+            environment=environment, entry_point=_refusal(target_context), fndesc=fndesc, type_annotation=annotation,
+            signature=signature, objectmode=objectmode, lifted=lifted, typing_error=None, call_helper=None,
+            metadata=None, reload_init=reload_init, referenced_envs=environments,
+        )  # fmt: skip
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -109,8 +115,8 @@ class KernelLowering(NativeLowering):
         """Lower the function of `state`."""
         if state.library is None:
             state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-            state.library.vectorises = hasattr(state.func_id.func, "__vectorised__")
-            state.library.uncounted = hasattr(state.func_id.func, "__uncounted__")
+            state.library.vectorise_loops = hasattr(state.func_id.func, "__vectorise_loops__")
+            state.library.no_refcount = hasattr(state.func_id.func, "__no_refcount__")
             state.library.enable_object_caching()
         return super().run_pass(state)
 
@@ -148,8 +154,8 @@ class InnerLowering(KernelLowering):
         state.library.forwards = state.flags.forceinline and _forwards(state.func_ir)
         super().run_pass(state)
         entry, lowered = _refusal(state.targetctx), state["cr"]
-        if hasattr(state.func_id.func, "__apart__") and uses_value_call_conv(lowered.fndesc):
-            state.library.apart = lowered.fndesc.mangled_name
+        if hasattr(state.func_id.func, "__noinline__") and uses_value_call_conv(lowered.fndesc):
+            state.library.noinline = lowered.fndesc.mangled_name
         offer(state.targetctx, entry, lowered.fndesc, state.library)
         state.reload_init.extend(state.library._reload_init)
         state["cr"] = lowered._replace(cfunc=entry)
@@ -197,6 +203,9 @@ def _widened(kind: types.Type) -> types.Type:
 
 class KernelDispatcher(CPUDispatcher):
     """numba's dispatcher, which compiles a function again when Python calls what was compiled for kernels only."""
+
+    def __init__(self, *arguments: Any, **options: Any):
+        super().__init__(*arguments, pipeline_class=Pipeline, **options)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """One version for all whole numbers and truth values, constant or not, where numba makes one for each constant:

@@ -120,10 +120,10 @@ def test_a_function_apart_is_linked_into_the_outermost_kernel_only():
     twice_both._cache.disable()  # what comes from the disk has no inner kernels
     assert twice_both((2.0, 3.0)) == 2.0 * (8.0 + 27.0 + 8.0)
     (inner,) = (result.library for result in both.overloads.values())
-    assert len(inner._apart) == 2
-    assert not defined(inner) & inner._apart.keys()
+    assert len(inner._noinline) == 2
+    assert not defined(inner) & inner._noinline.keys()
     (outer,) = (result.library for result in twice_both.overloads.values())
-    assert defined(outer) >= inner._apart.keys()
+    assert defined(outer) >= inner._noinline.keys()
     with pytest.raises(ValueError, match="below zero"):
         twice_both((2.0, -3.0))
 
