@@ -6,10 +6,10 @@ from typing import Any
 
 import mkdocs_gen_files
 import typer
-from lapwing.file_schemas.json_schema import SCHEMAS
 from typer.cli import get_docs_for_click
 
 from lapwing.cli.main import app
+from lapwing.file_schemas.json_schema import SCHEMAS
 
 INTRODUCTION = {
     "scene": "A scene is a TOML file. Override any key with `--set KEY=VALUE`, for example "
