@@ -11,12 +11,12 @@ import time
 
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import MOST
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
 
 
 def rows(shard):
     """Rows of a shard as they come from a flight, made up."""
-    numbers = {name: 1.0 / (1 + k) for k, name in enumerate(FIGURES)}
+    numbers = {name: 1.0 / (1 + k) for k, name in enumerate(METRICS)}
     return [{"run": MOST * shard + k, "seed": k + 1, **numbers} for k in range(MOST)]
 
 

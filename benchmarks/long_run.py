@@ -13,7 +13,7 @@ from benchmarks._targets import LAPWING
 from benchmarks.campaign_scaling import taken
 
 SLOW = True
-HOVERS = ["--set", "trajectory.phase.2.duration=1e6", "--set", "success.require=[\"verdict == 'timed out'\"]"]
+HOVERS = ["--set", "trajectory.phase.2.duration=1e6"]
 
 
 def main(most=600):

@@ -44,7 +44,7 @@ def fly(
 ) -> Flight:
     """Fly a scene in this process, as fast as it goes; the flight stays in memory.
 
-    Where a state ceases to be sound, or the controller fails in the air, the flight ends there; its `verdict` says so,
+    Where a state ceases to be sound, or the controller fails in the air, the flight ends there; its `outcome` says so,
     and `failure` why.
 
     Args:

@@ -98,7 +98,7 @@ def run(
         from lapwing.services.process_table import needed
         from lapwing.services.ros2.schema import Bus
         from lapwing.services.scene_resolver import load, resolve
-        from lapwing.studies.metrics import figures, joint_end_state
+        from lapwing.studies.metrics import joint_end_state, metrics
 
         links = {"--mavlink": mavlink, "--external": external, "--foxglove": foxglove, "--view": view}
         check_mode(
@@ -194,7 +194,7 @@ def run(
 
         try:
             elapsed = _fly(given, path, view, early)
-        except BaseException:  # what was flown before an error or Ctrl-C has its verdict, too
+        except BaseException:  # what was flown before an error or Ctrl-C has its outcome, too
             with suppress(ValueError):  # the first error is told
                 conclude(None)
             raise
@@ -209,9 +209,9 @@ def run(
             ended = "the same end, to the bit" if same else "ends in another state, with --set"
             typer.echo(f"{which}: {ended if there else 'it has not been flown there yet'}")
         for flown, flier in zip(flights, loaded.vehicles or (loaded,), strict=False):
-            if unmet := flier[Success].unmet(figures(flown)):
+            if unmet := flier[Success].unmet(metrics(flown)):
                 of = f" of {flown.vehicle}" if loaded.vehicles else ""
-                why = f"{flown.verdict.kind}; success.require: {'; '.join(unmet)}"
+                why = f"{flown.outcome.kind}; success.require: {'; '.join(unmet)}"
                 fail(f"the flight{of} has failed: {why}", FLIGHT_FAILED)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from lapwing.services.process_main import ProcessSpec
 
 MOST = 60  # events that are printed
-COLOURS = {"landed": "green", "flown": "default"}  # of a verdict; red for all others
+COLOURS = {"landed": "green", "completed": "green", "landed elsewhere": "yellow", "timed out": "yellow"}  # default: red
 
 
 def fleet(log: Path) -> list[Flight]:
@@ -73,9 +73,9 @@ def conclude(
 
 
 def _of_vehicle(flight: Flight) -> dict[str, Any]:
-    verdict = flight.verdict
+    outcome = flight.outcome
     return {
-        "verdict": {"text": str(verdict), **verdict._asdict()},
+        "outcome": {"text": str(outcome), **outcome._asdict()},
         "events": [event._asdict() for event in flight.events],
         "rmse": flight.rmse,
         "landed": flight.landed,
@@ -98,21 +98,21 @@ def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print `result` for people."""
     show_events(console, result["events"])
     _errors(console, scene[Published], result["rmse"])
-    _verdict(console, result["verdict"])
+    _outcome(console, result["outcome"])
     _ending(console, result)
 
 
 def show_fleet(console: Console, result: dict[str, Any]) -> None:
     """Print `result` of several vehicles for people."""
     for name, one in result["vehicles"].items():
-        _verdict(console, one["verdict"], f"{name}: ")
+        _outcome(console, one["outcome"], f"{name}: ")
     if result["separation"]:
         console.print(str(Separation(**result["separation"])), highlight=False)
     _ending(console, result)
 
 
-def _verdict(console: Console, verdict: dict[str, Any], of: str = "") -> None:
-    console.print(f"{of}{verdict['text']}", style=f"bold {COLOURS.get(verdict['kind'], 'red')}")
+def _outcome(console: Console, outcome: dict[str, Any], of: str = "") -> None:
+    console.print(f"{of}{outcome['text']}", style=f"bold {COLOURS.get(outcome['kind'], 'red')}")
 
 
 def _ending(console: Console, result: dict[str, Any]) -> None:

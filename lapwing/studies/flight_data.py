@@ -29,7 +29,8 @@ from lapwing.studies import tracking
 from lapwing.studies.flight_events import Event, events, slack
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.flight_topics import FlightTopics
-from lapwing.studies.outcome import FlightOutcome, judge
+from lapwing.studies.mission import Mission, mission_of
+from lapwing.studies.outcome import LANDED, FlightOutcome, classify
 from lapwing.studies.port_columns import columns_of
 from lapwing.studies.topic_view import TopicView
 
@@ -37,7 +38,7 @@ AXES = tuple(tracking.AXES)
 IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
 
 
-SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which verdict, events, figures and report are made
+SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which outcome, events, figures and report are made
 
 
 class FlightData(FlightTopics):
@@ -150,7 +151,7 @@ class FlightData(FlightTopics):
         return found
 
     def __repr__(self) -> str:
-        said = str(self.verdict) if len(self.truth) else "nothing was flown"
+        said = str(self.outcome) if len(self.truth) else "nothing was flown"
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {said}>"
 
     @cached_property
@@ -219,11 +220,20 @@ class FlightData(FlightTopics):
         return self.has("status") and bool(self.status.finished[-1])
 
     @cached_property
-    def verdict(self) -> FlightOutcome:
-        """How it ended: `kind` is "landed", "crashed", "timed out", "diverged", "broken off" or "flown"."""
+    def mission(self) -> Mission | None:
+        """Mission of the vehicle; None without one, or where a log has no run configuration that can be read."""
+        try:
+            return mission_of(self.setup, self.truth.position[0])
+        except ValueError:
+            return None
+
+    @cached_property
+    def outcome(self) -> FlightOutcome:
+        """End of the flight; see `FlightOutcome` for its kinds."""
         no_end = self.origin.recorded and not self.digest
         failure = self.failure or ("the log has no end" if no_end else "")
-        return judge(self.truth, self.status if self.has("status") else None, failure, self.diverged)
+        status = self.status if self.has("status") else None
+        return classify(self.truth, status, failure, self.diverged, None if status is None else self.mission)
 
     @cached_property
     def events(self) -> list[Event]:
@@ -240,8 +250,8 @@ class FlightData(FlightTopics):
 
     @property
     def landed(self) -> bool:
-        """Whether the mission has ended on the ground: as the autopilot says, and upright, slow and in contact."""
-        return self.verdict.kind == "landed"
+        """True if the vehicle is upright and at rest on its feet after its mission or a failsafe."""
+        return self.outcome.kind in LANDED
 
 
 def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:

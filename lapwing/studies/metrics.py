@@ -1,4 +1,4 @@
-"""The figures of a flight: numbers by name, for a scene's `[success]` and for the rows of campaigns."""
+"""Metrics of a flight by name, for a scene's `[success]` and for the rows of campaigns."""
 
 import hashlib
 import math
@@ -15,13 +15,15 @@ from lapwing.studies.ground_contacts import touches
 from lapwing.studies.saturation import limits, saturation
 from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided, total
 
-SURE = 3.0  # standard deviations of its own that the estimate is given
+SIGMAS = 3.0  # standard deviations of the estimate
 
-FIGURES: dict[str, str] = {
-    "verdict": "",  # how it ended: landed, crashed, timed out, ...
-    "told": "",  # the same as a sentence
+METRICS: dict[str, str] = {
+    "outcome": "",  # landed, completed, landed elsewhere, ended in failsafe, timed out, aborted, crashed, diverged
+    "outcome_text": "",  # with the circumstances
     "time": "s",  # of the last touch-down, of the crash, or of the end
     "duration": "s",
+    "target_distance": "m",  # horizontal distance from the mission's target at the end
+    "failsafe_time": "s",  # start of the failsafe in which the flight ended
     **{f"rmse.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the truth
     **{f"rmse_estimate.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the estimate
     "max_distance": "m",  # from the reference
@@ -33,29 +35,34 @@ FIGURES: dict[str, str] = {
     "touchdown.y": "m",
     "touchdown.tilt": "rad",
     "touchdown.speed": "m/s",  # downwards, at the hardest touch
-    **{f"inside.{axis}": "" for axis in "xyz"},  # share of the time with the truth within 3 sigma of the estimate
+    **{
+        f"within_3sigma.{axis}": "" for axis in "xyz"
+    },  # share of the time with the truth within 3 sigma of the estimate
 }
-"""Name and unit of every figure, in the order of the columns of a campaign's table."""
+"""Name and unit of every metric, in the order of the columns of a campaign's table."""
 
 
 def check_success(scene: Scene) -> None:
-    """Every figure that the scene's `[success]` names is one of these. Raises SceneError where one is not."""
+    """Raise SceneError if the scene's `[success]` names an unknown metric."""
     with scene.located():
-        scene[Success].check_names(FIGURES)
+        scene[Success].check_names(METRICS)
 
 
-def figures(flight: FlightData) -> dict[str, Any]:
-    """The figures of a flight by name; NaN where it says nothing of one."""
-    truth, verdict, armed = flight.truth, flight.verdict, flight.armed
+def metrics(flight: FlightData) -> dict[str, Any]:
+    """Return the metrics of a flight by name; NaN for those that it does not have."""
+    truth, outcome, armed = flight.truth, flight.outcome, flight.armed
     n, t = len(armed), truth.times
-    found: dict[str, Any] = dict.fromkeys(FIGURES, math.nan)
-    found |= {"verdict": verdict.kind, "told": str(verdict), "time": verdict.time, "duration": float(t[-1])}
+    found: dict[str, Any] = dict.fromkeys(METRICS, math.nan)
+    found |= {"outcome": outcome.kind, "outcome_text": str(outcome), "time": outcome.time, "duration": float(t[-1])}
+    for name in ("target_distance", "failsafe_time"):
+        value = getattr(outcome, name)
+        found[name] = math.nan if value is None else value
     found |= {"max_tilt": _tilt(truth.tilt_cosine.min()), "energy": flight.energy}
     last = max((touch.start for touch in touches(truth)), default=0)
     if last:
         x, y, _ = map(float, truth.position[last])
         found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": _tilt(truth.tilt_cosine[last])}
-        found |= {"touchdown.speed": verdict.touchdown}
+        found |= {"touchdown.speed": outcome.touchdown}
     if n == 0:
         return found
     highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
@@ -71,23 +78,23 @@ def figures(flight: FlightData) -> dict[str, Any]:
 
 
 def compile_ahead() -> None:
-    """Compile what figures are made by, which is the same for every flight."""
+    """Compile the functions that compute metrics; they are the same for every flight."""
     rows, armed = np.zeros((2, 4)), np.ones(2, bool)  # of a single row numpy does not say how it lies
     errors(np.zeros((2, 6)), rows, rows, armed)
     rmse(Reference(rows, rows, rows[:, 0]), rows, roll_pitch_yaw(rows), armed)
     reach(rows, rows, armed)
     total(rows)
     limits(rows, armed, 1.0)
-    _inside(strided(rows), strided(rows), strided(rows), plain(armed, bool))
+    _within_3sigma(strided(rows), strided(rows), strided(rows), plain(armed, bool))
 
 
 def _tilt(cosine: float) -> float:
-    """The angle [rad] of this cosine, which rounding may have brought beyond 1."""
+    """Return the angle [rad] of a cosine that rounding may have brought beyond 1."""
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
-    """What only an estimate at every tick tells."""
+    """Return the metrics that need an estimate at every tick; {} without."""
     n = len(armed)
     if not flight.has("estimate") or len(flight.estimate) < n:
         return {}
@@ -95,31 +102,34 @@ def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
     places = strided(estimate.position[:n]), strided(truth.position[:n]), strided(estimate.position_std[:n])
     return {
         **{f"rmse_estimate.{axis}": value for axis, value in flight.rmse_of(estimate).items()},
-        **{f"inside.{a}": share for a, share in zip("xyz", _inside(*places, plain(armed, bool)), strict=True)},
+        **{
+            f"within_3sigma.{a}": share
+            for a, share in zip("xyz", _within_3sigma(*places, plain(armed, bool)), strict=True)
+        },
     }
 
 
 @kernel
-def _inside(estimate: Any, position: Any, deviation: Any, armed: Any) -> tuple[float, float, float]:
-    """Share of the rows while armed with the position within 3 sigma of the estimate, along x, y, z."""
+def _within_3sigma(estimate: Any, position: Any, deviation: Any, armed: Any) -> tuple[float, float, float]:
+    """Return the share of the armed rows with the position within 3 sigma of the estimate, along x, y, z."""
     rows, x, y, z = 0, 0, 0, 0
     for row in range(len(armed)):
         if armed[row]:
             rows += 1
-            x += abs(estimate[row, 0] - position[row, 0]) <= SURE * deviation[row, 0]
-            y += abs(estimate[row, 1] - position[row, 1]) <= SURE * deviation[row, 1]
-            z += abs(estimate[row, 2] - position[row, 2]) <= SURE * deviation[row, 2]
+            x += abs(estimate[row, 0] - position[row, 0]) <= SIGMAS * deviation[row, 0]
+            y += abs(estimate[row, 1] - position[row, 1]) <= SIGMAS * deviation[row, 1]
+            z += abs(estimate[row, 2] - position[row, 2]) <= SIGMAS * deviation[row, 2]
     return x / rows, y / rows, z / rows
 
 
 def end_state(flight: FlightData) -> str:
-    """Digest of the true state at the last tick: two flights that share it went the same way, to the bit."""
+    """Return the digest of the true state at the last tick; equal for flights that are bit-for-bit identical."""
     truth = flight.truth
     numbers = [truth.times[-1:], truth.position[-1], truth.orientation[-1], truth.velocity[-1], truth.rotor_speed[-1]]
     return hashlib.blake2b(np.concatenate(numbers).astype("<f8").tobytes(), digest_size=8).hexdigest()
 
 
 def joint_end_state(flights: Sequence[FlightData]) -> str:
-    """Digest of the end of one flight, as of `end_state`; of several vehicles one digest over those of all."""
+    """Return the `end_state` of one flight, or one digest over those of several vehicles."""
     states = [end_state(flight) for flight in flights]
     return states[0] if len(states) == 1 else hashlib.blake2b("".join(states).encode(), digest_size=8).hexdigest()

@@ -1,4 +1,4 @@
-"""How a flight ended. The criteria are here alone: for a run, its report, a campaign, and the tests."""
+"""Outcome of a flight: the only place that decides whether it landed, crashed, timed out or ended otherwise."""
 
 import math
 from typing import Literal, NamedTuple, get_args
@@ -6,85 +6,117 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from lapwing.studies.ground_contacts import Touch, touches
+from lapwing.studies.mission import Mission
 from lapwing.studies.topic_view import TopicView
 
-Kind = Literal["landed", "crashed", "timed out", "diverged", "broken off", "flown"]
-KINDS = get_args(Kind)
+Kind = Literal[
+    "landed", "completed", "landed elsewhere", "ended in failsafe", "timed out", "aborted", "crashed", "diverged"
+]
+KINDS = get_args(Kind)  # from best to worst
+LANDED = ("landed", "landed elsewhere", "ended in failsafe")  # kinds of a vehicle at rest on its feet
 
 HARD = 2.0  # [m/s] downwards at a touch: a crash
 UPSIDE = 0.0  # cosine of the tilt below which the vehicle has turned over: a crash
 SLOW = 0.5  # [m/s] a vehicle that has landed moves less
 UPRIGHT = math.cos(math.radians(30.0))  # and is tilted less
-RESTING = 0.1  # [m] from the height at which it stood at first; for plants that tell of no contact
+RESTING = 0.1  # [m] from the initial height, for plants without contact information
+LANDING_RADIUS = 5.0  # [m] horizontally from the target of the mission, for satellite navigation without corrections
 
 
 class FlightOutcome(NamedTuple):
     """How a flight ended, when and where.
 
-    "landed": the mission is over, upright and at rest on its feet. "crashed": it turned over, hit the ground at more
-    than 2 m/s, or the mission was over and it did not stand. "timed out": the mission was not over. "diverged": a state
-    was no longer finite. "broken off": something else ended the run before its time. "flown": nobody steers in this
-    scene, so nothing has to land.
+    - "landed": the mission is finished; the vehicle is upright and at rest within 5 m of the mission's target.
+    - "completed": the flight reached its end without a landing to make: no autopilot, no mission, a trajectory that
+      ends in the air, or a run that ends before its trajectory.
+    - "landed elsewhere": as "landed", but farther from the target.
+    - "ended in failsafe": a failsafe ended the mission and the vehicle landed.
+    - "timed out": the mission was not finished.
+    - "aborted": something else ended the run early.
+    - "crashed": the vehicle turned over, hit the ground at more than 2 m/s, or was not at rest on its feet after the
+      mission.
+    - "diverged": a state was not finite.
     """
 
     kind: Kind
     time: float  # [s] of the last touch-down, of the crash, or of the end
-    how: str  # the circumstances, for people
+    how: str  # circumstances
     position: tuple[float, float, float]  # [m] world, at the end
     tilt: float  # [rad] from the vertical, at the end
     touchdown: float  # [m/s] speed downwards at the hardest touch; 0 without one
+    target_distance: float | None = None  # [m] horizontal distance from the mission's target at the end
+    failsafe: str = ""  # reason of the failsafe in which the flight ended
+    failsafe_time: float | None = None  # [s] of its start
 
     def __str__(self) -> str:
-        """The verdict as a sentence without its full stop."""
-        if self.kind == "flown":
-            return f"Flown to the end, {self.time:.2f} s: {self.how}"
+        """Return the outcome as a sentence without its full stop."""
+        if self.kind == "completed":
+            return f"Completed at {self.time:.2f} s: {self.how}"
         x, y, z = self.position
-        where = "" if self.kind in ("diverged", "broken off") else f"; ends at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        where = "" if self.kind in ("diverged", "aborted") else f"; ends at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         return f"{self.kind.capitalize()} at {self.time:.2f} s{': ' if self.how else ''}{self.how}{where}"
 
 
-def judge(truth: TopicView, status: TopicView | None, failure: str = "", diverged: bool = False) -> FlightOutcome:
-    """The verdict on a flight.
+def classify(
+    truth: TopicView,
+    status: TopicView | None,
+    failure: str = "",
+    diverged: bool = False,
+    mission: Mission | None = None,
+) -> FlightOutcome:
+    """Return the outcome of a flight.
 
     Args:
-        truth: at least one message.
-        status: of the autopilot; None where nobody steers.
-        failure: why the flight ended before its time; "" where it did not.
-        diverged: whether that is a state that was no longer finite.
+        truth: true state; at least one message.
+        status: autopilot status; None without an autopilot.
+        failure: reason of an early end; "" without one.
+        diverged: True if a state was not finite.
+        mission: mission of the autopilot; None without one.
     """
     end, cosine = float(truth.times[-1]), truth.tilt_cosine
-    found = touches(truth) if status is not None else []
+    contacts = touches(truth) if status is not None else []
     x, y, z = map(float, truth.position[-1])
     tilt = math.acos(max(-1.0, min(1.0, float(cosine[-1]))))
+    distance = None
+    if mission is not None and mission.target is not None:
+        distance = math.hypot(x - mission.target[0], y - mission.target[1])
+    hardest = max((touch.speed for touch in contacts), default=0.0)
 
-    def verdict(kind: Kind, time: float, how: str) -> FlightOutcome:
-        return FlightOutcome(
-            kind, round(time, 9), how, (x, y, z), tilt, max((touch.speed for touch in found), default=0.0)
-        )
+    def outcome(kind: Kind, time: float, how: str, failsafe: tuple[float, str] | None = None) -> FlightOutcome:
+        started, reason = failsafe or (None, "")
+        return FlightOutcome(kind, round(time, 9), how, (x, y, z), tilt, hardest, distance, reason, started)
 
     if diverged:
-        return verdict("diverged", end, failure)
+        return outcome("diverged", end, failure)
     if status is None:
-        return (
-            verdict("broken off", end, failure)
-            if failure
-            else verdict("flown", end, "nobody steers, so nothing has to land")
-        )
-    if accident := _accident(truth, cosine, found):
-        return verdict("crashed", *accident)
+        return outcome("aborted", end, failure) if failure else outcome("completed", end, "no autopilot")
+    failsafe = _last_failsafe(status)
+    if accident := _accident(truth, cosine, contacts):
+        return outcome("crashed", *accident, failsafe)
     if failure:
-        return verdict("broken off", end, failure)
-    if not over(status):
-        return verdict("timed out", end, _unfinished(status))
-    if wrong := _not_standing(truth, status, cosine):
-        return verdict("crashed", end, wrong)
-    # the last touch before the motors went off; a plant that tells of no contact has none
-    time = float(truth.times[found[-1].start]) if found else end
-    return verdict("landed", time, f"upright on its feet, touched down at {found[-1].speed:.2f} m/s" if found else "")
+        return outcome("aborted", end, failure, failsafe)
+    landed_in_failsafe = failsafe and status.landed[-1] and not status.armed[-1]
+    if not mission_finished(status) and not landed_in_failsafe:
+        completion = "no mission" if mission is None else mission.completion(status)
+        if completion and not failsafe:
+            return outcome("completed", end, completion)
+        return outcome("timed out", end, _unfinished(status, failsafe), failsafe)
+    if fault := _not_resting(truth, status, cosine):
+        return outcome("crashed", end, fault, failsafe)
+    # the last touch before the motors went off; a plant without contact information has none
+    time = float(truth.times[contacts[-1].start]) if contacts else end
+    how = [f"upright on its feet, touched down at {contacts[-1].speed:.2f} m/s"] if contacts else []
+    if failsafe:
+        how.insert(0, f"{failsafe[1]} at {failsafe[0]:.2f} s")
+    is_far = distance is not None and distance > LANDING_RADIUS
+    if distance is not None and (failsafe or is_far):
+        how.append(f"{distance:.1f} m from the target")
+    kind: Kind = "ended in failsafe" if failsafe else "landed elsewhere" if is_far else "landed"
+    return outcome(kind, time, ", ".join(how), failsafe)
 
 
-def over(status: TopicView) -> bool:
-    """Whether the mission is over: as the autopilot says, or flown, landed and disarmed under an operator."""
+def mission_finished(status: TopicView) -> bool:
+    """Return True if the autopilot reports the end, or has landed and disarmed after a flight under an operator."""
     if len(status) == 0:
         return False
     if status.finished[-1]:
@@ -96,38 +128,50 @@ def over(status: TopicView) -> bool:
     return bool(at_rest and status.armed.any())
 
 
-def _accident(truth: TopicView, cosine: np.ndarray, found: list[Touch]) -> tuple[float, str] | None:
-    """When it crashed first, and all that happened; None where it did not."""
-    told = []
-    over_turned = np.flatnonzero(cosine < UPSIDE)
-    if len(over_turned):
-        told.append((float(truth.times[over_turned[0]]), "turned over"))
-    for touch in found:
-        if touch.speed > HARD:
-            told.append((float(truth.times[touch.start]), f"hit the ground at {touch.speed:.1f} m/s"))
-    if not told:
+def _last_failsafe(status: TopicView) -> tuple[float, str] | None:
+    """Return start [s] and reason of the failsafe in force when the motors were last armed; None without one."""
+    if not {"failsafe", "text", "armed"} <= set(status.fields):
         return None
-    (time, first_words), *others = sorted(told)
-    return time, ", ".join([first_words, *(f"{words} at {t:.2f} s" for t, words in others)])
+    armed = np.flatnonzero(status.armed)
+    if not len(armed) or not status.failsafe[armed[-1]]:
+        return None
+    without = np.flatnonzero(~status.failsafe[: armed[-1]].astype(bool))
+    first = int(without[-1]) + 1 if len(without) else 0
+    return float(status.times[first]), str(status.text[first]) or "failsafe"
 
 
-def _not_standing(truth: TopicView, status: TopicView, cosine: np.ndarray) -> str:
-    """What is wrong with a vehicle whose mission is over; "" if it stands."""
+def _accident(truth: TopicView, cosine: np.ndarray, contacts: list[Touch]) -> tuple[float, str] | None:
+    """Return the time of the first accident and a list of all; None without one."""
+    accidents = []
+    turned_over = np.flatnonzero(cosine < UPSIDE)
+    if len(turned_over):
+        accidents.append((float(truth.times[turned_over[0]]), "turned over"))
+    for touch in contacts:
+        if touch.speed > HARD:
+            accidents.append((float(truth.times[touch.start]), f"hit the ground at {touch.speed:.1f} m/s"))
+    if not accidents:
+        return None
+    (time, first), *others = sorted(accidents)
+    return time, ", ".join([first, *(f"{text} at {t:.2f} s" for t, text in others)])
+
+
+def _not_resting(truth: TopicView, status: TopicView, cosine: np.ndarray) -> str:
+    """Return the reasons why a vehicle is not at rest on its feet after its mission; "" if it is."""
     height, speed = truth.position[:, 2], float(np.linalg.norm(truth.velocity[-1]))
-    wrong = []
+    faults = []
     if not status.landed[-1]:
-        wrong.append("the autopilot does not say that it has landed")
+        faults.append("the autopilot does not report a landing")
     if not (truth.ground_contact[-1] or abs(height[-1] - height[0]) < RESTING):
-        wrong.append("not on the ground")
+        faults.append("not on the ground")
     if not cosine[-1] > UPRIGHT:
-        wrong.append(f"tilted by {math.degrees(math.acos(max(-1.0, min(1.0, float(cosine[-1]))))):.0f}°")
+        faults.append(f"tilted by {math.degrees(math.acos(max(-1.0, min(1.0, float(cosine[-1]))))):.0f}°")
     if not speed < SLOW:
-        wrong.append(f"moves at {speed:.1f} m/s")
-    return f"the mission is over, but it does not stand: {', '.join(wrong)}" if wrong else ""
+        faults.append(f"moves at {speed:.1f} m/s")
+    return f"not at rest on its feet after the mission: {', '.join(faults)}" if faults else ""
 
 
-def _unfinished(status: TopicView) -> str:
+def _unfinished(status: TopicView, failsafe: tuple[float, str] | None) -> str:
     if not ("armed" in status.fields and status.armed.any()):
-        return "the mission was not over, the motors were never armed"
-    doing = " ".join(filter(None, (str(status.mode[-1]), f"({status.phase[-1]})" if status.phase[-1] else "")))
-    return f"the mission was not over, in {doing}"
+        return "mission not finished, motors never armed"
+    mode = " ".join(filter(None, (str(status.mode[-1]), f"({status.phase[-1]})" if status.phase[-1] else "")))
+    return f"mission not finished, in {mode}" + (f", {failsafe[1]} at {failsafe[0]:.2f} s" if failsafe else "")

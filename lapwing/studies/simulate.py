@@ -27,7 +27,7 @@ def fly(
     kind: type[F] = FlightData,  # type: ignore[assignment]
     rows: dict[str, np.ndarray] | None = None,
 ) -> F:
-    """Fly to the end, or until a state is not sound: the verdict then says so.
+    """Fly to the end, or until a state is not sound: its outcome is then "diverged".
 
     Args:
         run: what to fly.

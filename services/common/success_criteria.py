@@ -12,7 +12,7 @@ from pydantic import Field
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 
-EXPECTED = "an expression over figures of the flight, for example \"rmse.x < 0.1 and verdict == 'landed'\""
+EXPECTED = "an expression over figures of the flight, for example \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
 
 _MAY_HAVE = (
@@ -27,7 +27,7 @@ class Success(SceneTable):
 
     TABLE: ClassVar[str] = "success"
     require: tuple[str, ...] = Field(
-        default=("verdict != 'crashed'", "verdict != 'diverged'"), strict=False
+        default=("outcome in ('landed', 'completed')",), strict=False
     )  # expressions over figures of the flight that all have to hold
 
     def check(self, scene: Scene) -> None:
@@ -88,7 +88,7 @@ class _Lookup(ast.NodeTransformer):
         return self._look(node)
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """`verdict`."""
+        """`outcome`."""
         return self._look(node)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:

@@ -15,7 +15,7 @@ from lapwing.messages.topic_columns import history
 from lapwing.messages.topics import Topic
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
-from lapwing.studies.outcome import judge
+from lapwing.studies.outcome import LANDED, classify
 from lapwing.studies.topic_view import TopicView
 
 
@@ -70,8 +70,8 @@ class MemoryLog:
 
     @property
     def landed(self) -> bool:
-        """Whether the flight's verdict is that it has landed."""
-        return judge(self.view("truth"), self.view("status")).kind == "landed"
+        """True if the vehicle has landed."""
+        return classify(self.view("truth"), self.view("status")).kind in LANDED
 
     def view(self, name: str) -> TopicView:
         """A topic as columns."""

@@ -19,7 +19,7 @@ WORDS = [
     "--runs",
     "8",
     "--set",
-    'success.require=["verdict == \'landed\'", "rmse.z < 0.1"]',
+    'success.require=["outcome == \'landed\'", "rmse.z < 0.1"]',
     "--vary",
     "a b=$c",
 ]

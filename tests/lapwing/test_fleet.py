@@ -28,10 +28,10 @@ def flown(tmp_path_factory):
     return folder, said, json.loads((folder / "a.json").read_text())
 
 
-def test_every_vehicle_has_its_verdict_events_and_the_nearest_two_are_told(flown):
+def test_fleet_summary_has_outcomes_and_separation(flown):
     folder, said, figures = flown
     assert list(figures["vehicles"]) == ["left", "right", "scout"]
-    assert all(one["verdict"]["kind"] == "timed out" for one in figures["vehicles"].values())
+    assert all(one["outcome"]["kind"] == "completed" for one in figures["vehicles"].values())
     assert figures["separation"]["vehicles"][1] == "scout"
     assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # as they stand
     assert "Nearest: " in said

@@ -1,4 +1,4 @@
-"""A run whose services are started elsewhere ends in a verdict, too, when one of them dies."""
+"""A run whose services are started elsewhere has an outcome when one of them dies."""
 
 import json
 import os
@@ -43,7 +43,7 @@ def flies(log):
         return False
 
 
-def test_a_service_that_dies_is_named_and_what_was_flown_has_its_verdict(tmp_path):
+def test_dead_service_is_named_and_the_outcome_is_aborted(tmp_path):
     names = needed(resolve(load("hover", SETS[1:])))
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, "mission"]).items())
     log, figures = tmp_path / "log.mcap", tmp_path / "figures.json"
@@ -64,7 +64,7 @@ def test_a_service_that_dies_is_named_and_what_was_flown_has_its_verdict(tmp_pat
             process.communicate()
     assert mission.returncode == 1, said
     assert "plant: gone at t = " in said
-    assert json.loads(figures.read_text())["verdict"]["kind"] == "broken off"
+    assert json.loads(figures.read_text())["outcome"]["kind"] == "aborted"
 
 
 def test_viewers_are_told_of_events_while_it_flies(tmp_path):

@@ -7,7 +7,8 @@ import synthetic_flights
 from lapwing.cosim.scene import SceneError
 from lapwing.services.common.success_criteria import Success, holds
 from lapwing.services.scene_resolver import load
-from lapwing.studies.metrics import FIGURES, check_success, figures
+from lapwing.studies.metrics import METRICS, check_success, metrics
+from lapwing.studies.outcome import KINDS
 from lapwing.studies.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided, total
 
 N = 400
@@ -35,7 +36,7 @@ def flown(failure="", diverged=False, finished=True, setpoint=None, truth=None, 
 
 def test_errors_of_known_offsets():
     half = np.sin(0.05), np.cos(0.05)
-    f = figures(
+    f = metrics(
         flown(
             setpoint={"position": (1.0, 2.0, 3.0), "yaw": 0.2},
             truth={"pose.position": (0.9, 2.0, 3.2), "pose.orientation": (0.0, 0.0, *half)},  # a yaw of 0.1
@@ -46,24 +47,24 @@ def test_errors_of_known_offsets():
     assert [f[f"rmse_estimate.{axis}"] for axis in AXES] == pytest.approx([0.0, 0.3, 0.2, 0.0, 0.0, 0.2])
     assert f["max_distance"] == pytest.approx(np.hypot(0.1, 0.2))
     assert f["overshoot"] == pytest.approx(0.2)  # above the reference; it never came as far along x
-    assert [f[f"inside.{axis}"] for axis in "xyz"] == [1.0] * 3
+    assert [f[f"within_3sigma.{axis}"] for axis in "xyz"] == [1.0] * 3
     assert f["energy"] == pytest.approx(400.0)
-    assert (f["verdict"], f["saturation"], f["max_tilt"]) == ("landed", 0.0, 0.0)
+    assert (f["outcome"], f["saturation"], f["max_tilt"]) == ("landed", 0.0, 0.0)
     assert np.isnan(f["touchdown.speed"])
-    assert set(f) == set(FIGURES)
+    assert set(f) == set(METRICS)
 
 
 def test_share_of_the_time_within_three_sigma():
     ramp = np.zeros((N, 3))
     ramp[:, 1] = np.linspace(0.0, 0.6, N)  # three sigma are reached half-way
-    f = figures(flown(estimate={"pose.position": ramp}))
-    assert [f[f"inside.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 0.5, 1.0])
+    f = metrics(flown(estimate={"pose.position": ramp}))
+    assert [f[f"within_3sigma.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 0.5, 1.0])
 
 
 def test_only_the_armed_part_counts():
     armed = np.arange(N) < 10
     off = np.where(armed, 0.0, 5.0)[:, None] * np.ones(3)
-    assert figures(flown(truth={"pose.position": off}, armed=armed))["max_distance"] == 0.0
+    assert metrics(flown(truth={"pose.position": off}, armed=armed))["max_distance"] == 0.0
 
 
 def test_a_touch_down_has_its_place_speed_and_tilt():
@@ -71,37 +72,37 @@ def test_a_touch_down_has_its_place_speed_and_tilt():
     falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
     moving = np.arange(N)[:, None] * np.array([0.01, -0.02, 0.0])
     leaning = {"pose.orientation": (0.0, half, 0.0, np.sqrt(1.0 - half**2)), "pose.position": moving}
-    hit = figures(flown(truth={"ground_contact": touch, "velocity": falling, **leaning}))
-    assert (hit["verdict"], hit["touchdown.speed"], hit["time"]) == ("crashed", 3.0, 3.01)
+    hit = metrics(flown(truth={"ground_contact": touch, "velocity": falling, **leaning}))
+    assert (hit["outcome"], hit["touchdown.speed"], hit["time"]) == ("crashed", 3.0, 3.01)
     assert (hit["touchdown.x"], hit["touchdown.y"]) == pytest.approx((3.01, -6.02))
     assert hit["touchdown.tilt"] == pytest.approx(0.2)
 
 
 def test_saturation_is_a_share_of_the_time_in_the_air():
     voltage = np.where(np.arange(N) < 100, 40.0, 20.0)[:, None]
-    f = figures(flown(truth={"motor_voltage": voltage}))
+    f = metrics(flown(truth={"motor_voltage": voltage}))
     assert f["saturation"] == pytest.approx(0.25, abs=0.01)
 
 
-def test_verdicts_are_those_of_a_single_run():
-    assert figures(flown("not finite at t = 1 s", diverged=True))["verdict"] == "diverged"
-    assert figures(flown(finished=False))["verdict"] == "timed out"
+def test_metrics_report_the_outcome():
+    assert metrics(flown("not finite at t = 1 s", diverged=True))["outcome"] == "diverged"
+    assert metrics(flown(finished=False))["outcome"] == "completed"
 
 
 @pytest.mark.parametrize(
     ("text", "true"),
     [
         ("rmse.x < 0.1", True),
-        ("rmse.x < 0.1 and verdict == 'crashed'", False),
-        ("rmse.x < 0.1 or verdict == 'crashed'", True),
-        ("verdict in ('landed', 'flown') and not time > 5", True),
+        ("rmse.x < 0.1 and outcome == 'crashed'", False),
+        ("rmse.x < 0.1 or outcome == 'crashed'", True),
+        ("outcome in ('landed', 'completed') and not time > 5", True),
         ("0.01 < abs(-rmse.x) * 2 <= max(0.1, time / 100)", True),
         ("energy < 1", False),  # NaN
         ("1 / (time - 3) < 1", False),
     ],
 )
 def test_expressions_over_figures(text, true):
-    assert holds(text, {"rmse.x": 0.05, "verdict": "landed", "time": 3.0, "energy": np.nan}) == true
+    assert holds(text, {"rmse.x": 0.05, "outcome": "landed", "time": 3.0, "energy": np.nan}) == true
 
 
 @pytest.mark.parametrize(
@@ -113,11 +114,9 @@ def test_nothing_else_is_an_expression(text):
         load("hover", {"success.require": [text]})
 
 
-def test_the_default_lets_crashes_and_divergences_fail():
+def test_default_success_requires_a_completed_mission():
     success = load("hover")[Success]
-    assert [success.unmet({"verdict": v}) != [] for v in ("landed", "timed out", "crashed", "diverged")] == [
-        False, False, True, True,
-    ]  # fmt: skip
+    assert [success.unmet({"outcome": v}) != [] for v in KINDS] == [k > 1 for k in range(len(KINDS))]
     with pytest.raises(SceneError, match=r"success.require.0: unknown figure 'rmse.zz'; did you mean rmse.z\?"):
         check_success(load("hover", {"success.require": ["rmse.zz < 1"]}))
 

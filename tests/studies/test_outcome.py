@@ -1,10 +1,12 @@
-"""How flights made up end: each verdict, its time and its words."""
+"""Outcome of synthetic flights: kind, time and circumstances."""
 
 import numpy as np
 import pytest
 import synthetic_flights
 
-from lapwing.studies.outcome import judge
+import lapwing
+from lapwing.studies.mission import Mission
+from lapwing.studies.outcome import classify
 
 TICKS, RATE = 500, 100
 T = np.arange(TICKS) / RATE
@@ -12,8 +14,8 @@ UP = np.array([0.0, 0.0, 1.0])
 ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
 
 
-def flown(finished=True, landed=True, failure="", diverged=False, status=None, **truth):
-    """Up at 1 s, down at 4 s at 0.4 m/s, and standing at (1, 2)."""
+def fly(mission=None, finished=True, landed=True, failure="", diverged=False, status=None, **truth):
+    """Return the outcome of a flight up at 1 s and down at 4 s with 0.4 m/s, at rest at (1, 2)."""
     contact = (T < 1.0) | (T >= 4.0)
     columns = {
         "pose.position": np.array([1.0, 2.0, 0.35]),
@@ -22,75 +24,124 @@ def flown(finished=True, landed=True, failure="", diverged=False, status=None, *
         "ground_contact": contact,
     }
     last = {"finished": finished & (T > 4.5), "landed": landed & contact, "armed": ~contact}
-    words = {"mode": "mission", "phase": np.where(T < 3.0, "hover", "land")}
-    said = synthetic_flights.flight(
-        TICKS, RATE, failure, diverged, truth=columns | truth, status=last | words | (status or {})
-    )
-    return said.verdict
+    modes = {"mode": "mission", "phase": np.where(T < 3.0, "hover", "land")}
+    flight = synthetic_flights.flight(TICKS, RATE, truth=columns | truth, status=last | modes | (status or {}))
+    return classify(flight.truth, flight.status, failure, diverged, mission)
 
 
-def test_a_landing_says_when_how_hard_and_where():
-    found = flown()
-    assert (found.kind, found.time, found.tilt) == ("landed", 4.0, 0.0)
-    assert found.touchdown == pytest.approx(0.4)
-    assert str(found) == (
+def failsafe(start, reason="GPS lost"):
+    return {"failsafe": start <= T, "text": np.where(start <= T, reason, "")}
+
+
+def test_landing_reports_time_speed_place_and_target_distance():
+    outcome = fly(Mission((1.0, 2.5, 0.0)))
+    assert (outcome.kind, outcome.time, outcome.tilt) == ("landed", 4.0, 0.0)
+    assert outcome.touchdown == pytest.approx(0.4)
+    assert outcome.target_distance == pytest.approx(0.5)
+    assert str(outcome) == (
         "Landed at 4.00 s: upright on its feet, touched down at 0.40 m/s; ends at (1.00, 2.00, 0.35) m"
     )
 
 
-def test_upside_down_is_no_landing_whatever_the_autopilot_says():
-    found = flown(**{"pose.orientation": np.where((T > 3.0)[:, None], ON_ITS_BACK, synthetic_flights.LEVEL)})
-    assert (found.kind, found.time) == ("crashed", pytest.approx(3.01))
-    assert found.how == "turned over"
-    assert found.tilt == pytest.approx(np.pi)
+def test_landing_far_from_the_target_is_landed_elsewhere():
+    outcome = fly(Mission((13.0, 7.0, 0.0)))
+    assert (outcome.kind, outcome.target_distance) == ("landed elsewhere", pytest.approx(13.0))
+    assert "13.0 m from the target" in str(outcome)
 
 
-def test_a_hard_touch_is_a_crash_and_what_followed_is_told():
+@pytest.mark.parametrize("finished", [True, False])
+def test_failsafe_landing_names_reason_time_and_distance(finished):
+    outcome = fly(Mission((1.0, 12.0, 0.0)), finished=finished, status=failsafe(2.0))
+    assert (outcome.kind, outcome.failsafe, outcome.failsafe_time) == ("ended in failsafe", "GPS lost", 2.0)
+    assert outcome.target_distance == pytest.approx(10.0)
+    assert str(outcome).startswith("Ended in failsafe at 4.00 s: GPS lost at 2.00 s, upright on its feet")
+
+
+def test_failsafe_that_ended_in_the_air_does_not_count():
+    passed = {"failsafe": (T > 2.0) & (T < 3.0), "text": np.where((T > 2.0) & (T < 3.0), "GPS lost", "")}
+    assert fly(status=passed).kind == "landed"
+
+
+def test_failsafe_in_the_air_at_the_end_times_out():
+    flying = {"landed": T < 1.0, "armed": T >= 1.0}
+    outcome = fly(finished=False, status=flying | failsafe(2.0), ground_contact=T < 1.0)
+    assert (outcome.kind, outcome.failsafe) == ("timed out", "GPS lost")
+
+
+def test_turning_over_is_a_crash_despite_a_reported_landing():
+    outcome = fly(**{"pose.orientation": np.where((T > 3.0)[:, None], ON_ITS_BACK, synthetic_flights.LEVEL)})
+    assert (outcome.kind, outcome.time) == ("crashed", pytest.approx(3.01))
+    assert outcome.how == "turned over"
+    assert outcome.tilt == pytest.approx(np.pi)
+
+
+def test_hard_touch_is_a_crash_and_lists_later_accidents():
     turned = np.where((T > 4.2)[:, None], ON_ITS_BACK, synthetic_flights.LEVEL)
     contact = (T < 1.0) | (T >= 4.0)
     fast = np.where(contact, 0.0, -5.3)[:, None] * UP
-    found = flown(velocity=fast, **{"pose.orientation": turned})
-    assert str(found).startswith("Crashed at 4.00 s: hit the ground at 5.3 m/s, turned over at 4.21 s; ends at")
+    outcome = fly(velocity=fast, **{"pose.orientation": turned})
+    assert str(outcome).startswith("Crashed at 4.00 s: hit the ground at 5.3 m/s, turned over at 4.21 s; ends at")
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"velocity": np.array([0.6, 0.0, 0.0])}, "moves at 0.6 m/s"),
         ({"pose.orientation": (np.sin(np.radians(20.0)), 0.0, 0.0, np.cos(np.radians(20.0)))}, "tilted by 40°"),
-        ({"landed": False}, "the autopilot does not say that it has landed"),
+        ({"landed": False}, "does not report a landing"),
         ({"ground_contact": T < 1.0, "pose.position": np.outer(T, UP)}, "not on the ground"),
     ],
 )
-def test_who_does_not_stand_when_the_mission_is_over_has_crashed(changed, said):
-    found = flown(**changed)
-    assert found.kind == "crashed"
-    assert said in found.how
+def test_finished_mission_without_rest_on_its_feet_is_a_crash(changed, message):
+    outcome = fly(**changed)
+    assert outcome.kind == "crashed"
+    assert message in outcome.how
 
 
-def test_a_bounce_is_a_part_of_its_touch():
+def test_touch_time_is_the_first_contact_of_a_bounce():
     bouncing = (T < 1.0) | ((T >= 3.9) & (T < 3.92)) | (T >= 4.0)
-    assert flown(ground_contact=bouncing).time == 3.9
+    assert fly(ground_contact=bouncing).time == 3.9
 
 
-def test_a_mission_that_is_not_over_has_timed_out_and_says_in_what():
-    found = flown(finished=False)
-    assert (found.kind, found.time) == ("timed out", 4.99)
-    assert found.how == "the mission was not over, in mission (land)"
-    grounded = flown(finished=False, status={"armed": False})
-    assert grounded.how == "the mission was not over, the motors were never armed"
+def test_unfinished_mission_times_out_with_its_mode():
+    outcome = fly(Mission(None), finished=False)
+    assert (outcome.kind, outcome.time) == ("timed out", 4.99)
+    assert outcome.how == "mission not finished, in mission (land)"
+    grounded = fly(Mission(None), finished=False, status={"armed": False})
+    assert grounded.how == "mission not finished, motors never armed"
 
 
-def test_under_an_operator_disarmed_after_a_flight_is_over():
-    assert flown(finished=False, status={"mode": "hold"}).kind == "landed"
+@pytest.mark.parametrize("mission", [None, Mission(None, final_phase="land"), Mission(None, is_longer=True)])
+def test_flight_without_a_landing_to_make_is_completed(mission):
+    assert fly(mission, finished=False).kind == "completed"
 
 
-def test_divergence_and_other_ends_before_the_time():
-    assert str(flown(failure="not finite at t = 5 s", diverged=True)) == "Diverged at 4.99 s: not finite at t = 5 s"
-    assert str(flown(failure="ended by SIGINT", finished=False)) == "Broken off at 4.99 s: ended by SIGINT"
+def test_disarming_in_hold_under_an_operator_is_a_landing():
+    assert fly(finished=False, status={"mode": "hold"}).kind == "landed"
 
 
-def test_where_nobody_steers_nothing_has_to_land():
-    found = synthetic_flights.moved([0.0, 1.0, 2.0])
-    assert (found.verdict.kind, found.landed) == ("flown", False)
-    assert judge(found.truth, None).kind == "flown"
+def test_divergence_and_abort_report_their_reason():
+    assert str(fly(failure="not finite at t = 5 s", diverged=True)) == "Diverged at 4.99 s: not finite at t = 5 s"
+    assert str(fly(failure="ended by SIGINT", finished=False)) == "Aborted at 4.99 s: ended by SIGINT"
+
+
+def test_flight_without_an_autopilot_is_completed():
+    flight = synthetic_flights.moved([0.0, 1.0, 2.0])
+    assert (flight.outcome.kind, flight.landed) == ("completed", False)
+
+
+def test_mission_target_is_the_end_of_the_trajectory():
+    flight = lapwing.fly("hover", {"run.duration": 1.0})
+    assert flight.mission.is_longer
+    assert flight.outcome.kind == "completed"
+    target = lapwing.studies.mission.mission_of(lapwing.services.scene_resolver.resolve(lapwing.load("hover")), None)
+    assert target.target[:2] == (0.0, 0.0)
+    assert not target.is_longer
+
+
+def test_gps_loss_ends_in_failsafe_and_fails_by_default():
+    overrides = {"sensors.gps.faults": [{"kind": "dropout", "start": 5.0}]}
+    flight = lapwing.fly("delivery_mission", overrides)
+    assert flight.outcome.kind == "ended in failsafe"
+    assert flight.outcome.failsafe_time > 5.0
+    assert flight.outcome.target_distance > 1.0

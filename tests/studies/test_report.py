@@ -230,9 +230,9 @@ def test_the_page_needs_nothing_from_elsewhere(page):
 
 def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
     code = (
-        "import sys; from pathlib import Path; from lapwing.studies.flight_data import Flight;"
+        "import sys; from pathlib import Path; from lapwing.studies.flight_data import FlightData;"
         "from lapwing.studies.report import write;"
-        f"write(Flight.read({str(log)!r}), Path({str(log.with_suffix('.html'))!r}));"
+        f"write(FlightData.read({str(log)!r}), Path({str(log.with_suffix('.html'))!r}));"
         "print([name for name in ('matplotlib', 'plotly') if name in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout.strip() == b"[]"

@@ -12,7 +12,7 @@ from lapwing.studies.campaign.campaign_plots import shown
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
 
 COMPARED = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a campaign's manifest
 
@@ -58,7 +58,7 @@ def compare(one: Path, other: Path) -> Comparison:
     at, of = np.array(found).T
     good, better = a["success"][at].astype(float), b["success"][of].astype(float)
     differences = [Difference("success", float(good.mean()), float(better.mean()), paired(good, better))]
-    for name in FIGURES:
+    for name in METRICS:
         if a.folder.kinds[name] is float:
             x, y = a[name][at], b[name][of]
             there = np.isfinite(x) & np.isfinite(y)

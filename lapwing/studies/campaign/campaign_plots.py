@@ -8,7 +8,7 @@ import numpy as np
 
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
 from lapwing.studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
 from lapwing.studies.tracking import DEGREE
@@ -25,7 +25,7 @@ _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 def shown(name: str) -> tuple[str, float]:
     """Label of a figure and the factor to its unit there: angles in degrees, shares in per cent."""
-    unit = FIGURES[name]
+    unit = METRICS[name]
     if unit == "rad":
         return f"{name} [°]", 1.0 / DEGREE
     return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
@@ -184,7 +184,7 @@ def parallel(found: Results) -> Plot:
     names = [*keys, *(name for name in MATTERS if name in found.figures)]
     columns, ticks = [], []
     for name in names:
-        values, (label, scale) = found.number(name), shown(name) if name in FIGURES else (name, 1.0)
+        values, (label, scale) = found.number(name), shown(name) if name in METRICS else (name, 1.0)
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))
         texts = _texts(found, name)

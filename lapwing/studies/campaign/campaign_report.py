@@ -64,7 +64,7 @@ def _page(found: Results, sections: list[Section]) -> str:
     worst = [
         {
             "run": int(row["run"]),
-            "told": row["told"] or row["verdict"],
+            "outcome_text": row["outcome_text"] or row["outcome"],
             "parameters": ", ".join(f"{key} {_short(row[key])}" for key in plan.keys),
             "figures": [f"{scale * row[name]:.3g}" for name, (_, scale) in zip(LISTED, heads, strict=True)],
             "command": shlex.join(
@@ -73,11 +73,11 @@ def _page(found: Results, sections: list[Section]) -> str:
         }
         for row in found.worst(WORST)
     ]
-    refused = zip(found.refused["run"].tolist(), found.refused["told"].tolist(), strict=True)
+    refused = zip(found.refused["run"].tolist(), found.refused["outcome_text"].tolist(), strict=True)
     return render(
         "campaign.html",
         title=f"{found.scene}: {len(found) + len(found.refused['run'])} runs",
-        told=found.told,
+        outcome_text=found.outcome_text,
         failure=found.failure,
         facts={name: text for name, text in facts.items() if text},
         heads=[label for label, _ in heads],

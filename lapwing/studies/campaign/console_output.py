@@ -20,32 +20,33 @@ LISTED = 10  # failures, refusals
 def show(console: Console, found: Results) -> None:
     """Print the campaign for people."""
     if len(found) == 0:
-        console.print(f"{found.scene}: the scene has refused every run", highlight=False)
-        _list(console, "refused", found.refused["run"], found.refused["told"])
+        console.print(f"{found.scene}: the scene rejected every run", highlight=False)
+        _list(console, "rejected", found.refused["run"], found.refused["outcome_text"])
         return
     _table(console, "Root-mean-square error of the reference against the truth", "rmse", found)
     if found.on_estimate:
         _table(console, "The same against the vehicle's own estimate", "rmse_estimate", found)
-        shares = ", ".join(f"{axis} {found[f'inside.{axis}'].mean():.2%}" for axis in "xyz")
+        shares = ", ".join(f"{axis} {found[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
         console.print(f"Truth within 3 sigma of the estimate: {shares} of the time", highlight=False)
-        least = {axis: found.spread(f"inside.{axis}") for axis in "xyz"}
+        least = {axis: found.spread(f"within_3sigma.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
         console.print(f"Least of a flight: {text}", highlight=False)
     if found.vehicles:
         _vehicles(console, found)
     if len(found) > 1 and not found.figures:
         console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
-    console.print(f"{found.scene}: {len(found) + len(found.refused['run'])} runs: {found.told}", highlight=False)
-    p = found.failure
+    runs = len(found) + len(found.refused["run"])
+    console.print(f"{found.scene}: {runs} runs: {found.outcome_text}", highlight=False)
+    p, failed = found.failure, ~found["success"].astype(bool)
     share = f"{p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
-    console.print(f"Failures: {share} (success: {' and '.join(found.folder.about['success']) or 'always'})")
-    failed = ~found["success"].astype(bool)
-    if late := int((found["verdict"][~failed] == "timed out").sum()):
-        console.print(
-            f"{late} of the successes timed out: [success] require = [\"verdict == 'landed'\"] lets them fail"
-        )
-    _list(console, "run", found["run"][failed], found["told"][failed])
-    _list(console, "refused: run", found.refused["run"], found.refused["told"])
+    criteria = " and ".join(found.folder.about["success"]) or "always"
+    style = "bold red" if failed.any() else "bold green"
+    console.print(f"Failures: {share} (success: {criteria})", style=style, markup=False, highlight=False)
+    if (farthest := found.spread("target_distance")) and failed.any():
+        text = f"median {farthest.median:.1f} m, worst {farthest.worst:.1f} m (run {farthest.run})"
+        console.print(f"Distance from the mission's target at the end: {text}", highlight=False)
+    _list(console, "run", found["run"][failed], found["outcome_text"][failed])
+    _list(console, "rejected: run", found.refused["run"], found.refused["outcome_text"])
 
 
 def _vehicles(console: Console, found: Results) -> None:
@@ -110,7 +111,7 @@ def write_json(path: Path, found: Results, digest: str) -> None:
     data = {
         "scene": found.scene,
         "runs": len(found) + len(found.refused["run"]),
-        "told": found.told,
+        "outcome_text": found.outcome_text,
         "failure": found.failure._asdict(),
         "figures": {name: s._asdict() for name, s in spreads.items() if s},
         "failed": found["run"][~found["success"].astype(bool)].tolist(),

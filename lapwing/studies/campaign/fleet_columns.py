@@ -6,11 +6,11 @@ from typing import Any
 
 from lapwing.services.common.success_criteria import Success
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
+from lapwing.studies.outcome import KINDS
 from lapwing.studies.separation import nearest
 
 NEAREST = "nearest"  # [m] least distance between two vehicles
-BAD = ("diverged", "crashed", "broken off", "timed out", "landed", "flown")  # kinds of verdicts, the worst first
 PLACES = ("touchdown.x", "touchdown.y")  # which of several has no meaning
 Row = dict[str, Any]
 
@@ -19,7 +19,10 @@ def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
     """The columns that the table of a fleet has besides those of a run: `left.rmse.x`, by name and type."""
     each = {f"{name}.success": bool for name in vehicles}
     figures = {
-        f"{v}.{name}": str if name == "verdict" else float for v in vehicles for name in FIGURES if name != "told"
+        f"{v}.{name}": str if name == "outcome" else float
+        for v in vehicles
+        for name in METRICS
+        if name != "outcome_text"
     }
     return {NEAREST: float, **each, **figures} if vehicles else {}
 
@@ -32,27 +35,29 @@ def joined(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], requir
         of_each: its figures.
         required: its `[success]`.
     """
-    found: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in FIGURES}
+    found: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in METRICS}
     unmet = {name: required[name].unmet(row) for name, row in of_each.items()}
     texts = [
-        f"{name}: {of_each[name]['told']}; not {', not '.join(missed)}" for name, missed in unmet.items() if missed
+        f"{name}: {of_each[name]['outcome_text']}; not {', not '.join(missed)}"
+        for name, missed in unmet.items()
+        if missed
     ]
-    found |= {"success": not texts, "told": "; ".join(texts)}
+    found |= {"success": not texts, "outcome_text": "; ".join(texts)}
     found[NEAREST] = nearest({name: flight.truth for name, flight in flights.items()}).distance
     for name, row in of_each.items():
-        found |= {f"{name}.{key}": value for key, value in row.items() if key != "told"}
+        found |= {f"{name}.{key}": value for key, value in row.items() if key != "outcome_text"}
         found[f"{name}.success"] = not unmet[name]
     return found
 
 
 def _worst(name: str, values: list[Any]) -> Any:
-    if name == "verdict":
-        return min(values, key=BAD.index)
-    if name == "told" or name in PLACES:
-        return "" if name == "told" else math.nan
+    if name == "outcome":
+        return max(values, key=KINDS.index)
+    if name == "outcome_text" or name in PLACES:
+        return "" if name == "outcome_text" else math.nan
     known = [value for value in values if not math.isnan(value)]
     if not known:
         return math.nan
     if name == "energy":
         return math.fsum(known)
-    return min(known) if name.startswith("inside.") else max(known)
+    return min(known) if name.startswith("within_3sigma.") else max(known)

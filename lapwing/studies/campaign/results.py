@@ -9,11 +9,14 @@ from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REFUSED
 from lapwing.studies.campaign.statistics import Interval, Spread, interval, spread
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
 from lapwing.studies.outcome import KINDS
 from lapwing.studies.tracking import AXES
 
-LEAST_IS_WORST = (NEAREST, *(f"inside.{axis}" for axis in "xyz"))  # of all other figures the greatest is the worst
+LEAST_IS_WORST = (
+    NEAREST,
+    *(f"within_3sigma.{axis}" for axis in "xyz"),
+)  # of all other figures the greatest is the worst
 
 
 class Results:
@@ -27,7 +30,7 @@ class Results:
 
     def __init__(self, folder: Folder):
         self.folder, everything = folder, folder.arrays()
-        taken = everything["verdict"] != REFUSED
+        taken = everything["outcome"] != REFUSED
         self.columns = {name: values[taken] for name, values in everything.items()}
         self.refused = {name: values[~taken] for name, values in everything.items()}
 
@@ -65,15 +68,15 @@ class Results:
         return interval(int((~self["success"].astype(bool)).sum()), len(self))
 
     @cached_property
-    def told(self) -> str:
-        """How many runs ended how: "97 landed, 3 crashed, 1 refused"."""
-        kinds = [(kind, int((self["verdict"] == kind).sum())) for kind in KINDS] + [(REFUSED, len(self.refused["run"]))]
+    def outcome_text(self) -> str:
+        """Number of runs of each outcome: "97 landed, 3 crashed, 1 rejected"."""
+        kinds = [(kind, int((self["outcome"] == kind).sum())) for kind in KINDS] + [(REFUSED, len(self.refused["run"]))]
         return ", ".join(f"{n} {kind}" for kind, n in kinds if n)
 
     @cached_property
     def figures(self) -> list[str]:
         """The figures that are numbers and differ between runs."""
-        numbers = [name for name in FIGURES if self.folder.kinds[name] is float]
+        numbers = [name for name in METRICS if self.folder.kinds[name] is float]
         return [name for name in numbers if len(np.unique(self[name][np.isfinite(self[name])])) > 1]
 
     @property

@@ -23,10 +23,10 @@ from lapwing.services.scene_resolver import load, reseed
 from lapwing.studies.campaign import fleet_columns
 from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
 from lapwing.studies.campaign.plan import Plan
-from lapwing.studies.metrics import FIGURES, check_success, figures, joint_end_state
+from lapwing.studies.metrics import METRICS, check_success, joint_end_state, metrics
 from lapwing.studies.simulate import fly_each
 
-REFUSED = "refused"  # the verdict on a run whose values the scene refuses
+REFUSED = "rejected"  # outcome of a run whose values the scene refuses
 TRIED = 16  # first runs, of which the scene has to take one at least, or else of as many all over the campaign
 _FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # of an absolute path
 _OURS = ("lapwing",)
@@ -65,7 +65,7 @@ def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
         drawn = next((d for k, d in plan.vary if k == key), None)
         values = [entry[key] for entry in plan.sweep if key in entry] if drawn is None else drawn.values
         found[key] = float if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values) else str
-    found |= {"success": bool, **{name: str if name in ("verdict", "told") else float for name in FIGURES}}
+    found |= {"success": bool, **{name: str if name in ("outcome", "outcome_text") else float for name in METRICS}}
     return {**found, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
 
 
@@ -114,7 +114,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     try:
         setup = setup_of(plan, run)
     except SceneError as error:
-        return {**row, **_of_refused(vehicles(plan)), "told": _refusal(error)}
+        return {**row, **_of_refused(vehicles(plan)), "outcome_text": _refusal(error)}
     flights = fly_each(setup, TOPICS, rows)
     row["end_state"] = joint_end_state(flights)
     scene = scene_of(plan)
@@ -122,12 +122,12 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
         by_name = {flight.vehicle: flight for flight in flights}
         required = {vehicle[Vehicle].name: vehicle[Success] for vehicle in scene.vehicles}
         return row | fleet_columns.joined(
-            by_name, {name: figures(flight) for name, flight in by_name.items()}, required
+            by_name, {name: metrics(flight) for name, flight in by_name.items()}, required
         )
-    found = figures(flights[0])
+    found = metrics(flights[0])
     unmet = scene[Success].unmet(found)
-    told = f"{found['told']}; not {', not '.join(unmet)}" if unmet else ""
-    return {**row, **found, "success": not unmet, "told": told}
+    told = f"{found['outcome_text']}; not {', not '.join(unmet)}" if unmet else ""
+    return {**row, **found, "success": not unmet, "outcome_text": told}
 
 
 def _refusal(error: SceneError) -> str:
@@ -139,10 +139,10 @@ def _refusal(error: SceneError) -> str:
 
 
 def _of_refused(names: tuple[str, ...]) -> Row:
-    found: Row = dict.fromkeys(FIGURES, math.nan)
+    found: Row = dict.fromkeys(METRICS, math.nan)
     for name, kind in fleet_columns.columns(names).items():
         found[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
-    return {**found, "verdict": REFUSED, "end_state": ""}
+    return {**found, "outcome": REFUSED, "end_state": ""}
 
 
 def setup_of(plan: Plan, run: int) -> RunConfig:

@@ -47,7 +47,7 @@ class Count(NamedTuple):
 def count(rows: Iterable[Row]) -> Count:
     """Of some rows."""
     kept = list(rows)
-    kinds = Counter(row["verdict"] for row in kept)
+    kinds = Counter(row["outcome"] for row in kept)
     return Count() + Count(len(kept), sum(row["success"] for row in kept), tuple(kinds.items()))
 
 

@@ -38,4 +38,4 @@ def end_state_of(run: int, folder: Path) -> str:
     if shard in found.missing():
         return ""
     row = next(row for row in found.rows(shard) if row["run"] == run)
-    return "" if row["verdict"] == REFUSED else row["end_state"]
+    return "" if row["outcome"] == REFUSED else row["end_state"]

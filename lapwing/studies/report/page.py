@@ -14,7 +14,7 @@ from lapwing.studies.report.plotly_figure import script
 from lapwing.studies.report.sections import Section, labels, long, sections
 from lapwing.studies.tracking import shown
 
-LOOKS = {"landed": "good", "flown": ""}  # of a verdict; "bad" for all others
+LOOKS = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
 _HERE = Path(__file__).parent
 _TEMPLATES = Environment(loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True)
 
@@ -39,7 +39,7 @@ def flight_page(flights: Sequence[FlightData]) -> str:
         name=" and ".join(names) if len(flights) > 1 else flights[0].metadata.get("scene") or names[0],
         title=" · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
         labels=names if len(flights) > 1 else (),
-        verdicts=[(LOOKS.get(flight.verdict.kind, "bad"), flight.verdict) for flight in flights],
+        outcomes=[(LOOKS.get(flight.outcome.kind, "bad"), flight.outcome) for flight in flights],
         events=[flight.events for flight in flights],
         facts={key: [one.get(key, "") for one in told] for key in dict.fromkeys(k for one in told for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},

@@ -87,7 +87,7 @@ def _corners(found: Tuned) -> Rows:
         "The flight with a vehicle that differs from the controller's model", "vehicle", "max. position error, m", "end"
     )
     for corner, f in found.corners.items():
-        rows.add(str(corner), f"{f['max_distance']:.3f}", f["verdict"])
+        rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"])
     return rows
 
 

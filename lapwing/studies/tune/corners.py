@@ -15,7 +15,7 @@ from lapwing.services.common.autopilot_parameters import of_gains
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import Effects, airframe, gravity, start_pose
 from lapwing.studies.campaign.campaign_config import TOPICS
-from lapwing.studies.metrics import figures
+from lapwing.studies.metrics import metrics
 from lapwing.studies.simulate import fly
 
 WRONG = 0.2  # of the nominal value
@@ -37,7 +37,7 @@ CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repea
 
 def flown(setup: RunConfig) -> dict[str, Any]:
     """Figures of a flight of which all that a campaign looks at is told at every tick."""
-    return figures(fly(setup, TOPICS))
+    return metrics(fly(setup, TOPICS))
 
 
 def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:

@@ -76,7 +76,7 @@ def polish(
         if lacking:
             return 10.0 + len(lacking)
         found = fly(gains)
-        if any(f["verdict"] != "landed" for f in found):
+        if any(f["outcome"] != "landed" for f in found):
             return 10.0
         ratio = float(np.mean([rmse(found, axis) / rmse(before, axis) for axis in judged]))
         seen[ratio] = bandwidths, gains, found
@@ -90,7 +90,8 @@ def polish(
     minimize(cost, at, method="Nelder-Mead", options=options)
     if not seen:
         what = next(
-            (f["told"] for f in before if f["verdict"] != "landed"), "none of those near it holds its margins and lands"
+            (f["outcome_text"] for f in before if f["outcome"] != "landed"),
+            "none of those near it holds its margins and lands",
         )
         raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
     bandwidths, gains, after = seen[min(seen)]

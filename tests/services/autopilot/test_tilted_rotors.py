@@ -36,8 +36,8 @@ def test_axes_along_z_are_those_of_rotors_without_axes():
 
 def test_a_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     flown = fly(load(SCENE))
-    assert str(flown.verdict).startswith("Landed")
-    assert "upright" in str(flown.verdict)
+    assert str(flown.outcome).startswith("Landed")
+    assert "upright" in str(flown.outcome)
     t = flown.setup.interval * np.arange(len(flown.truth))
     hover = (t > 6.5) & (t < 8.0)
     lift = flown.truth.rotor_thrust[hover].sum(axis=1).mean() * np.cos(np.radians(15.0))

@@ -13,7 +13,7 @@ from lapwing.studies.campaign.distributions import uniform
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, has_sobol
-from lapwing.studies.metrics import FIGURES
+from lapwing.studies.metrics import METRICS
 from lapwing.studies.report import matplotlib_figure
 
 KEYS = ("a", "b")
@@ -25,9 +25,9 @@ def table(runs, sweep=None, keys=KEYS, **values):
     made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
     drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in keys}
     kinds = {"run": int, "seed": int, **dict.fromkeys(keys, float), "success": bool}
-    kinds |= {name: str if name in ("verdict", "told") else float for name in FIGURES}
+    kinds |= {name: str if name in ("outcome", "outcome_text") else float for name in METRICS}
     found = {name: np.full(runs, np.nan) for name in kinds}
-    found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "verdict": np.full(runs, "landed", object)}
+    found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "outcome": np.full(runs, "landed", object)}
     about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
     arrays = found | drawn | {name: of(drawn) for name, of in values.items()}
     return Results(SimpleNamespace(arrays=lambda: arrays, plan=made, about=about, kinds=kinds))

@@ -14,7 +14,7 @@ from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.metrics import figures
+from lapwing.studies.metrics import metrics
 from lapwing.studies.report.plot import NotRecordedError
 from lapwing.studies.simulate import fly_each
 from tests.cosim.memory_log import fly
@@ -65,7 +65,7 @@ def test_a_row_has_the_worst_of_the_vehicles_and_each_of_them(folder):
     assert not found["success"].any()
     assert found["left.success"].all()
     assert not found["scout.success"].any()
-    assert all(text.startswith("scout: Timed out") for text in found["told"])
+    assert all(text.startswith("scout: Completed") for text in found["outcome_text"])
     assert 4.0 < found["nearest"].min() < 4.3  # they stand 4.24 m apart
     assert "Nearest of any two vehicles" in said
 
@@ -99,7 +99,7 @@ def test_a_run_is_its_figures_and_the_same_each_time():
     assert repr(first[0]) == repr(first[2])
     assert first[0]["end_state"] != first[1]["end_state"]
     flights = fly_each(resolve(load("fleet", [*SHORT, "run.seed=1", "rates.estimate=250"])), TOPICS)
-    assert figures(flights[1])["rmse.z"] == first[0]["right.rmse.z"]
+    assert metrics(flights[1])["rmse.z"] == first[0]["right.rmse.z"]
 
 
 def test_a_run_is_flown_again_to_the_bit(folder, tmp_path):

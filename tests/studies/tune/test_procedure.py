@@ -49,7 +49,7 @@ def test_the_same_scene_gives_the_same_gains(found):
 
 def test_every_corner_lands(found):
     assert len(found.corners) == 8
-    assert not [f["told"] for f in found.corners.values() if f["verdict"] != "landed"]
+    assert not [f["outcome_text"] for f in found.corners.values() if f["outcome"] != "landed"]
     assert max(f["max_distance"] for f in found.corners.values()) < 0.3
     assert len({f["max_distance"] for f in found.corners.values()}) == 8  # the corners are different vehicles
 

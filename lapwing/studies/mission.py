@@ -1,0 +1,70 @@
+"""Mission of a flight: the scene's trajectory or a flight plan, and where it ends."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.services.trajectory.block import TrajectoryPath
+from lapwing.studies.topic_view import TopicView
+
+
+class Mission(NamedTuple):
+    """Target of a mission, and whether the run can reach its end."""
+
+    target: tuple[float, float, float] | None  # [m] world, of its end; None if unknown before the flight
+    final_phase: str | None = None  # of a trajectory that ends in the air; None for missions that end with a landing
+    is_longer: bool = False  # the run ends before its trajectory
+
+    def completion(self, status: TopicView) -> str:
+        """Return the reason why a flight that has not landed is complete; "" if it is not."""
+        if self.is_longer:
+            return "the run ends before its trajectory"
+        has_phase = "phase" in status.fields and len(status) > 0
+        if has_phase and self.final_phase is not None and str(status.phase[-1]) == self.final_phase:
+            return "trajectory flown, ends in the air"
+        return ""
+
+
+def mission_of(setup: RunConfig, start: np.ndarray) -> Mission | None:
+    """Return the mission of a run configuration of one vehicle; None if it has none.
+
+    Args:
+        setup: run configuration.
+        start: initial position in the world frame, shape (3,) [m].
+    """
+    if "autopilot" not in setup.services:
+        return None
+    if items := _plan_items(setup.services["autopilot"].parameters):
+        return Mission(_plan_target(items, start))
+    if "trajectory" not in setup.services:
+        return None
+    trajectory = setup.services["trajectory"].parameters
+    if not isinstance(trajectory.core, TrajectoryPath):  # it follows another vehicle
+        return Mission(None)
+    path = trajectory.core.path
+    if setup.duration <= max(
+        float(path.phase_start[-1]), *(float(c.start[-1]) for c in (path.x, path.y, path.z, path.yaw))
+    ):
+        return Mission(None, is_longer=True)
+    ends_in_air = trajectory.core.final >= len(trajectory.phases)
+    ends = (float(channel.coefficients[-1][0]) for channel in (path.x, path.y, path.z))
+    x, y, z = (origin + end for origin, end in zip(path.origin_world, ends, strict=True))
+    return Mission((x, y, z), trajectory.phases[-1] if ends_in_air else None)
+
+
+def _plan_items(autopilot: Any) -> tuple[Any, ...]:
+    uploads = [command.items for command in getattr(autopilot, "plan", ()) if command.kind == "mission_upload"]
+    return tuple(uploads[-1]) if uploads else ()
+
+
+def _plan_target(items: tuple[Any, ...], start: np.ndarray) -> tuple[float, float, float] | None:
+    """Return the place of the last item that has one: the start for "return"."""
+    for item in reversed(items):
+        if item.action == "return":
+            x, y, z = map(float, start)
+            return x, y, z
+        place = (float(item.position.x), float(item.position.y), float(item.position.z))
+        if item.action in ("waypoint", "loiter_time", "land", "takeoff") and np.isfinite(place[:2]).all():
+            return place
+    return None
