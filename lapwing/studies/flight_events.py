@@ -7,10 +7,10 @@ import numpy as np
 
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.ground_contacts import touches
-from lapwing.studies.model_validity import warnings
+from lapwing.studies.model_validity import validity_warnings
 from lapwing.studies.planned_faults import planned
-from lapwing.studies.saturation import saturation, stretches
-from lapwing.studies.tension import pushes, told
+from lapwing.studies.saturation import intervals, saturation
+from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
 BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
@@ -18,34 +18,34 @@ ORDER = tuple(KINDS)  # at the same time
 
 
 class Event(NamedTuple):
-    """Something that happened."""
+    """One event."""
 
     time: float  # [s]
-    kind: str  # of lapwing.services.common.event_kinds.KINDS
+    kind: str  # one of lapwing.services.common.event_kinds.KINDS
     text: str
 
 
 def events(
     truth: TopicView, status: TopicView | None, setpoint: TopicView | None, armed: np.ndarray, scene: dict[str, Any]
 ) -> list[Event]:
-    """All events of a flight in their order.
+    """Return all events of a flight in order of time.
 
     Args:
-        truth: the true state.
-        status: of the autopilot; None where nobody steers: then only planned faults are told.
-        setpoint: that was followed, if any.
-        armed: whether the motors are armed, at the first n times of `truth`, shape (n,).
-        scene: its tables.
+        truth: true state.
+        status: autopilot status; None without an autopilot: then only planned faults are listed.
+        setpoint: setpoint that was followed, if any.
+        armed: True where the motors are armed, at the first n times of `truth`, shape (n,).
+        scene: tables of the scene.
     """
     end = float(truth.times[-1]) if len(truth) else 0.0
     found = [Event(time, "fault", text) for time, text in planned(scene) if time <= end]
     if status is not None and len(status):
-        found += _said(status)
+        found += _status_events(status)
         found += _contacts(truth)
-        found += [Event(doubt.start, "warning", doubt.text) for doubt in warnings(truth, scene)]
+        found += [Event(warning.start, "warning", warning.text) for warning in validity_warnings(truth, scene)]
         highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
         if highest is not None and len(armed):
-            found += _saturations(truth, armed, highest)
+            found += _saturation(truth, armed, highest)
     if setpoint is not None and len(setpoint):
         phases = changes(setpoint.times, setpoint.phase)
         found += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
@@ -54,35 +54,35 @@ def events(
 
 
 def ordered(found: Iterable[Event]) -> list[Event]:
-    """Events in their order."""
+    """Return events in order of time; simultaneous ones in the order of their kinds."""
     return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
 
 
 def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:
-    """Where a link pushes: a rigid one can, a cable would be slack, and the flight is not one on cables.
+    """Return the times at which a rigid link pushes, where a cable would be slack.
 
     Args:
-        bodies: the load and the quadrotors.
-        lift: their thrusts.
-        load: the scene's table [cooperative_load].
+        bodies: poses of the load and the quadrotors.
+        lift: thrusts of the quadrotors.
+        load: table [cooperative_load] of the scene.
     """
-    every = told(bodies, lift, load)
+    forces = link_tension(bodies, lift, load)
     found = []
-    for k in range(every.shape[1]):
-        for push in pushes(bodies.times[: len(every)], every[:, k]):
+    for k in range(forces.shape[1]):
+        for push in pushes(bodies.times[: len(forces)], forces[:, k]):
             text = f"link {k + 1} pushes until {push.stop:.3f} s with up to {push.most:.3g} N: a cable would be slack"
             found.append(Event(round(push.start, 9), "slack", text))
     return sorted(found)
 
 
 def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
-    """Time [s] and value at the beginning and wherever the value becomes another."""
+    """Yield time [s] and value at the beginning and at every change."""
     rows = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
     return ((float(t[k]), values[k]) for k in rows)
 
 
-def _said(status: TopicView) -> Iterator[Event]:
-    """What the autopilot said of itself."""
+def _status_events(status: TopicView) -> Iterator[Event]:
+    """Yield the events in the autopilot status."""
     t, known = status.times, set(status.fields)
     if "armed" in known:
         for time, armed in list(changes(t, status.armed)):
@@ -117,15 +117,17 @@ def _contacts(truth: TopicView) -> Iterator[Event]:
             yield Event(float(t[touch.stop]), "contact", "leaves the ground")
 
 
-def _saturations(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
+def _saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
+    """Yield one event for all times at which a motor is at a limit."""
     found, t = saturation(truth, armed, highest), truth.times
-    for first, stop in stretches(found.any, t):
-        some = slice(first, stop)
-        low, high = (np.flatnonzero(at[some].any(axis=0)) + 1 for at in (found.low, found.high))
-        where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
-        lasted = float(found.step[some][found.any[some]].sum())
-        share = 100.0 * found.share(lasted)
-        yield Event(float(t[first]), "motors", f"{', '.join(where)} for {lasted:.2f} s, {share:.2g} % of the flight")
+    times = intervals(found.any, t)
+    if not times:
+        return
+    low, high = (np.flatnonzero(at.any(axis=0)) + 1 for at in (found.low, found.high))
+    where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
+    count = f" ({len(times)} times)" if len(times) > 1 else ""
+    share = f"{100.0 * found.share(found.lasted):.2g} % of the time in the air"
+    yield Event(float(t[times[0][0]]), "motors", f"{', '.join(where)} for {found.lasted:.2f} s{count}, {share}")
 
 
 def _motors(numbers: np.ndarray) -> str:

@@ -1,53 +1,63 @@
-"""Where a flight leaves what its models are valid for: in the flow of its own rotors, off the terrain's grid."""
+"""Validity warnings: a flight in the vortex ring of its rotors, or beyond the edge of the terrain grid."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.studies.saturation import stretches
+from lapwing.studies.saturation import intervals
 from lapwing.studies.topic_view import TopicView
 
-# Of the rotors' induced velocity in hover: descent between these, slower across than this (after Leishman, Principles
-# of Helicopter Aerodynamics, section 2.13: momentum theory has no solution that is measured there)
+SHORTEST = 0.5  # [s] in all; less is not reported
+# Vortex ring state, in units of the induced velocity in hover: descent between these, slower across than this (after
+# Leishman, Principles of Helicopter Aerodynamics, section 2.13)
 SLOWEST_DESCENT, FASTEST_DESCENT, FASTEST_ACROSS = 0.5, 1.5, 1.0
 
 
 class ValidityWarning(NamedTuple):
-    """A stretch of a flight where it is not to be trusted."""
+    """Part of a flight in which a model is used outside its range."""
 
-    start: float  # [s]
+    start: float  # [s] of the first time
     text: str
 
 
-def warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
-    """All of a flight, in no order.
+def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
+    """Return one warning for each model that is used outside its range for 0.5 s or more.
 
     Args:
-        truth: the true state.
-        scene: its tables.
+        truth: true state.
+        scene: tables of the scene.
     """
-    found = []
+    warnings = []
     diameter = _table(scene, "airframe", "propeller").get("diameter")
     if diameter and {"rotor_thrust", "air_density", "wind"} <= set(truth.fields):
-        for start, stop in stretches(in_vortex_ring(truth, diameter), truth.times):
-            lasted = _seconds(truth, start, stop)
-            text = f"descends into the vortex ring of its rotors for {lasted} s: their thrust is not sure there"
-            found.append(ValidityWarning(float(truth.times[start]), text))
+        in_ring = in_vortex_ring(truth, diameter)
+        warnings += _warning(truth, in_ring, "descent in vortex ring state", "the thrust is uncertain")
     grid = _table(scene, "environment", "terrain", "grid")
     if grid.get("heights"):
-        for start, stop in stretches(off_the_grid(truth, grid), truth.times):
-            lasted = _seconds(truth, start, stop)
-            text = f"is beyond the edge of the terrain's grid for {lasted} s: the ground is level across it there"
-            found.append(ValidityWarning(float(truth.times[start]), text))
-    return found
+        text = "the ground is assumed level across the edge"
+        warnings += _warning(truth, off_the_grid(truth, grid), "beyond the edge of the terrain grid", text)
+    return warnings
+
+
+def _warning(truth: TopicView, where: np.ndarray, name: str, consequence: str) -> list[ValidityWarning]:
+    """Return the warning on the times at which something holds, or none if they are shorter than `SHORTEST`."""
+    step = np.diff(truth.times, append=truth.times[-1])
+    seconds, flight = float(step[where].sum()), float(step[~truth.ground_contact].sum())
+    if seconds < SHORTEST:
+        return []
+    found = intervals(where, truth.times)
+    times = f" ({len(found)} times)" if len(found) > 1 else ""
+    share = 100.0 * min(1.0, seconds / max(flight, 1e-9))
+    text = f"{name} for {seconds:.1f} s{times}, {share:.2g} % of the time in the air: {consequence}"
+    return [ValidityWarning(float(truth.times[found[0][0]]), text)]
 
 
 def in_vortex_ring(truth: TopicView, diameter: float) -> np.ndarray:
-    """Whether the rotors descend into their own flow, shape (n,) of bool.
+    """Return True where the rotors descend into their own flow, shape (n,).
 
     Args:
-        truth: of n messages.
-        diameter: of the rotors [m].
+        truth: true state, n messages.
+        diameter: diameter of the rotors [m].
     """
     x, y, z, w = truth.orientation.T
     axis = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
@@ -62,7 +72,7 @@ def in_vortex_ring(truth: TopicView, diameter: float) -> np.ndarray:
 
 
 def off_the_grid(truth: TopicView, grid: dict[str, Any]) -> np.ndarray:
-    """Whether the vehicle is where the terrain's grid has no heights, shape (n,) of bool."""
+    """Return True where the vehicle is beyond the edge of the terrain grid, shape (n,)."""
     (x, y), spacing = grid.get("corner", (0.0, 0.0)), grid.get("spacing", 1.0)
     rows, columns = np.shape(grid["heights"])
     px, py = truth.position[:, 0] - x, truth.position[:, 1] - y
@@ -73,7 +83,3 @@ def _table(scene: dict[str, Any], *path: str) -> dict[str, Any]:
     for key in path:
         scene = scene.get(key) or {}
     return scene
-
-
-def _seconds(truth: TopicView, start: int, stop: int) -> str:
-    return f"{truth.times[min(stop, len(truth.times) - 1)] - truth.times[start]:.1f}"

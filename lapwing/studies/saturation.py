@@ -1,4 +1,4 @@
-"""When motors are at a limit of their voltage in the air."""
+"""Motor saturation: motors at a limit of their voltage in the air."""
 
 import functools
 from typing import Any, NamedTuple
@@ -10,11 +10,11 @@ from lapwing.studies.topic_view import TopicView
 from lapwing.studies.tracking import plain, strided
 
 NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
-APART = 1.0  # [s] stretches that are nearer to each other are told as one
+GAP = 1.0  # [s] shorter gaps do not separate two intervals
 
 
 class Saturation(NamedTuple):
-    """Where motors are at a limit while the vehicle flies."""
+    """Motors at a limit of their voltage while the vehicle flies."""
 
     low: np.ndarray  # at no voltage, shape (n, motors) of bool
     high: np.ndarray  # at the highest
@@ -23,22 +23,22 @@ class Saturation(NamedTuple):
 
     @property
     def any(self) -> np.ndarray:
-        """Whether any motor is at a limit, shape (n,)."""
+        """True where any motor is at a limit, shape (n,)."""
         at_limit = self.low | self.high
         return functools.reduce(np.logical_or, at_limit.T) if at_limit.any() else np.zeros(len(at_limit), bool)
 
     @property
     def lasted(self) -> float:
-        """Time in all at which a motor is at a limit [s]."""
+        """Total time with a motor at a limit [s]."""
         return float(self.step[self.any].sum())
 
     def share(self, seconds: float) -> float:
-        """A time [s] as a share of the time in the air."""
+        """Return a time [s] as a share of the time in the air."""
         return seconds / max(float(self.step[self.flying].sum()), 1e-9)
 
 
 def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturation:
-    """Where motors are at 0 or at the `highest` voltage [V] while the vehicle flies.
+    """Return the motors at 0 or at the `highest` voltage [V] while the vehicle flies.
 
     Args:
         truth: of n or more messages.
@@ -53,7 +53,7 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
 
 
 def limits(voltage: np.ndarray, flying: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where motors are at 0, and where at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
+    """Return the motors at 0 and those at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
     low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
     _limits(low, high, strided(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
     return low, high
@@ -67,12 +67,12 @@ def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: 
             high[row, k] = flying[row] and voltage[row, k] > most
 
 
-def stretches(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
-    """Rows (first, one after the last) of stretches where something holds, those close to each other as one."""
+def intervals(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
+    """Return the rows (first, stop) of the intervals in which something holds; short gaps are closed."""
     edges = np.diff(where.astype(np.int8), prepend=0, append=0)
     merged: list[tuple[int, int]] = []
     for start, stop in zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True):
-        if merged and t[start] - t[merged[-1][1] - 1] < APART:
+        if merged and t[start] - t[merged[-1][1] - 1] < GAP:
             merged[-1] = merged[-1][0], stop
         else:
             merged.append((start, stop))

@@ -1,4 +1,4 @@
-"""Tension of the links that carry a load together, from what the bodies and their control said."""
+"""Tension of the links of a shared load, from recorded poses and thrusts."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -9,24 +9,24 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.kernels import python_function
 from lapwing.studies.topic_view import TopicView
 
-GAP = 0.05  # [s] between two stretches of pushing that are told as one
+GAP = 0.05  # [s] shorter gaps do not separate two pushes
 
 
 class Push(NamedTuple):
-    """A stretch in which a link pushes, where a cable would be slack."""
+    """Interval in which a link pushes, where a cable would be slack."""
 
-    start: float  # [s] at which the tension vanishes
+    start: float  # [s] time at which the tension vanishes
     stop: float  # [s]
     most: float  # [N]
 
 
 def tension(position: np.ndarray, velocity: np.ndarray, force: np.ndarray, load: Mapping[str, Any]) -> np.ndarray:
-    """Tension of each of k links [N], negative where it pushes (theory.md, eq. (7.28)), shape (n, k).
+    """Return the tension of k links [N], negative where they push (theory.md, eq. (7.28)), shape (n, k).
 
     Args:
-        position: of the load and the quadrotors [m], world, shape (n, 1 + k, 3).
-        velocity: the same [m/s].
-        force: of each quadrotor's rotors [N], world, shape (n, k, 3).
+        position: positions of the load and the quadrotors [m], world, shape (n, 1 + k, 3).
+        velocity: their velocities [m/s], world, shape (n, 1 + k, 3).
+        force: rotor force of each quadrotor [N], world, shape (n, k, 3).
         load: quad_mass [kg], link_length [m], load_mass [kg], as in the scene's table [cooperative_load].
     """
     mass, length = np.array(load["quad_mass"]), np.array(load["link_length"])
@@ -36,12 +36,12 @@ def tension(position: np.ndarray, velocity: np.ndarray, force: np.ndarray, load:
     along = np.sum(q * force, axis=2)
     inertia = load["load_mass"] * np.eye(3) + np.einsum("i,nij,nik->njk", mass, q, q)
     pull = np.einsum("ni,nij->nj", along - mass * centripetal, q)
-    specific = np.linalg.solve(inertia, pull[..., None])[..., 0]  # of the load, less gravity
+    specific = np.linalg.solve(inertia, pull[..., None])[..., 0]  # [m/s^2] acceleration of the load, less gravity
     return mass * (np.einsum("nij,nj->ni", q, specific) + centripetal) - along
 
 
-def told(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> np.ndarray:
-    """`tension` of a flight, from the topics "bodies", the load first, and "lift"."""
+def link_tension(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> np.ndarray:
+    """Return the `tension` of a flight from the topics "bodies" (the load first) and "lift"."""
     n = min(len(bodies), len(lift))
     x, y, z, w = np.moveaxis(bodies.orientation[:n, 1:], 2, 0)
     matrix = python_function(rotation_matrix)((w, x, y, z))
@@ -50,11 +50,11 @@ def told(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> np.ndar
 
 
 def pushes(t: np.ndarray, tension: np.ndarray) -> list[Push]:
-    """Where one link pushes; the beginning is on the line between the two samples around it.
+    """Return the intervals in which one link pushes; their start is interpolated linearly.
 
     Args:
         t: times [s], shape (n,).
-        tension: of the link [N], shape (n,).
+        tension: tension of the link [N], shape (n,).
     """
     rows = np.flatnonzero(tension < 0.0)
     if not len(rows):

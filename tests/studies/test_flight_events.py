@@ -1,4 +1,4 @@
-"""What happened in flights made up, as a list."""
+"""Events of synthetic flights."""
 
 import numpy as np
 import synthetic_flights
@@ -13,11 +13,12 @@ SCENE = {
 }
 
 
-def flown():
+def flown(voltage=None):
     """Up at 1 s; two motors at their limit from 2 s on for 0.2 s; a failsafe at 3 s; down at 4 s."""
     flying = (T >= 1.0) & (T < 4.0)
-    voltage = np.full((TICKS, 4), 20.0)
-    voltage[200:220, [0, 2]] = 40.0
+    if voltage is None:
+        voltage = np.full((TICKS, 4), 20.0)
+        voltage[200:220, [0, 2]] = 40.0
     truth = {
         "pose.position": (0.0, 0.0, 0.35),
         "pose.orientation": synthetic_flights.LEVEL,
@@ -44,7 +45,7 @@ def flown():
     )
 
 
-def test_everything_that_happened_is_told_in_its_order():
+def test_events_are_listed_in_order():
     assert [tuple(event) for event in flown().events] == [
         (0.0, "mode", "mission"),
         (0.0, "phase", "climb"),
@@ -52,7 +53,7 @@ def test_everything_that_happened_is_told_in_its_order():
         (1.0, "contact", "leaves the ground"),
         (2.0, "fault", "gps: dropout until 3 s"),
         (2.0, "phase", "hover"),
-        (2.0, "motors", "motors 1, 3 at 40 V for 0.20 s, 6.7 % of the flight"),
+        (2.0, "motors", "motors 1, 3 at 40 V for 0.20 s, 6.7 % of the time in the air"),
         (2.5, "fault", "rotor 2 keeps 30 % of its thrust"),
         (2.8, "fault", "motor 2 noticed to have failed"),
         (3.0, "failsafe", "a motor has failed"),
@@ -64,5 +65,13 @@ def test_everything_that_happened_is_told_in_its_order():
     ]
 
 
-def test_without_an_autopilot_there_is_nothing_to_tell():
+def test_flight_without_an_autopilot_has_no_events():
     assert synthetic_flights.moved([0.0, 1.0]).events == []
+
+
+def test_saturation_is_one_event_with_its_share():
+    voltage = np.full((TICKS, 4), 20.0)
+    voltage[120:130, 0] = voltage[300:330, 2] = 40.0
+    (event,) = [event for event in flown(voltage).events if event.kind == "motors"]
+    assert event.time == 1.2
+    assert event.text == "motors 1, 3 at 40 V for 0.40 s (2 times), 13 % of the time in the air"

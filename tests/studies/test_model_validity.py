@@ -1,4 +1,4 @@
-"""Descents by hand, and a walk off a grid."""
+"""Validity warnings of computed descents and of a path beyond a terrain grid."""
 
 import math
 
@@ -31,33 +31,39 @@ def ring(*velocity, **how):
     return bool(in_vortex_ring(flown(velocity, **how).truth, 0.5).all())
 
 
-def test_the_ring_is_between_half_and_one_and_a_half_induced_velocities_down():
+def test_vortex_ring_limits_in_induced_velocities():
     assert [ring(0.0, 0.0, -f * HOVER) for f in (0.0, 0.45, 0.55, 1.0, 1.45, 1.55)] == [0, 0, 1, 1, 1, 0]
     assert not ring(1.1 * HOVER, 0.0, -HOVER)
     assert ring(0.9 * HOVER, 0.0, -HOVER)
 
 
-def test_it_is_the_air_along_the_rotors_axis_that_counts():
+def test_vortex_ring_depends_on_air_along_the_rotor_axis():
     assert ring(0.0, 0.0, 0.0, wind=(0.0, 0.0, HOVER))
     quarter = math.sqrt(0.5)
     assert ring(-HOVER, 0.0, 0.0, turned=(0.0, quarter, 0.0, quarter))  # nose down: body z is world x
     assert not ring(HOVER, 0.0, 0.0, turned=(0.0, quarter, 0.0, quarter))
 
 
-def test_it_is_told_once_with_how_long():
+def test_vortex_ring_is_one_warning_with_its_share():
     t = np.arange(400) / 100
-    down = np.where((t >= 1.0) & (t < 2.5), -HOVER, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
-    said = [event for event in flown(down).events if event.kind == "warning"]
-    assert [(event.time, event.text[:54]) for event in said] == [
-        (1.0, "descends into the vortex ring of its rotors for 1.5 s:")
-    ]
+    inside = ((t >= 1.0) & (t < 2.0)) | ((t >= 3.2) & (t < 3.7))
+    down = np.where(inside, -HOVER, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    (warning,) = [event for event in flown(down).events if event.kind == "warning"]
+    assert warning.time == 1.0
+    assert "vortex ring state for 1.5 s (2 times), 38 % of the time in the air" in warning.text
 
 
-def test_off_the_grid_is_told():
+def test_short_vortex_ring_is_not_reported():
+    t = np.arange(400) / 100
+    down = np.where((t >= 1.0) & (t < 1.3), -HOVER, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    assert not [event for event in flown(down).events if event.kind == "warning"]
+
+
+def test_flight_beyond_the_terrain_grid_is_reported():
     grid = {"heights": [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]], "corner": [-1.0, -2.0], "spacing": 2.0}
     x = np.linspace(0.0, 4.0, 400)
     walk = np.column_stack([x, 0 * x - 1.0, 0 * x + 9.0])
     scene = {**SCENE, "environment": {"terrain": {"grid": grid}}}
-    said = [e for e in flown((1.0, 0.0, 0.0), scene=scene, position=walk).events if e.kind == "warning"]
-    assert [round(event.time, 1) for event in said] == [3.0]
-    assert said[0].text.startswith("is beyond the edge of the terrain's grid for 1.0 s")
+    (warning,) = [e for e in flown((1.0, 0.0, 0.0), scene=scene, position=walk).events if e.kind == "warning"]
+    assert round(warning.time, 1) == 3.0
+    assert "beyond the edge of the terrain grid for 1.0 s" in warning.text
