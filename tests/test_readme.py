@@ -1,4 +1,4 @@
-"""What the README tells its reader to type works as written."""
+"""Commands and Python blocks of the README and of the page of commands by task run as written."""
 
 import os
 import re
@@ -15,9 +15,10 @@ pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
+PAGES = README + (ROOT / "docs/guides/cookbook.md").read_text()
 COMMANDS = [
     line.partition(" #")[0].strip()
-    for block in re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
+    for block in re.findall(r"```sh\n(.*?)```", PAGES, flags=re.DOTALL)
     for line in block.splitlines()
 ]
 FLOWN = [c for c in COMMANDS if c.startswith("lapwing ")]
@@ -67,26 +68,26 @@ def _run(command, key_prefix, folder, before):
 
 
 @pytest.mark.parametrize("command", FLOWN)
-def test_lapwing_commands_run_as_written(command, begun):
+def test_readme_command_runs(command, begun):
     done = begun[command].result()
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("make ")])
-def test_make_targets_exist(command):
+def test_readme_make_target_exists(command):
     target = command.split()[1]
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c.startswith("docker compose ")])
-def test_compose_services_exist(command):
+def test_readme_compose_service_exists(command):
     service = command.split()[-1]
     assert re.search(rf"^  {service}:$", (ROOT / "docker-compose.yml").read_text(), flags=re.MULTILINE)
 
 
-def test_the_python_blocks_run_in_order(folder, monkeypatch):
+def test_readme_python_blocks_run(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", PAGES, flags=re.DOTALL)
     assert blocks
     names: dict = {}
     for block in blocks:
@@ -94,6 +95,10 @@ def test_the_python_blocks_run_in_order(folder, monkeypatch):
     assert (folder / "flight.html").stat().st_size > 10_000
 
 
-def test_links_and_pictures_lead_somewhere():
+def test_readme_links_resolve():
     for target in re.findall(r"\]\(([^)]+)\)", README):
         assert (ROOT / target).exists(), target
+
+
+def test_readme_is_short():
+    assert len(README.splitlines()) <= 80

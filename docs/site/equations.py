@@ -27,4 +27,5 @@ def _mathml(match: re.Match[str]) -> str:
     number = _TAG.search(latex)
     equation = convert(_TAG.sub("", latex), display="block" if opening == "[" else "inline")
     right = f'<span style="float:right">({number[1]})</span>' if number else ""
-    return f"<{tag}>{right}{equation}</{tag}>"
+    style = ' style="margin:1em 0;overflow:auto"' if tag == "div" else ""
+    return f"<{tag}{style}>{right}{equation}</{tag}>"
