@@ -92,7 +92,7 @@ audit: $(VENV)/audit/bin/pip-audit
 # A wheel that contains the compiled kernels of a scene for processors like this machine's; others compile their own.
 SHIPS ?= delivery_mission
 wheel: $(VENV)/.installed
-	LAPWING_CACHE=lapwing/kernels/shipped $(BIN)/lapwing warm $(SHIPS)
+	LAPWING_CACHE=lapwing/kernels/shipped $(BIN)/lapwing precompile $(SHIPS)
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	rm -r build/lib lapwing/kernels/shipped
 

@@ -30,7 +30,7 @@ def main(log=None):
     with tempfile.TemporaryDirectory() as folder:
         if log is None:
             log = str(Path(folder, "log.mcap"))
-            words = ["run", "delivery_mission", "--mode", "single", "--log", log]
+            words = ["run", "delivery_mission", "--mode", "single-process", "--log", log]
             subprocess.run([sys.executable, "-m", "lapwing", *words], check=True, stdout=subprocess.DEVNULL)
         chunks, index, files = contents(log)
         print(f"{Path(log).stat().st_size / 1e6:.2f} MB: index of messages {index / 1e6:.2f}, files {files / 1e6:.2f}")

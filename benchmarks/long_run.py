@@ -20,7 +20,7 @@ def main(most=600):
     with tempfile.TemporaryDirectory() as folder:
         seconds = 75
         while seconds <= most:
-            words = ["run", "delivery_mission", "--mode", "single", *HOVERS, "--set", f"run.duration={seconds}"]
+            words = ["run", "delivery_mission", "--mode", "single-process", *HOVERS, "--set", f"run.duration={seconds}"]
             processor, peak = taken([*LAPWING, *words, "--log", f"{folder}/{seconds}.mcap"])
             print(
                 f"{seconds:7} s simulated: {processor:6.1f} s of processor time, {peak:6.0f} MB at the most", flush=True

@@ -28,14 +28,14 @@ def fly(mode, folder):
 
 def main(repeats=3):
     with tempfile.TemporaryDirectory() as folder:
-        fly("single", folder)
-        runs = {mode: [fly(mode, folder) for _ in range(repeats)] for mode in ("processes", "single")}
+        fly("single-process", folder)
+        runs = {mode: [fly(mode, folder) for _ in range(repeats)] for mode in ("multi-process", "single-process")}
         assert len({run["digest"] for mode in runs.values() for run in mode}) == 1, "the digests differ"
         size = size_mb(Path(folder, "log.mcap"))
     factor = {mode: median(run["real_time_factor"] for run in figures) for mode, figures in runs.items()}
     found = [
-        Row("mission, one process, to real time", factor["single"], "", 150.0, True),
-        Row("mission, a process for each service, to real time", factor["processes"], "", 18.6, True),
+        Row("mission, one process, to real time", factor["single-process"], "", 150.0, True),
+        Row("mission, a process for each service, to real time", factor["multi-process"], "", 18.6, True),
         Row("log of the mission", size, "MB", 5.0),
     ]
     show(found)

@@ -33,7 +33,7 @@ print(json.dumps({"wall": wall, "busy": busy, "size": path.stat().st_size}))
 def main(repeats=5):
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder, "log.mcap"))
-        words = ["run", SCENE, "--mode", "single", "--log", log]
+        words = ["run", SCENE, "--mode", "single-process", "--log", log]
         subprocess.run([sys.executable, "-m", "lapwing", *words], check=True, stdout=subprocess.DEVNULL)
         for ending in ("html", "pdf", "png"):
             command = [sys.executable, "-c", WRITE, log, str(Path(folder, f"report.{ending}"))]

@@ -35,6 +35,7 @@ class Version(NamedTuple):
     run: list[str]  # what every run is told
     effect: list[str]  # one more effect
     campaign: list[str]  # of one seed
+    modes: tuple[str, str]  # values of --mode: one process, a process for each service
 
 
 class Taken(NamedTuple):
@@ -69,7 +70,7 @@ def compiled(version, environment, *arguments):
 
 def compile_times(version):
     """By what is compiled [s]."""
-    single = ("--mode", "single")
+    single = ("--mode", version.modes[0])
     with empty_cache() as environment:
         yield "hover", compiled(version, environment, "run", HOVER, *single)
     with empty_cache() as environment:
@@ -82,9 +83,9 @@ def compile_times(version):
 
 def flights(version, repeats):
     """By what is flown, kernels compiled before: seconds of the whole command, or the factor of real time."""
-    for mode in ("single", "processes"):
+    for mode, value in zip(("single", "processes"), version.modes, strict=True):
         for scene in (HOVER, MISSION):
-            taken = [took(version, None, "run", scene, "--mode", mode) for _ in range(repeats + 1)][1:]
+            taken = [took(version, None, "run", scene, "--mode", value) for _ in range(repeats + 1)][1:]
             if scene == HOVER:
                 yield f"hover, {mode}, the whole command", median(t.wall for t in taken)
             else:
@@ -107,9 +108,11 @@ def versions(folder):
     subprocess.run(["make", "--silent", ".venv/.installed"], cwd=first, check=True)
     drag = ["--set", "effects.body_drag.area=[0.06,0.06,0.06]"]
     return (
-        Version(first, [str(first / ".venv/bin/lapwing")], ["--space", "benchmark"], drag, ["--seeds", "1"]),
+        Version(first, [str(first / ".venv/bin/lapwing")], ["--space", "benchmark"], drag, ["--seeds", "1"],
+                ("single", "processes")),
         Version(ROOT, LAPWING, ["--key-prefix", "benchmark"], [*drag, "--set", "effects.wind_random.beside_drag=true"],
-                ["--runs", "1", "--workers", "1", "--out", "{folder}/campaign"]),
+                ["--runs", "1", "--workers", "1", "--out", "{folder}/campaign"],
+                ("single-process", "multi-process")),
     )  # fmt: skip
 
 

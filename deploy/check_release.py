@@ -32,7 +32,7 @@ def check(python: str, wheel: Path) -> None:
         if {name for name in added if not name.endswith(".dist-info")} != {"lapwing"}:
             raise SystemExit(f"{wheel.name}: installs {', '.join(sorted(added))}; expected lapwing alone")
         subprocess.run([*pip, "install", wheel], check=True)
-        subprocess.run([environment / "bin/lapwing", "run", "hover", "--mode", "single"], cwd=work, check=True)
+        subprocess.run([environment / "bin/lapwing", "run", "hover", "--mode", "single-process"], cwd=work, check=True)
         print(f"{python}: {wheel.name} installs one package and flies")
 
 

@@ -103,7 +103,7 @@ for file in recordings/mission.json "$(field recordings/mission.json log)" "$(fi
 done
 passed "landed; log and report are there and belong to $owner"
 
-"$LAPWING" run $SCENE --mode single --log local.mcap --json local.json > local.log 2>&1 ||
+"$LAPWING" run $SCENE --mode single-process --log local.mcap --json local.json > local.log 2>&1 ||
     { tail -5 local.log >&2; fail "the local run failed"; }
 there=$(field recordings/mission.json digest)
 here=$(field local.json digest)

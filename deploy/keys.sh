@@ -23,7 +23,7 @@ sound() {
 if ! sound; then
     made=$(mktemp -d)
     trap 'rm -rf "$made"' EXIT
-    lapwing keys "$made/keys" > /dev/null
+    lapwing certificates "$made/keys" > /dev/null
     rm -f keys/*/authority.pem # whatever ends this early: what is left is not sound
     for own in keys/*; do
         for file in key.pem zenoh.json5 certificate.pem authority.pem; do

@@ -1,6 +1,6 @@
 """Manifests of a run on Kubernetes: a pod for each service, which only the others reach, with its certificate.
 
-    lapwing keys keys
+    lapwing certificates keys
     python deploy/kubernetes.py delivery_mission | kubectl apply -f -
 
 docs/guides/several_hosts.md tells the rest.
@@ -131,7 +131,7 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
                 {
                     "name": name,
                     "image": image,
-                    "args": [*command, "--peers", table, "--keys", "keys"],
+                    "args": [*command, "--endpoints", table, "--keys", "keys"],
                     "securityContext": restricted,
                     "resources": resources,
                     "ports": [{"name": "zenoh", "containerPort": PORT}],

@@ -23,7 +23,7 @@ def note(event: str, arguments: tuple[Any, ...]) -> None:
 
 
 sys.addaudithook(note)
-sys.argv = ["lapwing", "warm"]
+sys.argv = ["lapwing", "precompile"]
 try:
     main()
 except SystemExit as end:

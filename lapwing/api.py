@@ -55,7 +55,7 @@ def fly(
             of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
             `lapwing.services.common.controller_api`. A class in a module of its own becomes part of the flight's
             set-up, so that
-            `lapwing refly` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
+            `lapwing resimulate` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
         controller_options: of the constructor of the class: numbers, texts, lists of numbers, by name.
         estimator: the same of an estimator, with `step(time, readings)`; see `lapwing.services.common.estimator_api`.
         estimator_options: the same.

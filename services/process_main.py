@@ -34,7 +34,7 @@ class ProcessSpec(NamedTuple):
     core: int | None = None  # core that all services of a sequential lock step share
     log: str = ""  # path of the recorder's log
     sources: dict[str, str] | None = None  # the files that were resolved, for the log; text by name
-    mode: str = "processes"  # of the run, for the log
+    mode: str = "multi-process"  # of the run, for the log
     open: tuple[str, ...] = ()  # endpoints for clients
     mavlink: tuple[str, ...] = ()  # URLs of links
     mavlink_key: str = ""  # path of a passphrase

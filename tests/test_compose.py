@@ -16,7 +16,7 @@ from pymavlink import mavutil
 from lapwing.cosim.access.certificates import make
 from lapwing.cosim.access.zenoh_access import VIEWER
 from lapwing.cosim.processes.run_monitor import MONITOR
-from lapwing.runs.distributed_run import parse_peers
+from lapwing.runs.distributed_run import parse_endpoints
 from lapwing.services import process_table as processes
 from lapwing.services import security
 from lapwing.services.scene_resolver import load, resolve
@@ -92,7 +92,9 @@ def test_every_image_is_a_stage_of_the_dockerfile():
 
 def own_certificates(services):
     """The participant whose certificate each service that takes part in a flight needs."""
-    taking_part = {name: service["command"] for name, service in services.items() if "--peers" in service["command"]}
+    taking_part = {
+        name: service["command"] for name, service in services.items() if "--endpoints" in service["command"]
+    }
     return {name: command[2] if command[1] == "service" else name for name, command in taking_part.items()}
 
 
@@ -122,15 +124,15 @@ def test_links_between_containers_are_certified_unless_that_is_asked_for():
     services, opened = compose(), compose(SCHEME="tcp", LINKS="--insecure")
     for name in own_certificates({name: each for name, each in services.items() if "command" in each}):
         command, insecure = services[name]["command"], opened[name]["command"]
-        k = command.index("--peers") + 1
+        k = command.index("--endpoints") + 1
         assert command[k + 1] == "--keys=keys"
-        assert {endpoint.partition("/")[0] for endpoint in parse_peers(command[k]).values()} == {"tls"}
+        assert {endpoint.partition("/")[0] for endpoint in parse_endpoints(command[k]).values()} == {"tls"}
         # of what nobody but this host reaches: MAVLink's ports, and Foxglove's
         assert ("--insecure" in command) == (name in ("groundstation", "foxglove"))
-        if "--open" in command:
-            assert command[command.index("--open") + 1].startswith("tls/")
+        if "--listen" in command:
+            assert command[command.index("--listen") + 1].startswith("tls/")
         assert insecure[k + 1] == "--insecure"
-        assert {endpoint.partition("/")[0] for endpoint in parse_peers(insecure[k]).values()} == {"tcp"}
+        assert {endpoint.partition("/")[0] for endpoint in parse_endpoints(insecure[k]).values()} == {"tcp"}
 
 
 def test_containers_are_closed():
@@ -152,8 +154,8 @@ def test_containers_are_closed():
 def endpoints():
     """The names in the table of participants, and who is started by `docker compose up mission`."""
     mission = compose()["mission"]
-    table = mission["command"][mission["command"].index("--peers") + 1]
-    return parse_peers(table), {"mission", *mission["depends_on"]} - {"keys"}
+    table = mission["command"][mission["command"].index("--endpoints") + 1]
+    return parse_endpoints(table), {"mission", *mission["depends_on"]} - {"keys"}
 
 
 @pytest.mark.parametrize("scene", sorted(Path("scenes").glob("*.toml")), ids=lambda path: path.stem)

@@ -128,7 +128,7 @@ def draw(path: Path) -> None:
             python = not isinstance(part, Block)
             lines.append((f"{name} (Python)", ORANGE) if python else (name, DARK))
         process(axes, SERVICES[service.name], f"{number}  {service.name}", lines if len(lines) > 1 else [])
-    what = {"recorder": "log.mcap", "router": "--open: topics for clients", "mavlink": "--mavlink"}
+    what = {"recorder": "log.mcap", "router": "--listen: topics for clients", "mavlink": "--mavlink"}
     what |= {"foxglove": "--foxglove", "ros2": "--ros2"}
     for entry in PROCESSES:
         if not entry.lock_step:

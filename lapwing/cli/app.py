@@ -1,9 +1,32 @@
-"""The application that the commands belong to."""
+"""The Typer application, and the groups in which its help lists the commands."""
+
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+GROUPS = {  # in the order of a workflow
+    "Fly": ("scenes", "check", "run", "service"),
+    "Look": ("report", "view", "parameters"),
+    "Study": ("performance", "effects", "accuracy", "stability", "tune", "campaign", "compare"),
+    "Logs": ("info", "verify", "recover", "export", "replay", "resimulate"),
+    "Set up": ("new", "precompile", "certificates", "protocol", "schema"),
+}
+
+
+class GroupedCommands(TyperGroup):
+    """Lists the commands under the headings of `GROUPS`, others last."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each command with the whole first line of its help."""
+        grouped = {name for names in GROUPS.values() for name in names}
+        others = tuple(name for name in self.list_commands(ctx) if name not in grouped)
+        for heading, names in {**GROUPS, "Other": others}.items():
+            commands = {name: self.get_command(ctx, name) for name in names}
+            rows = [(n, (c.help or "").partition("\n")[0]) for n, c in commands.items() if c and not c.hidden]
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
+
+
+app = typer.Typer(add_completion=False, cls=GroupedCommands, pretty_exceptions_enable=False, rich_markup_mode=None)

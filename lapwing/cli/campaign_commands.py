@@ -1,4 +1,4 @@
-"""Campaigns: many runs of a scene, and two campaigns beside each other."""
+"""Campaigns: many runs of a scene, and the comparison of two campaigns."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +9,7 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_folder, claim_report
-from lapwing.cli.preflight import decided
+from lapwing.cli.preflight import with_solver_selected
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lapwing.studies.campaign.runs import Reference
     from lapwing.studies.campaign.shard_loop import Workers
 
-LINES = 5.0  # [s] between two lines of progress where there is no terminal
+LINES = 5.0  # [s] between progress lines without a terminal
 
 
 @app.command()
@@ -27,43 +27,46 @@ def campaign(
     scene: SceneFile,
     set_: Overrides = None,
     runs: Annotated[
-        int | None, typer.Option(metavar="N", help="how many [100, or the lines of the sweep, the points of the grid]")
+        int | None, typer.Option(metavar="N", help="number of runs [100, or the size of the sweep or grid]")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="S", help="of the campaign: of every run's seed and draws")] = 1,
+    seed: Annotated[int, typer.Option(metavar="S", help="seed of the campaign, from which all runs draw")] = 1,
     vary: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=DISTRIBUTION",
-            help="a key that varies: vehicle.mass=normal(10.4,0.2), autopilot.gains=choice(a.toml,b.toml) (repeatable)",
+            help="random scene key: vehicle.mass=normal(10.4,0.2), autopilot.gains=choice(a.toml,b.toml) (repeatable)",
         ),
     ] = None,
     sweep: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="keys that vary together: a column each, a line for a run")
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="table of scene keys: a column for each key, a row for each run"),
     ] = None,
     design: Annotated[
-        str, typer.Option(metavar="random|lhs|sobol|grid", help="how the runs fill the space of what varies")
+        str, typer.Option(metavar="random|lhs|sobol|grid", help="sampling of the random keys")
     ] = "random",
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="its folder; the same command goes on there [campaigns/...]")
+        Path | None,
+        typer.Option(metavar="DIR", help="campaign folder; repeating the command resumes it [campaigns/...]"),
     ] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="write the table as CSV, too")] = False,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write what it came to as JSON")] = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="the report [DIR/report.html]")
-    ] = None,
-    until_ci: Annotated[
+    csv: Annotated[bool, typer.Option("--csv", help="also write the table of runs as CSV")] = False,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the results as JSON")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [DIR/report.html]")] = None,
+    ci_half_width: Annotated[
         float | None,
-        typer.Option("--until-ci", metavar="P", help="end when the failure probability is known to +-P (95 %)"),
+        typer.Option("--ci-half-width", metavar="P", help="stop once the failure probability is known to +-P (95 %)"),
     ] = None,
-    workers: Annotated[int | None, typer.Option(metavar="N", help="processes [one for each core]")] = None,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="number of processes [one for each core]")] = None,
     cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="fly on a Dask cluster: tcp://scheduler:8786")
+        str | None, typer.Option(metavar="ADDRESS", help="run on a Dask cluster, e.g. tcp://scheduler:8786")
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="fly the I-th of N parts only: for arrays of batch jobs")
+        str | None, typer.Option(metavar="I/N", help="run part I of N only, for arrays of batch jobs")
     ] = None,
 ) -> None:
-    """Fly a scene many times with what varies drawn anew: errors as distributions, and how often it fails."""
+    """Fly a scene many times with random parameters.
+
+    Reports error distributions, the failure probability, and which parameters matter.
+    """
     from lapwing.studies.campaign import console_output
     from lapwing.studies.campaign.campaign_report import write
     from lapwing.studies.campaign.distributions import parse
@@ -75,12 +78,14 @@ def campaign(
     with user_errors():
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
-        if until_ci is not None and not 0.0 < until_ci < 1.0:
-            raise ValueError(f"--until-ci {until_ci:g}: expected a probability between 0 and 1, for example 0.01")
-        if until_ci is not None and shard is not None:
-            raise ValueError("--until-ci: a part does not know how the others end; expected without --shard")
+        if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:
+            raise ValueError(
+                f"--ci-half-width {ci_half_width:g}: expected a probability between 0 and 1, for example 0.01"
+            )
+        if ci_half_width is not None and shard is not None:
+            raise ValueError("--ci-half-width: needs the results of all runs; leave out --shard")
         if cluster is not None and workers is not None:
-            raise ValueError("--workers: a cluster has its own; expected without --cluster")
+            raise ValueError("--workers: a cluster has its own workers; leave out --cluster")
         check_distinct({"SCENE": scene, "--sweep": sweep, "--json": json, "--report": report})
         claim(json)
         claim_report("--report", report)
@@ -90,68 +95,70 @@ def campaign(
             if not equals or not key:
                 raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
             if key in varied:
-                raise ValueError(f"--vary {text}: {key} has a distribution already; expected one of each key")
+                raise ValueError(f"--vary {text}: {key} already has a distribution; give one for each key")
             try:
                 varied[key] = parse(drawn)
             except ValueError as fault:
                 raise ValueError(f"--vary {text}: {fault}") from None
-        given = plan(str(scene), decided(scene, set_ or []).overrides, runs, seed, varied, sweep, design)
-        first = _reference(screen, given)
-        about = manifest(given, first)
-        folder = begin(out or default_path(about), given, about)
+        campaign_plan = plan(
+            str(scene), with_solver_selected(scene, set_ or []).overrides, runs, seed, varied, sweep, design
+        )
+        first = _reference(screen, campaign_plan)
+        about = manifest(campaign_plan, first)
+        folder = begin(out or default_path(about), campaign_plan, about)
         claim_folder(folder.path, shared=shard is not None)
         part = _part(shard, len(folder.shards))
-        _fly(screen, folder, first, _workers(screen, cluster, workers, folder), until_ci, part)
+        _fly(screen, folder, first, _workers(screen, cluster, workers, folder), ci_half_width, part)
         if shard is not None and folder.missing():
-            screen.print(f"{folder.path}: part {shard} is done; {len(folder.missing())} shards are still missing")
+            screen.print(f"{folder.path}: part {shard} complete, {len(folder.missing())} shards missing")
             return
-        digest, found = folder.finish(csv), Results(folder)
-        console_output.show(screen, found)
+        digest, results = folder.finish(csv), Results(folder)
+        console_output.show(screen, results)
         if json:
-            console_output.write_json(json, found, digest)
+            console_output.write_json(json, results, digest)
         page = report or folder.path / "report.html"
-        if len(found):
-            write(page, found)
+        if len(results):
+            write(page, results)
             screen.print(f"{'report':<7} {page}", soft_wrap=True)
         screen.print(f"{'digest':<7} {digest}\n{'folder':<7} {folder.path}", soft_wrap=True)
 
 
 @app.command()
 def compare(
-    one: Annotated[Path, typer.Argument(metavar="DIR", help="the folder of a campaign")],
-    other: Annotated[Path, typer.Argument(metavar="DIR", help="of another one with the same seed")],
+    one: Annotated[Path, typer.Argument(metavar="DIR", help="folder of a campaign")],
+    other: Annotated[Path, typer.Argument(metavar="DIR", help="folder of a second campaign with the same seed")],
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the differences as JSON")] = None,
 ) -> None:
-    """Two campaigns beside each other, run by run: what the second does better or worse, with intervals."""
+    """Compare two campaigns run by run, with confidence intervals."""
     from lapwing.studies.campaign import campaign_comparison as study
     from lapwing.studies.terminal import console
 
     with user_errors():
         claim(json)
-        found = study.compare(one, other)
-        study.show(console(), found)
+        result = study.compare(one, other)
+        study.show(console(), result)
         if json:
-            study.write_json(json, found)
+            study.write_json(json, result)
 
 
 def _reference(screen: "Console", given: "Plan") -> "Reference":
-    from lapwing.runs.compile_notice import told
+    from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.studies.campaign.runs import first_setup, reference
 
     run, setup = first_setup(given)
-    with told(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
+    with notify_on_compile(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
         return reference(run, setup)
 
 
 def _part(shard: str | None, shards: int) -> range | None:
-    """The shards of the I-th of N parts."""
+    """Return the shards of part I of N, None for all."""
     if shard is None:
         return None
     i, _, n = shard.partition("/")
     if not (i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n)):
         raise ValueError(f"--shard {shard}: expected I/N with I from 1 to N, for example 3/8")
     if int(n) > shards:
-        raise ValueError(f"--shard {shard}: this campaign has {shards} shards; expected at most I/{shards}")
+        raise ValueError(f"--shard {shard}: the campaign has {shards} shards; expected at most I/{shards}")
     return range(int(i) - 1, shards, int(n))
 
 

@@ -1,4 +1,4 @@
-"""What a log holds, whether two are the same, what is left of a damaged one, and a log as tables."""
+"""Logs: summary, verification, recovery and export."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,27 +7,26 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import DIFFERENT, fail, user_errors
+from lapwing.cli.options import LogFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_folder
 
 if TYPE_CHECKING:
     from lapwing.studies.logs.log_comparison import Comparison
     from lapwing.studies.logs.log_info import Info
 
-LogFile = Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")]
-
 
 @app.command()
 def info(log: LogFile) -> None:
-    """Tell what a log holds: its making, its topics, what happened, and where messages are missing."""
+    """Show the origin, topics, events and gaps of a log."""
     from lapwing.cli.run_summary import fleet, show_events
     from lapwing.studies.logs.log_info import info as look
     from lapwing.studies.terminal import console
 
     with user_errors():
-        found = look(log)
-        for label, line in _about(found).items():
+        result = look(log)
+        for label, line in _about(result).items():
             typer.echo(f"  {label:<9} {line}")
-        for line in _topics(found):
+        for line in _topics(result):
             typer.echo(line)
         flights = fleet(log)
         for flight in flights:
@@ -39,9 +38,14 @@ def info(log: LogFile) -> None:
 @app.command()
 def verify(
     log: LogFile,
-    other: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="another one, to compare it with")] = None,
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="second log, to compare with the first")
+    ] = None,
 ) -> None:
-    """Recompute a log's digest, or find the first message at which two logs differ; exit code 3 where they do."""
+    """Check the digest of a log, or find where two logs differ.
+
+    Exit codes: 2 invalid input, 3 the digest or the logs differ.
+    """
     from lapwing.cosim.log import LogReader
 
     with user_errors():
@@ -49,28 +53,28 @@ def verify(
             from lapwing.studies.logs.log_comparison import compare
 
             check_distinct({"FILE": log, "the second FILE": other})
-            found = compare(log, other)
-            for line in _differences(found):
+            comparison = compare(log, other)
+            for line in _differences(comparison):
                 typer.echo(line)
-            if not found.same:
+            if not comparison.same:
                 fail(f"{log} and {other} differ", DIFFERENT)
-            typer.echo(f"{log} and {other}: the same messages")
+            typer.echo(f"{log} and {other}: identical messages")
             return
         with LogReader(log) as read:
             stated, computed = read.metadata.get("digest"), read.digest()
         if stated is None:
-            raise ValueError(f"{log}: states no digest to compare with; expected a log that has its end")
+            raise ValueError(f"{log}: has no digest; expected a complete log (lapwing recover completes one)")
         if stated != computed:
-            fail(f"{log}: states the digest {stated}, its messages have {computed}", DIFFERENT)
-        typer.echo(f"{log}: digest {stated}, as its messages have it")
+            fail(f"{log}: digests differ: recorded {stated}, computed {computed}", DIFFERENT)
+        typer.echo(f"{log}: digest {stated} is correct")
 
 
 @app.command()
 def recover(
     log: LogFile,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="where to write it [FILE_recovered.mcap]")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="recovered log [FILE_recovered.mcap]")] = None,
 ) -> None:
-    """Write what is left of a log without an end, or with damaged parts, as a whole log."""
+    """Write the intact messages of a damaged log to a new log."""
     from lapwing.cosim.log.recover import recover as save
 
     with user_errors():
@@ -86,12 +90,16 @@ def recover(
 @app.command()
 def export(
     log: LogFile,
-    parquet: Annotated[Path | None, typer.Option(metavar="FOLDER", help="an Apache Parquet file a topic")] = None,
-    csv: Annotated[Path | None, typer.Option(metavar="FOLDER", help="a CSV file a topic")] = None,
-    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="a MATLAB file with a struct a topic")] = None,
-    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="only these")] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="write an Apache Parquet file for each topic")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FOLDER", help="write a CSV file for each topic")] = None,
+    mat: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write a MATLAB file with a struct for each topic")
+    ] = None,
+    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="export only these topics")] = None,
 ) -> None:
-    """Write a log as tables for other programs: one a topic, numbers and texts with their units."""
+    """Write a log as CSV, Parquet or MATLAB tables with units."""
     from lapwing.cosim.log import LogReader
     from lapwing.studies.logs import log_export as tables
 
@@ -116,7 +124,7 @@ def export(
 
 
 def _about(found: "Info") -> dict[str, str]:
-    """What `info` tells of the whole, by label."""
+    """Return the header lines of `info` by label."""
     said = found.metadata
     solver = f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else ""
     exchange = f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else ""
@@ -136,14 +144,14 @@ def _about(found: "Info") -> dict[str, str]:
         "failure": said.get("failure", ""),
         "waited": f"{said['waited_for_disk']} for the disk" if "waited_for_disk" in said else "",
         "recovered": said.get("recovered", ""),
-        "end": "" if found.complete else "none, its writer was ended; lapwing recover makes a whole log of it",
+        "end": "" if found.complete else "none, the recorder was ended; use lapwing recover",
     }
     lines |= {f"no {command}": f"lacks {what}" for command, what in found.missing.items()}
     return {label: line for label, line in lines.items() if line}
 
 
 def _topics(found: "Info") -> list[str]:
-    """A line for each topic, under a head, in columns."""
+    """Return the topic table of `info` as lines."""
     rows = [("topic", "messages", "rate [Hz]", "kB", "type", "gaps")]
     for topic in found.topics:
         rate = f"{topic.rate:g}" if topic.rate else ""
@@ -160,7 +168,7 @@ def _topics(found: "Info") -> list[str]:
 
 
 def _differences(found: "Comparison") -> list[str]:
-    """What `verify` tells of two logs that differ."""
+    """Return the lines that `verify` prints for two different logs."""
     lines = [f"{key}: {one or 'none'} | {other or 'none'}" for key, (one, other) in found.about.items()]
     lines += [
         f"only in the {where}: {', '.join(o)}" for where, o in zip(("first", "second"), found.only, strict=True) if o

@@ -1,171 +1,176 @@
-"""A log again: published as it was, or flown with its inputs."""
+"""Playback of logs: published with the recorded timing, or resimulated from the recorded inputs."""
 
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.endpoint_checks import check_links, check_published, check_ros2, mavlink_options
+from lapwing.cli.endpoint_checks import check_published
 from lapwing.cli.error_exit import fail, user_errors
-from lapwing.cli.options import (
-    FoxgloveAddress,
-    Insecure,
-    KeyPrefix,
-    MavlinkKey,
-    MavlinkUrls,
-    Ros2Domain,
-    Ros2Router,
-    Speed,
-    parse_speed,
-)
+from lapwing.cli.options import KeyPrefix, LinkOptions, LogFile, Speed, parse_speed, with_options
 from lapwing.cli.output_paths import check_log
 
 if TYPE_CHECKING:
-    from lapwing.services.mavlink.link_options import Options
     from lapwing.services.mavlink.link_server import LinkServer
 
 
-def _recorded_hubs(log: Path, options: "Options", stack: ExitStack) -> "dict[str, LinkServer]":
-    """The links of each vehicle of a log, by its name; those of a fleet wait with the first's."""
-    from lapwing.cosim.config.provenance import SETUP_FILE
-    from lapwing.cosim.diagram.multi_vehicle import members
-    from lapwing.cosim.log import LogReader
-    from lapwing.runs.resimulate import recorded_setup
-    from lapwing.services.mavlink.link_server import LinkServer
-    from lapwing.services.mavlink.links import numbered
-    from lapwing.services.mavlink.vehicle_description import VehicleDescription
+@dataclass(frozen=True, kw_only=True)
+class ReplayOptions(LinkOptions):
+    """Options of `lapwing replay`."""
 
-    with LogReader(log) as recorded:
-        if SETUP_FILE in recorded.attachments:
-            flown = {m.vehicle: m.beside.get("mavlink") for m in members(recorded_setup(recorded))}
-        else:  # another tool's, or a part of one
-            flown = {next((t.split("/")[1] for t in recorded.topics() if t.endswith("/status")), "drone1"): None}
-    hubs: dict[str, LinkServer] = {}
-    for i, (name, description) in enumerate(flown.items()):
-        own = options._replace(urls=tuple(numbered(url, i) for url in options.urls))
-        hub = LinkServer(description or VehicleDescription(name), own, None, next(iter(hubs.values()), None))
-        hubs[name] = stack.enter_context(hub)
-    return hubs
+    log: LogFile
+    speed: Speed = "1"
+    start: Annotated[float, typer.Option("--from", metavar="S", help="first simulation time to play")] = 0.0
+    end: Annotated[float | None, typer.Option("--to", metavar="S", help="last simulation time to play")] = None
+    loop: Annotated[bool, typer.Option("--loop", help="start over at the end")] = False
+    topics: Annotated[
+        str | None, typer.Option(metavar="TOPIC,...", help="play only these topics, e.g. /clock,/drone1/imu")
+    ] = None
+    key_prefix: KeyPrefix = "lapwing"
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="endpoint at which subscribers connect")] = (
+        "tcp/127.0.0.1:7447"
+    )
+    record: Annotated[Path | None, typer.Option(metavar="FILE", help="write the published messages to a log")] = None
 
+    def validate(self) -> None:
+        """Raise ValueError for options that are malformed, unsafe, or do not go together."""
+        from lapwing.cosim.transport.key_prefix import check_key_prefix
 
-def _topics(log: Path) -> dict[str, str]:
-    """The type of each topic of a log."""
-    from lapwing.cosim.log import LogReader
-
-    with LogReader(log) as recorded:
-        return recorded.topics()
+        check_key_prefix(self.key_prefix)
+        if self.record and self.loop:
+            raise ValueError("--record and --loop exclude each other; leave out one")
+        if self.record and self.record.resolve() == self.log.resolve():
+            raise ValueError(f"--record {self.record}: is the replayed log; choose another file")
+        check_log(self.record)
+        check_published("--listen", self.listen, self.insecure)
+        self.validate_links()
 
 
 @app.command()
-def replay(
-    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
-    speed: Speed = "1",
-    start: Annotated[float, typer.Option("--from", metavar="S", help="begin at this simulation time")] = 0.0,
-    end: Annotated[float | None, typer.Option("--to", metavar="S", help="end at this simulation time")] = None,
-    loop: Annotated[bool, typer.Option("--loop", help="begin again at the end")] = False,
-    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="only these: /clock,/drone1/imu")] = None,
-    key_prefix: KeyPrefix = "lapwing",
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="where subscribers connect")] = "tcp/127.0.0.1:7447",
-    record: Annotated[Path | None, typer.Option(metavar="FILE", help="also write what is published to a log")] = None,
-    mavlink: MavlinkUrls = None,
-    mavlink_key: MavlinkKey = None,
-    insecure: Insecure = False,
-    foxglove: FoxgloveAddress = None,
-    ros2: Ros2Domain = None,
-    ros2_router: Ros2Router = None,
-) -> None:
-    """Publish a log on Zenoh with its own timing, as the live run did.
+@with_options
+def replay(options: ReplayOptions) -> None:
+    """Publish a log on Zenoh with its recorded timing.
 
-    In a terminal the space bar holds it and lets it go on, a full stop lets one instant go, q ends it.
+    Keys in a terminal: space pauses and continues, a full stop plays one instant, q quits.
     """
     from lapwing.cli.keyboard import Keyboard
     from lapwing.cosim.processes.interrupt import Stop
-    from lapwing.cosim.transport.key_prefix import check_key_prefix
-    from lapwing.services.foxglove.server import check_address
     from lapwing.services.replay.playback_clock import Pace
     from lapwing.services.replay.playback_schedule import Cut
     from lapwing.services.replay.player import play
 
+    log = options.log
     with user_errors():
-        check_key_prefix(key_prefix)
-        cut, factor = Cut.of(start, end), parse_speed(speed)
-        if record and loop:
-            raise ValueError("--record and --loop exclude each other: a log has an end")
-        if record and record.resolve() == log.resolve():
-            raise ValueError(f"--record {record}: is the log that is replayed; choose another file")
-        check_log(record)
-        check_published("--listen", listen, insecure)
-        check_links(mavlink, mavlink_key)
-        if foxglove is not None:
-            check_address(foxglove, insecure)
-        router = check_ros2(ros2, ros2_router, insecure)
+        cut, factor = Cut.of(options.start, options.end), parse_speed(options.speed)
+        options.validate()
         with ExitStack() as stack:
-            hubs: dict[str, LinkServer] = {}
-            if mavlink:
-                hubs = _recorded_hubs(log, mavlink_options(mavlink, mavlink_key, insecure, log, factor), stack)
-            listeners: list[Callable[[str, int, bytes], None]] = [hub.replay for hub in hubs.values()]
+            servers = _link_servers(options, factor, stack)
+            viewers = _viewers(options, stack)
+            listeners: list[Callable[[str, int, bytes], None]] = [server.replay for server in servers.values()]
+            listeners += [viewer.put for viewer in viewers]
 
             def wait(seconds: float) -> None:
-                leading, *others = hubs.values()
-                leading.wait(seconds)
+                first, *others = servers.values()
+                first.wait(seconds)
                 for other in others:
                     other.adapter.tick(time.monotonic())
 
-            viewers: list[Any] = []
-            if foxglove is not None or ros2 is not None:
-                kinds = _topics(log)
-            if foxglove is not None:
-                from lapwing.services.foxglove.server import Server
-
-                viewers.append(stack.enter_context(Server(foxglove, insecure)))
-            if ros2 is not None:
-                from lapwing.services.ros2.node import Node
-
-                viewers.append(stack.enter_context(Node(ros2, router, insecure)))
-            for viewer in viewers:
-                for topic, kind in kinds.items():
-                    viewer.declare(topic, kind)
-                listeners.append(viewer.put)
             stop = stack.enter_context(Stop())
             keyboard = stack.enter_context(Keyboard())
-            pace = Pace(keyboard.keys, typer.echo, wait if hubs else time.sleep)
             count = play(
                 log,
-                key_prefix,
-                listen,
+                options.key_prefix,
+                options.listen,
                 cut,
                 factor,
-                loop,
-                record,
+                options.loop,
+                options.record,
                 lambda: stop.number is not None,
                 lambda *message: [listener(*message) for listener in listeners],
-                pace,
-                topics.split(",") if topics is not None else None,
+                Pace(keyboard.keys, typer.echo, wait if servers else time.sleep),
+                options.topics.split(",") if options.topics is not None else None,
             )
-            for name, hub in hubs.items():
-                for line in hub.report():
-                    typer.echo(f"mavlink: {f'{name}: ' if len(hubs) > 1 else ''}{line}")
+            for name, server in servers.items():
+                for line in server.report():
+                    typer.echo(f"mavlink: {f'{name}: ' if len(servers) > 1 else ''}{line}")
             stop.check()
-        typer.echo(f"{log}: {count} messages published" + (f", recorded to {record}" if record else ""))
+        typer.echo(f"{log}: {count} messages published" + (f", recorded to {options.record}" if options.record else ""))
+
+
+def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack) -> "dict[str, LinkServer]":
+    """Open the MAVLink links of each recorded vehicle, by its name; the first server polls for the others."""
+    if not options.mavlink:
+        return {}
+    from lapwing.cosim.config.provenance import SETUP_FILE
+    from lapwing.cosim.diagram.multi_vehicle import members
+    from lapwing.cosim.log import LogReader
+    from lapwing.runs.resimulate import recorded_setup
+    from lapwing.services.mavlink.link_options import Options
+    from lapwing.services.mavlink.link_server import LinkServer
+    from lapwing.services.mavlink.links import numbered
+    from lapwing.services.mavlink.signing import read_key
+    from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+    with LogReader(options.log) as reader:
+        if SETUP_FILE in reader.attachments:
+            vehicles = {m.vehicle: m.beside.get("mavlink") for m in members(recorded_setup(reader))}
+        else:  # written by another tool
+            vehicles = {next((t.split("/")[1] for t in reader.topics() if t.endswith("/status")), "drone1"): None}
+    key = read_key(options.mavlink_key) if options.mavlink_key else None
+    servers: dict[str, LinkServer] = {}
+    for i, (name, description) in enumerate(vehicles.items()):
+        urls = tuple(numbered(url, i) for url in options.mavlink)
+        link = Options(urls, key, options.insecure, options.log, speed=speed)
+        first = next(iter(servers.values()), None)
+        servers[name] = stack.enter_context(LinkServer(description or VehicleDescription(name), link, None, first))
+    return servers
+
+
+def _viewers(options: ReplayOptions, stack: ExitStack) -> list[Any]:
+    """Start the Foxglove server and the ROS 2 node of the options, with all topics of the log declared."""
+    from lapwing.cosim.log import LogReader
+
+    viewers: list[Any] = []
+    if options.foxglove is not None:
+        from lapwing.services.foxglove.server import Server
+
+        viewers.append(stack.enter_context(Server(options.foxglove, options.insecure)))
+    if options.ros2 is not None:
+        from lapwing.services.ros2.node import Node
+
+        viewers.append(stack.enter_context(Node(options.ros2, options.router, options.insecure)))
+    if viewers:
+        with LogReader(options.log) as reader:
+            topics = reader.topics()
+        for viewer in viewers:
+            for topic, kind in topics.items():
+                viewer.declare(topic, kind)
+    return viewers
 
 
 @app.command()
-def refly(
-    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
-    run_code: Annotated[bool, typer.Option("--run-code", help="run the Python modules that the log carries")] = False,
+def resimulate(
+    log: LogFile,
+    allow_code: Annotated[
+        bool, typer.Option("--allow-code", help="allow Python modules stored in the log to run")
+    ] = False,
 ) -> None:
-    """Fly a log's scene again with the recorded commands at their ticks: the same digest, or exit code 1."""
+    """Repeat a recorded run from its log and compare digests.
+
+    Exit codes: 1 the digests differ, 2 invalid input.
+    """
     from lapwing.cli.progress import Display
-    from lapwing.runs import resimulate as again
+    from lapwing.runs import resimulate as runs
     from lapwing.studies.terminal import console
 
     with user_errors():
         with Display(console(), 0.0) as display:
-            before, after = again.refly(log, display, run_code)
-        if before != after:
-            fail(f"{log}: digest {before}, flown again {after}: not the same", 1)
-        typer.echo(f"{log}: flown again, the same digest {after}")
+            recorded, computed = runs.resimulate(log, display, allow_code)
+        if recorded != computed:
+            fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", 1)
+        typer.echo(f"{log}: resimulated, digest {computed} is identical")

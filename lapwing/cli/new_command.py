@@ -8,7 +8,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 
-new = typer.Typer(help="Write files to begin with.", rich_markup_mode=None)
+new = typer.Typer(help="Create a scene, airframe, effect or other extension.", rich_markup_mode=None)
 app.add_typer(new, name="new")
 
 EFFECT = '''"""Linear air drag: an effect of your own.

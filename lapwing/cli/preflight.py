@@ -1,4 +1,4 @@
-"""A scene with everything decided: integrator and step where it asks for an accuracy."""
+"""Preparation of a scene: solver selection, success criteria, gain check."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from lapwing.cosim.scene import Scene
 
 
-def decided(path: Path, overrides: list[str]) -> "Scene":
-    """The scene, with integrator and step chosen where it asks for an accuracy instead."""
+def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
+    """Load a scene; if it sets `solver.accuracy`, select integrator and step."""
     from lapwing.services.plant.schema import Solver
     from lapwing.services.scene_resolver import load
     from lapwing.studies.metrics import check_success
@@ -18,7 +18,7 @@ def decided(path: Path, overrides: list[str]) -> "Scene":
     scene = load(path, overrides)
     for vehicle in scene.vehicles or (scene,):
         check_success(vehicle)
-    if scene.vehicles or not scene[Solver].undecided:  # of several vehicles each would choose its own
+    if scene.vehicles or not scene[Solver].undecided:  # each vehicle of several would select its own
         return scene
     from lapwing.studies.accuracy import solver_selection
 
@@ -28,7 +28,7 @@ def decided(path: Path, overrides: list[str]) -> "Scene":
 
 
 def warn_of_gains(scene: "Scene") -> None:
-    """Say which of the autopilot's loops are unstable, a line each; the scene may be flown all the same."""
+    """Print a warning for each unstable control loop."""
     from lapwing.services.autopilot.stability_check import unstable_loops
 
     for vehicle in scene.vehicles or (scene,):

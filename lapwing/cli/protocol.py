@@ -1,4 +1,4 @@
-"""`lapwing protocol`: what a program of one's own has to know of a scene to take part in it."""
+"""`lapwing protocol`: bus protocol of a scene, for external services."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,17 +9,24 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import claim
-from lapwing.cli.preflight import decided
+from lapwing.cli.preflight import with_solver_selected
 
 
 @app.command()
 def protocol(
     scene: SceneFile,
     set_: Overrides = None,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as JSON, with the whole set-up")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the services and what they hand on")] = None,
+    json: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write the protocol and the run configuration as JSON")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write a diagram of the services and their ports")
+    ] = None,
 ) -> None:
-    """What each service of a scene takes and gives: ports, periods, columns (docs/reference/protocol.md)."""
+    """Show the ports, periods and columns of each service.
+
+    docs/reference/protocol.md describes the protocol for external services.
+    """
     import json as json_module
 
     from lapwing.cosim.transport.packet_layout import layout
@@ -28,27 +35,27 @@ def protocol(
     with user_errors():
         claim(json)
         claim(plot)
-        setup = resolve(decided(scene, set_ or []))
+        setup = resolve(with_solver_selected(scene, set_ or []))
         found = layout(setup)
         if plot:
             from lapwing.studies.service_diagram import draw
 
             draw(setup, plot)
         if json:
-            json.write_text(json_module.dumps(found, indent=1) + "\n")
+            json.write_text(json_module.dumps(found, indent=1) + "\n", encoding="utf-8")
         if json or plot:
             return
-        typer.echo(f"{found['rate']} Hz, {found['interval_ns']} ns a tick, last tick {found['last_tick']}")
+        typer.echo(f"{found['rate']} Hz, {found['interval_ns']} ns per tick, last tick {found['last_tick']}")
         for name in found["order"]:
             _show(name, found["services"][name])
 
 
 def _show(name: str, service: dict[str, Any]) -> None:
     typer.echo(f"\n{name}")
-    for taken in service["inputs"]:
-        typer.echo(f"  takes {taken['port']}" + (f" of {taken['delay']} ticks ago" if taken["delay"] else ""))
+    for port in service["inputs"]:
+        typer.echo(f"  input {port['port']}" + (f", delayed by {port['delay']} ticks" if port["delay"] else ""))
     for port in service["ports"]:
         every = "every tick" if port["period"] == 1 else f"every {port['period']} ticks"
-        typer.echo(f"  gives {port['name']} {every}: {len(port['columns'])} columns")
+        typer.echo(f"  output {port['name']}, {every}: {len(port['columns'])} columns")
         for offset, column in enumerate(port["columns"]):
             typer.echo(f"    {8 * offset:5d}  {column}")

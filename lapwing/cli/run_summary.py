@@ -33,7 +33,7 @@ def fleet(log: Path) -> list[Flight]:
         return []
 
 
-def conclude(
+def report_results(
     scene: Scene,
     given: "ProcessSpec",
     flights: Sequence[Flight],

@@ -1,4 +1,4 @@
-"""What there is to fly, whether it is valid, what it is tuned to, what a log shows; and kernels compiled ahead."""
+"""Scenes listed, checked and precompiled; reports of logs; autopilot parameters."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -7,18 +7,17 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
-from lapwing.cli.options import (
-    Overrides,
-    SceneFile,
-)
-from lapwing.cli.preflight import decided, warn_of_gains
+from lapwing.cli.options import LogFile, Overrides, SceneFile
+from lapwing.cli.preflight import warn_of_gains, with_solver_selected
 
 
 @app.command()
 def scenes(
-    folder: Annotated[Path | None, typer.Argument(help="where to look [the scenes that ship]")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[FOLDER]", help="folder of scenes [the shipped scenes]")
+    ] = None,
 ) -> None:
-    """List the scenes, a line each."""
+    """List scenes with their titles."""
     from lapwing.cosim.scene import SceneError
     from lapwing.services.common.run_schema import SHIPPED, title
 
@@ -38,14 +37,14 @@ def scenes(
 
 @app.command()
 def check(scene: SceneFile, set_: Overrides = None) -> None:
-    """Validate a scene."""
+    """Validate a scene and show what it contains."""
     from lapwing.services.common.communication_schema import Communication
     from lapwing.services.common.run_schema import Run
     from lapwing.services.common.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
 
     with user_errors():
-        loaded = decided(scene, set_ or [])
+        loaded = with_solver_selected(scene, set_ or [])
         setup = resolve(loaded)
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
@@ -63,12 +62,16 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
 
 
 @app.command()
-def warm(
+def precompile(
     scenes: Annotated[
-        list[Path] | None, typer.Argument(metavar="[SCENE|FOLDER]...", help="[delivery_mission]; of a folder all")
+        list[Path] | None,
+        typer.Argument(metavar="[SCENE|FOLDER]...", help="scenes, or folders of scenes [delivery_mission]"),
     ] = None,
 ) -> None:
-    """Compile what scenes need, so that their first run starts at once; of several the sound ones."""
+    """Compile the kernels of scenes ahead of their first run.
+
+    Invalid scenes are reported and skipped.
+    """
     from lapwing.runs.precompile import compile_ahead
     from lapwing.services.scene_resolver import resolve
     from lapwing.studies.terminal import console
@@ -79,7 +82,7 @@ def warm(
         faults: list[ValueError] = []
         for path in paths:
             try:
-                sound[str(path)] = resolve(decided(path, []))
+                sound[str(path)] = resolve(with_solver_selected(path, []))
             except ValueError as fault:
                 faults.append(fault)
         compile_ahead(sound, console())
@@ -90,7 +93,7 @@ def warm(
 
 
 def _scenes_of(path: Path) -> list[Path]:
-    """A scene, or all of a folder."""
+    """Return a scene, or all scenes of a folder."""
     if not path.is_dir():
         return [path]
     found = sorted(path.glob("*.toml"))
@@ -101,18 +104,16 @@ def _scenes_of(path: Path) -> list[Path]:
 
 @app.command()
 def report(
-    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
+    log: LogFile,
     other: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="another one, laid over the first in every plot")
+        Path | None, typer.Argument(metavar="[FILE]", help="second log, drawn over the first in every plot")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="where to write it [beside the first log, .html]")
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [beside the first log, .html]")
     ] = None,
-    vehicle: Annotated[
-        str | None, typer.Option(metavar="NAME", help="of several in the log, whose report it is [the first]")
-    ] = None,
+    vehicle: Annotated[str | None, typer.Option(metavar="NAME", help="vehicle to report [first in the log]")] = None,
 ) -> None:
-    """Write a report of a log, or of two laid over each other: a page for a browser, or plots on paper."""
+    """Write a report of a log, or a comparison of two logs."""
     from lapwing.cli.output_paths import check_distinct, claim_report
     from lapwing.flight import Flight
     from lapwing.studies.flight_data import SHOWN
@@ -126,12 +127,12 @@ def report(
 
 @app.command()
 def view(
-    log: Annotated[Path, typer.Argument(metavar="FILE", help="an MCAP log of a run")],
+    log: LogFile,
     rerun: Annotated[
-        bool, typer.Option("--rerun", help="open the log in Rerun instead (pip install lapwing[view])")
+        bool, typer.Option("--rerun", help="open the log in Rerun instead; needs pip install lapwing[view]")
     ] = False,
 ) -> None:
-    """Write the report of a log, in which the vehicle flies again, and open it in the browser."""
+    """Write the report of a log and open it in the browser."""
     import webbrowser
 
     from lapwing.flight import Flight
@@ -144,18 +145,18 @@ def view(
             return
         page = Flight.read(log, only=SHOWN).report()
         if not webbrowser.open(page.resolve().as_uri()):
-            typer.echo("no browser was found; open the page yourself:")
+            typer.echo("no browser found; open this page:")
         typer.echo(page)
 
 
 @app.command()
 def parameters(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="a scene, or an MCAP log of a run")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="scene, or MCAP log of a run")],
     save: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="write them as QGroundControl does; a scene can name the file")
+        Path | None, typer.Option(metavar="FILE", help="write a QGroundControl parameter file, which a scene can use")
     ] = None,
 ) -> None:
-    """List the autopilot's parameters: those of a scene, or those that a run ended with."""
+    """List the autopilot parameters of a scene or at the end of a log."""
     from lapwing.cosim.log import LogReader
     from lapwing.runs.resimulate import given_commands, recorded_setup
     from lapwing.services.common import parameter_file
@@ -165,15 +166,15 @@ def parameters(
     with user_errors():
         commands: list = []
         if file.suffix == ".toml":
-            setup = resolve(decided(file, []))
+            setup = resolve(with_solver_selected(file, []))
         else:
             with LogReader(file) as read:
                 setup = recorded_setup(read)
                 commands = [command for _, given in given_commands(read, setup) for command in given]
         if not setup.vehicle:
-            raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or a log of one")
+            raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or log with one vehicle")
         if "autopilot" not in setup.services:
-            raise ValueError(f"{file}: nobody steers there; expected a scene with [autopilot], or a log of one")
+            raise ValueError(f"{file}: no autopilot; expected a scene with [autopilot], or its log")
         known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}
         values = changed(known, commands)
         if save:

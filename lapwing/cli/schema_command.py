@@ -25,7 +25,7 @@ def schema(
     kind: Annotated[Kind, typer.Argument(help="the kind of file")] = Kind.scene,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="the output file [standard output]")] = None,
 ) -> None:
-    """Write the JSON schema with which editors complete and check TOML files."""
+    """Write a JSON schema with which editors check TOML files."""
     from lapwing.file_schemas.json_schema import SCHEMAS
 
     with user_errors():

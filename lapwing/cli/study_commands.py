@@ -1,4 +1,4 @@
-"""The studies: performance, effects, accuracy, stability, tune."""
+"""Studies: performance, effects, accuracy, stability, tune."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,16 +32,16 @@ def _study(
     find: Callable[[], Any],
     module: ModuleType,
 ) -> None:
-    """Refuse files that cannot be written, then study, show, and write what was asked for.
+    """Check the output files, run a study, and print and write its result.
 
     Args:
-        name: of the argument that says what is studied, for messages.
-        subject: its value.
-        json: file for the figures.
-        plot: file for the picture.
-        console: where it is shown.
-        find: the study.
-        module: has `show(console, found)`, `write_json(path, found)` and `plot(path, found)`.
+        name: argument that names the subject, for messages.
+        subject: value of that argument.
+        json: file for the result.
+        plot: file for the plot.
+        console: output.
+        find: runs the study.
+        module: has `show(console, result)`, `write_json(path, result)` and `plot(path, result)`.
     """
     check_distinct({name: subject, "--json": json, "--plot": plot})
     claim(json)
@@ -56,23 +56,26 @@ def _study(
 
 @contextmanager
 def _compiling(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
-    """Say with a guess of the time when the scene's closed loop has to be compiled first, and only then."""
-    from lapwing.runs.compile_notice import told
+    """Announce the compilation of the scene's closed loop with its estimated time, if there is one."""
+    from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.services.scene_resolver import resolve
 
     def say(what: "Compilation") -> None:
         progress.update(task, description=f"compiling, about {what.seconds:.0f} s, then flying")
 
-    with told(resolve(scene), say, alone=False):
+    with notify_on_compile(resolve(scene), say, alone=False):
         yield
 
 
 @app.command()
 def performance(
-    subject: Annotated[Path, typer.Argument(metavar="SCENE|VEHICLE", help="a scene, or an airframe's TOML file")],
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the figures as JSON")] = None,
+    subject: Annotated[Path, typer.Argument(metavar="SCENE|VEHICLE", help="scene, or airframe file (TOML)")],
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the result as JSON")] = None,
 ) -> None:
-    """Hover time, payload, range, ceiling, tilt and speed from the models, beside published figures."""
+    """Compute hover time, range, payload, ceiling and top speed.
+
+    Published values are shown beside the computed ones.
+    """
     from lapwing.studies import performance_card as study
     from lapwing.studies.terminal import console
 
@@ -84,11 +87,14 @@ def performance(
 def effects(
     scene: SceneFile,
     set_: Overrides = None,
-    within: Annotated[float, typer.Option(metavar="M", help="how far the trajectory may change")] = 0.01,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the study as JSON")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw it (PNG, SVG or PDF)")] = None,
+    tolerance: Annotated[float, typer.Option(metavar="M", help="largest permitted change of the trajectory")] = 0.01,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the result as JSON")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="write a plot (PNG, SVG or PDF)")] = None,
 ) -> None:
-    """What each effect of a scene costs and changes, and which of them it could do without."""
+    """Measure the cost and influence of each effect of a scene.
+
+    Names the effects that the scene does not need tolerance --tolerance.
+    """
     from lapwing.cli.study_progress import Countdown
     from lapwing.services.scene_resolver import load
     from lapwing.studies.effects import console_output
@@ -96,28 +102,34 @@ def effects(
     from lapwing.studies.terminal import console
 
     with user_errors():
-        if not within > 0.0:
-            raise ValueError(f"--within {within:g}: expected a distance above 0 m")
+        if not tolerance > 0.0:
+            raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
         screen = console()
 
         def find() -> Study:
             with Countdown(screen) as countdown:
-                return study(load(scene, set_ or []), within, countdown.say)
+                return study(load(scene, set_ or []), tolerance, countdown.say)
 
         _study("SCENE", scene, json, plot, screen, find, console_output)
 
 
 @app.command()
 def accuracy(
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="a system of the study, or a scene (name or file)")],
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="reference problem, or scene (name or file)")],
     set_: Overrides = None,
     goal: Annotated[
-        float | None, typer.Option("--target", metavar="ERROR", help="name the cheapest choice that meets it: 1e-6")
+        float | None,
+        typer.Option("--target", metavar="ERROR", help="find the cheapest solver with at most this error, e.g. 1e-6"),
     ] = None,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all points as JSON")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw error over time (PNG, SVG or PDF)")] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all results as JSON")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="plot error over wall time (PNG, SVG or PDF)")
+    ] = None,
 ) -> None:
-    """Error against wall time of every integrator, on a system whose answer is known, or on a scene's plant."""
+    """Measure error against wall time of every integrator.
+
+    The subject is a reference problem with a known solution, or the plant of a scene.
+    """
     with user_errors():
         from lapwing.studies.accuracy import accuracy_command
 
@@ -128,15 +140,19 @@ def accuracy(
 
 @app.command()
 def stability(
-    case: Annotated[str | None, typer.Argument(metavar="CASE", help="one case; all without")] = None,
-    long: Annotated[bool, typer.Option("--long", help="with the cases that take minutes")] = False,
+    case: Annotated[str | None, typer.Argument(metavar="CASE", help="case to run [all]")] = None,
+    slow: Annotated[bool, typer.Option("--slow", help="include cases that take minutes")] = False,
     sweep: Annotated[
-        bool, typer.Option("--sweep", help="walk each case's difficulty until every method breaks")
+        bool, typer.Option("--sweep", help="raise the difficulty of each case until every method fails")
     ] = False,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all figures as JSON")] = None,
-    report: Annotated[Path | None, typer.Option(metavar="FILE", help="write figures and plots (HTML)")] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all results as JSON")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="write results and plots (HTML)")] = None,
 ) -> None:
-    """Hard cases beside a naive method that fails each: bounds, figures, verdicts. Exit code 1 if one falls short."""
+    """Run numerically hard cases against their error bounds.
+
+    Each case is also run with a baseline method that fails it.
+    Exit codes: 1 a case misses its bound, 2 invalid input.
+    """
     with user_errors():
         from lapwing.studies.stability import stability_command
 
@@ -145,8 +161,8 @@ def stability(
             raise ValueError(f"--report {report}: expected a name that ends in .html")
         claim(json)
         claim(report)
-        stands = stability_command.run(case, long, sweep, json, report)
-    if not stands:
+        passed = stability_command.run(case, slow, sweep, json, report)
+    if not passed:
         raise SystemExit(1)
 
 
@@ -165,16 +181,19 @@ def tune(
         float, typer.Option(metavar="RAD/S", help="bandwidth of the outer loops")
     ] = Bandwidths().position,
     log: Annotated[
-        Path | None, typer.Option("--from", metavar="LOG", help="identify the plant from this flight (MCAP)")
+        Path | None, typer.Option("--from", metavar="LOG", help="identify the plant from this MCAP log")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML), for a scene to name")
+        Path | None, typer.Option(metavar="FILE", help="write the gain set (TOML) for use in a scene")
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="write Bode plots, steps and tables (HTML)")
+        Path | None, typer.Option(metavar="FILE", help="write Bode plots, step responses and tables (HTML)")
     ] = None,
 ) -> None:
-    """Design gains about hover for bandwidth, 45 degrees and 6 dB in every loop, then polish them in flight."""
+    """Design controller gains and refine them in simulated flight.
+
+    Each loop gets its bandwidth with margins of 45 degrees and 6 dB at hover.
+    """
     from rich.progress import Progress
 
     from lapwing.services.scene_resolver import load
@@ -188,7 +207,7 @@ def tune(
             if path and path.suffix != ending:
                 raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
             claim(path)
-        wanted, screen = Bandwidths(altitude, yaw, attitude, position), console()
+        target, screen = Bandwidths(altitude, yaw, attitude, position), console()
         with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=gain_refinement.CANDIDATES)
             loaded = load(scene, set_ or [])
@@ -198,12 +217,12 @@ def tune(
 
             with _compiling(loaded, progress, task):
                 found = procedure.tune(
-                    loaded, wanted, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
+                    loaded, target, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
                 )
         console_output.show(screen, found)
         if out:
             procedure.write(out, found.gains)
-            typer.echo(f'{out}: a scene beside it names it with [autopilot] gains = "{out.name}"')
+            typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
         if report:
             page.write(report, found)
             typer.echo(f"{report}: Bode plots, margins and steps")

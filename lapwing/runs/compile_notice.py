@@ -63,7 +63,7 @@ class Stopwatch:
 
 
 @contextmanager
-def told(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
+def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
     """Say so once, as soon as a kernel is compiled within the context for a run in this process.
 
     Args:

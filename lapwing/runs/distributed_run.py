@@ -24,7 +24,7 @@ JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
 CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has failed
 
 
-def fly_joined(
+def monitor_run(
     given: ProcessSpec, observer: Observer, live: Callable[[RunMonitor], None] = lambda watch: None
 ) -> Elapsed:
     """Watch a run whose services are started elsewhere, to its end; `live` is shown it some five times a second.
@@ -56,7 +56,7 @@ def fly_joined(
 
 
 def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: Callable[[RunMonitor], None]) -> None:
-    """RunMonitor the run of the participants `names` to its end; errors as of `fly_joined`."""
+    """RunMonitor the run of the participants `names` to its end; errors as of `monitor_run`."""
     deadline = time.monotonic() + JOIN_TIMEOUT
     while not (watch.ended and process_table.RECORDER in watch.gone):
         live(watch)
@@ -89,7 +89,7 @@ def _comes(watch: RunMonitor, news: Callable[[], bool], seconds: float) -> bool:
     return news()
 
 
-def parse_peers(text: str) -> dict[str, str]:
+def parse_endpoints(text: str) -> dict[str, str]:
     """ "name=endpoint,..." as a table. Programs of somebody else's stand first: all others connect to them.
 
     Raises:
@@ -97,10 +97,10 @@ def parse_peers(text: str) -> dict[str, str]:
     """
     peers = dict(pair.split("=", 1) for pair in text.split(",") if "=" in pair)
     if not peers or len(peers) != len(text.split(",")):
-        raise ValueError(f"--peers {text}: expected name=endpoint,..., for example plant=tcp/plant:7447")
+        raise ValueError(f"--endpoints {text}: expected name=endpoint,..., for example plant=tcp/plant:7447")
     for endpoint in peers.values():
-        check_endpoint("--peers", endpoint)
-    return {**elsewhere(peers), **peers}
+        check_endpoint("--endpoints", endpoint)
+    return {**external_services(peers), **peers}
 
 
 def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
@@ -110,10 +110,10 @@ def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
         ValueError: names those that are missing.
     """
     if missing := [name for name in needed if name not in peers]:
-        raise ValueError(f"--peers: no endpoint for {', '.join(missing)}")
+        raise ValueError(f"--endpoints: no endpoint for {', '.join(missing)}")
 
 
-def elsewhere(peers: Mapping[str, str]) -> dict[str, str]:
+def external_services(peers: Mapping[str, str]) -> dict[str, str]:
     """The programs of somebody else's in a table: services whose messages have a process of their own in it."""
     return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
 

@@ -80,7 +80,7 @@ class Clock:
     def __init__(self, observer: Observer, setup: RunConfig):
         self._observer, self._began, self._slow_disk = observer, False, False
         self._pose, self._status = leading(setup, POSE), leading(setup, STATUS)
-        self._compiling = Stopwatch("processes", setup, observer.compiling)
+        self._compiling = Stopwatch("multi-process", setup, observer.compiling)
         self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
 
     def observe(self, watch: RunMonitor) -> bool:

@@ -11,7 +11,7 @@ from rich.progress_bar import ProgressBar
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
-from lapwing.runs.compile_notice import Compilation, guessed, told
+from lapwing.runs.compile_notice import Compilation, guessed, notify_on_compile
 from lapwing.services.process_table import create_all
 from lapwing.studies import metrics
 
@@ -48,7 +48,7 @@ def compile_ahead(setups: Mapping[str, RunConfig], console: Console) -> None:
                     console.print(what.notice, soft_wrap=True)
 
             started = time.perf_counter()
-            with told(setup, say):
+            with notify_on_compile(setup, say):
                 BlockDiagram(setup, create_all(setup), PAGE).advance(1)  # what steps the parts is compiled, too
                 metrics.compile_ahead()
             done += guess

@@ -62,13 +62,13 @@ def given_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iter
         yield time_ns // setup.interval_ns, OperatorInput.decode(payload).commands
 
 
-def refly(log: Path, observer: Observer | None = None, run_code: bool = False) -> tuple[str, str]:
+def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = False) -> tuple[str, str]:
     """Digests of the log, and of the run flown again up to the log's last tick.
 
     Args:
         log: of a run.
         observer: is told how far the run is.
-        run_code: whether Python modules that the log carries may be run.
+        allow_code: whether Python modules that the log carries may be run.
 
     Raises:
         ValueError: no log, or none of a run, it carries modules that must not be run, or a service was a program
@@ -76,9 +76,9 @@ def refly(log: Path, observer: Observer | None = None, run_code: bool = False) -
     """
     with LogReader(log) as read:
         modules = carried_modules(read)
-        if modules and not run_code:
+        if modules and not allow_code:
             files = ", ".join(f"modules.{name}.py" for name in modules)
-            raise ValueError(f"{log}: carries code of its author ({files}): read it, and give --run-code to run it")
+            raise ValueError(f"{log}: carries code of its author ({files}): read it, and give --allow-code to run it")
         user_module.install(modules)
         setup = without_plan(recorded_setup(read, modules))
         if elsewhere := read.metadata.get("external"):

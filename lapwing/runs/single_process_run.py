@@ -14,7 +14,7 @@ from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.processes.interrupt import Interrupted, Stop
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.messages.topics import POSE, STATUS
-from lapwing.runs.compile_notice import told
+from lapwing.runs.compile_notice import notify_on_compile
 from lapwing.runs.observer import Elapsed, Observer, Silent
 from lapwing.services.process_table import Operator, create_all
 
@@ -35,7 +35,7 @@ def fly_single(
         log: where to record it.
         sources: the files that were resolved, for the log.
         speed: simulated seconds per second, None for as fast as it goes.
-        observer: is told how far the run is.
+        observer: is notify_on_compile how far the run is.
         operator: gives the commands that have come until a tick; for several vehicles one for each, by name.
         last: the tick after which to stop, None for the end of the run.
 
@@ -45,9 +45,9 @@ def fly_single(
         Interrupted: ended by a signal.
     """
     watcher = observer or Silent()
-    with told(setup, watcher.compiling):
+    with notify_on_compile(setup, watcher.compiling):
         graph = BlockDiagram(setup, create_all(setup, operator), PAGE)
-    with Stop() as stop, LogWriter(log, metadata(setup, "single"), attachments(setup, sources or {})) as writer:
+    with Stop() as stop, LogWriter(log, metadata(setup, "single-process"), attachments(setup, sources or {})) as writer:
         recording = Recording(writer, setup)
         pose, status = leading(setup, POSE), leading(setup, STATUS)
 

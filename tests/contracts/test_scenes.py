@@ -26,7 +26,7 @@ SCENES = sorted((ROOT / "scenes").glob("*.toml"))
 def fly(scene, folder):
     """The figures of a run in one process."""
     figures = folder / "figures.json"
-    command = [sys.executable, "-m", "lapwing", "run", str(scene), "--mode", "single"]
+    command = [sys.executable, "-m", "lapwing", "run", str(scene), "--mode", "single-process"]
     command += ["--log", str(folder / "log.mcap"), "--json", str(figures)]
     subprocess.run(command, check=True, timeout=600)
     return json.loads(figures.read_text())

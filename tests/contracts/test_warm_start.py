@@ -52,7 +52,9 @@ def kernels(*words):
 
 def flown(folder):
     """The same of a run."""
-    return kernels("run", "hover", "--mode", "single", "--set", "run.duration=0.2", "--log", str(folder / "log.mcap"))
+    return kernels(
+        "run", "hover", "--mode", "single-process", "--set", "run.duration=0.2", "--log", str(folder / "log.mcap")
+    )
 
 
 def test_the_second_run_compiles_nothing(tmp_path):
@@ -64,7 +66,7 @@ def test_the_second_run_compiles_nothing(tmp_path):
 
 def test_a_run_needs_nothing_that_compiling_ahead_does_not_look_up(tmp_path):
     """And hence compiles, and keeps: without a cache of its own, for which all would be compiled once more."""
-    _, ahead = kernels("warm", "hover")
+    _, ahead = kernels("precompile", "hover")
     compiled, looked_up = flown(tmp_path)
     assert compiled == []
     assert set(looked_up) <= set(ahead)

@@ -33,7 +33,7 @@ def participant(name, peers, tmp_path, *more, insecure=True):
         "service",
         name,
         SCENE,
-        "--peers",
+        "--endpoints",
         table,
         "--key-prefix",
         "test-join",

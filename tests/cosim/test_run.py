@@ -134,7 +134,7 @@ def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
     first, second = (processes(tmp_path, key_prefix) for key_prefix in ("test-first", "test-second"))
     assert first["digest"] == second["digest"] == alone
     assert first["sim_time_s"] == pytest.approx(2.0)
-    assert (first["scene"], first["seed"], first["mode"]) == ("hover", 1, "processes")
+    assert (first["scene"], first["seed"], first["mode"]) == ("hover", 1, "multi-process")
     assert set(first["rmse"]) == {"x", "y", "z", "roll", "pitch", "yaw"}
     with LogReader(tmp_path / "test-first.mcap") as log:
         assert log.digest() == first["digest"]
@@ -213,7 +213,7 @@ def test_a_killed_recorder_loses_half_a_second_at_most(started):
     while len(lost) < 3 and min(lost, default=1.0) > 0.5:
         (door,) = loopback_endpoints(["door"]).values()
         prefix = f"test-recover{len(lost)}"
-        run = started(prefix, "--open", door, "--insecure")
+        run = started(prefix, "--listen", door, "--insecure")
         with ZenohBus(connect=[door], mode="client") as bus:
             clock = bus.subscribe(f"{prefix}/clock")
             heard = clock.get(STARTED)[0]
@@ -248,7 +248,7 @@ def test_services_end_by_themselves_when_the_launcher_is_killed(started):
 def test_a_service_that_cannot_start_for_a_reason_that_the_user_can_mend(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-        command = arguments(tmp_path, "test-door", "--open", door, "--insecure")
+        command = arguments(tmp_path, "test-door", "--listen", door, "--insecure")
         result = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
     assert result.returncode == 2
     assert result.stderr.startswith("lapwing: router: cannot listen on tcp/127.0.0.1:")

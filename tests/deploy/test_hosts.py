@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.processes.run_monitor import MONITOR
-from lapwing.runs.distributed_run import parse_peers
+from lapwing.runs.distributed_run import parse_endpoints
 from lapwing.services import process_table
 from lapwing.services.scene_resolver import load, resolve
 
@@ -31,7 +31,7 @@ def manifests(scene):
 
 
 def peers_of(command):
-    return parse_peers(command[command.index("--peers") + 1])
+    return parse_endpoints(command[command.index("--endpoints") + 1])
 
 
 def test_two_hosts_have_every_service_once_and_one_table():

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.flight import Flight
-from lapwing.runs.resimulate import refly
+from lapwing.runs.resimulate import resimulate
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long
@@ -61,7 +61,7 @@ def test_it_flies_to_the_same_digest_twice(program, tmp_path):
     assert flight.truth["pose.position"][-1, 2] > 4.0
     assert flight.topic("status")["armed"][-1]
     with pytest.raises(ValueError, match="cannot be flown again: autopilot was a program of somebody else's"):
-        refly(tmp_path / "first.mcap")
+        resimulate(tmp_path / "first.mcap")
 
 
 def test_another_scene_than_the_others_is_refused(program, tmp_path):

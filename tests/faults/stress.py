@@ -47,12 +47,12 @@ def reference(kind: str, folder: Path) -> str:
     A link belongs to runs in processes only: there the log of one is flown again in one process, to the same digest.
     """
     options, log = KINDS[kind], folder / f"{kind}.mcap"
-    mode = [] if "--mavlink" in options else ["--mode", "single"]
+    mode = [] if "--mavlink" in options else ["--mode", "single-process"]
     subprocess.run(
         [*LAPWING, "run", *options, *mode, "--log", str(log)], check=True, capture_output=True, timeout=TIMEOUT
     )
     if not mode:
-        subprocess.run([*LAPWING, "refly", str(log)], check=True, capture_output=True, timeout=TIMEOUT)
+        subprocess.run([*LAPWING, "resimulate", str(log)], check=True, capture_output=True, timeout=TIMEOUT)
     with LogReader(log) as reader:
         return reader.metadata["digest"]
 

@@ -30,7 +30,7 @@ class Run:
             more = ["--speed", "1"] if name == "plant" else []
             if name in (MONITOR, "recorder"):
                 more = ["--log", str(self.log)]
-            words = [*command, "delivery_mission", *sets, "--peers", table, "--keys", str(keys), *more]
+            words = [*command, "delivery_mission", *sets, "--endpoints", table, "--keys", str(keys), *more]
             self.participants[name] = subprocess.Popen(
                 network.command(host, sys.executable, "-m", "lapwing", *words),
                 stdout=subprocess.DEVNULL,

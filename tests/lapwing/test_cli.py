@@ -16,7 +16,7 @@ ROOT = Path.cwd()
 HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
 PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 
-OPEN = ("--peers", "foxglove=unixsock-stream/x")
+OPEN = ("--endpoints", "foxglove=unixsock-stream/x")
 
 BAD = {
     "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
@@ -53,22 +53,28 @@ BAD = {
     "speed 0": ([HOVER, "--speed", "0"], "--speed 0: expected a number above 0, or max"),
     "speed nan": ([HOVER, "--speed", "nan"], "--speed nan: expected a number above 0, or max"),
     "speed fast": ([HOVER, "--speed", "fast"], "--speed fast: expected a number above 0, or max"),
-    "mode": ([HOVER, "--mode", "both"], "--mode both: expected processes or single"),
-    "no network": ([HOVER, "--mode", "single", "--peers", PEERS], "--mode single: has no network"),
-    "empty peers": ([HOVER, "--peers", ""], "--peers : expected name=endpoint,..."),
-    "peers": ([HOVER, "--peers", "x"], "--peers x: expected name=endpoint,..."),
-    "peers' endpoint": ([HOVER, "--peers", "plant=x"], "--peers x: expected an endpoint protocol/address:port"),
-    "too few peers": ([HOVER, "--peers", PEERS, "--insecure"], "no endpoint for trajectory, recorder, mission"),
-    "open door": ([HOVER, "--open", "tcp/0.0.0.0:1"], "--open tcp/0.0.0.0:1: anybody could join there: expected tls/"),
-    "no keys": ([HOVER, "--open", "tls/0.0.0.0:1"], "expected --keys FOLDER with it; `lapwing keys FOLDER` makes one"),
+    "mode": ([HOVER, "--mode", "both"], "--mode both: expected multi-process or single-process"),
+    "no network": ([HOVER, "--mode", "single-process", "--endpoints", PEERS], "--mode single-process: has no network"),
+    "empty peers": ([HOVER, "--endpoints", ""], "--endpoints : expected name=endpoint,..."),
+    "peers": ([HOVER, "--endpoints", "x"], "--endpoints x: expected name=endpoint,..."),
+    "peers' endpoint": ([HOVER, "--endpoints", "plant=x"], "--endpoints x: expected an endpoint protocol/address:port"),
+    "too few peers": ([HOVER, "--endpoints", PEERS, "--insecure"], "no endpoint for trajectory, recorder, mission"),
+    "open door": (
+        [HOVER, "--listen", "tcp/0.0.0.0:1"],
+        "--listen tcp/0.0.0.0:1: anybody could join there: expected tls/",
+    ),
+    "no keys": (
+        [HOVER, "--listen", "tls/0.0.0.0:1"],
+        "expected --keys FOLDER with it; `lapwing certificates FOLDER` makes one",
+    ),
     "viewers": (
         [HOVER, "--foxglove", "0.0.0.0:8799"],
         "--foxglove 0.0.0.0:8799: anybody could look on there: expected",
     ),
-    "view alone": ([HOVER, "--mode", "single", "--view"], "--view: belongs to a run in processes"),
-    "ROS 2 alone": ([HOVER, "--mode", "single", "--ros2", "0"], "--ros2: belongs to a run in processes"),
+    "view alone": ([HOVER, "--mode", "single-process", "--view"], "--view: belongs to a run in processes"),
+    "ROS 2 alone": ([HOVER, "--mode", "single-process", "--ros2", "0"], "--ros2: belongs to a run in processes"),
     "ROS 2 in a scene": (
-        [HOVER, "--mode", "single", "--set", "bus.ros2=true"],
+        [HOVER, "--mode", "single-process", "--set", "bus.ros2=true"],
         "--ros2: belongs to a run in processes",
     ),
     "ROS 2 domain": ([HOVER, "--ros2", "233"], "'--ros2': Input should be less than or equal to 232"),
@@ -79,8 +85,8 @@ BAD = {
         [HOVER, "--realtime", "--speed", "max"],
         "--realtime: belongs to a run that keeps a speed",
     ),
-    "keys": ([HOVER, "--keys", "x"], "--keys: expected with --open or --peers"),
-    "door": ([HOVER, "--open", "x"], "--open x: expected an endpoint protocol/address:port"),
+    "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
+    "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
     "option": ([HOVER, "--lgo", "x"], "No such option: --lgo"),
     "no scene": ([], "Missing argument 'SCENE'"),
 }
@@ -100,8 +106,8 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
     ("arguments", "expected"),
     [
         (["check", "scenes/none.toml"], "no such file"),
-        (["warm", "scenes/none.toml"], "no such file"),
-        (["warm", "scenes/plans"], "scenes/plans: no scenes there; expected a folder with .toml files"),
+        (["precompile", "scenes/none.toml"], "no such file"),
+        (["precompile", "scenes/plans"], "scenes/plans: no scenes there; expected a folder with .toml files"),
         (["scenes", "none"], "none: no scenes there"),
         (["report", "none.mcap"], "none.mcap"),
         (["report", "none.mcap", "--out", "a.txt"], "--out a.txt: expected a name that ends in .html, .pdf or .png"),
@@ -117,9 +123,12 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999", "--insecure"], "none.mcap: cannot read the log"),
         (["replay", "none.mcap", "--foxglove", "[::]:8799"], "--foxglove [::]:8799: anybody could look on there"),
         (["service", "foxglove", HOVER, *OPEN, "--foxglove", "0.0.0.0:8765"], "anybody could look on there: expected"),
-        (["service", "plnt", HOVER, "--peers", PEERS], "unknown service plnt; expected one of"),
-        (["service", "sensors", HOVER, "--peers", PEERS], "no endpoint for sensors itself"),
-        (["service", "plant", HOVER, "--peers", PEERS, "--key-prefix", "a b"], "--key-prefix a b: expected letters"),
+        (["service", "plnt", HOVER, "--endpoints", PEERS], "unknown service plnt; expected one of"),
+        (["service", "sensors", HOVER, "--endpoints", PEERS], "no endpoint for sensors itself"),
+        (
+            ["service", "plant", HOVER, "--endpoints", PEERS, "--key-prefix", "a b"],
+            "--key-prefix a b: expected letters",
+        ),
         (["fly"], "No such command 'fly'"),
     ],
 )
@@ -147,7 +156,7 @@ def test_a_refused_run_takes_the_folder_of_recordings_away_again(lapwing):
 
 def test_a_signal_while_kernels_compile_ends_the_run_at_once(lapwing, monkeypatch):
     monkeypatch.setattr(single_process_run, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
-    code, out, err = lapwing("run", HOVER, "--mode", "single")
+    code, out, err = lapwing("run", HOVER, "--mode", "single-process")
     assert (code, out, err) == (143, "", "lapwing: ended by SIGTERM\n")
     assert os.listdir() == ["scenes"]
 
@@ -161,7 +170,7 @@ def test_version(lapwing):
 def test_without_a_command_the_help_is_shown(lapwing):
     code, out, _ = lapwing()
     assert code == 0
-    for command in ("run", "scenes", "check", "warm", "report", "replay"):
+    for command in ("run", "scenes", "check", "precompile", "report", "replay"):
         assert f"\n  {command} " in out
 
 
@@ -214,7 +223,7 @@ def test_output_to_a_full_device_is_one_line_and_no_traceback(arguments):
 def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
     lapwing.fly("hover", {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
     log = tmp_path / "log.mcap"
-    command = [sys.executable, "-m", "lapwing", "run", "hover", "--set", "run.duration=1", "--mode", "single"]
+    command = [sys.executable, "-m", "lapwing", "run", "hover", "--set", "run.duration=1", "--mode", "single-process"]
     with FULL.open("w") as full:
         result = subprocess.run(
             [*command, "--log", str(log)], stdout=full, stderr=subprocess.PIPE, text=True, check=False

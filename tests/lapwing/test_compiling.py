@@ -13,7 +13,7 @@ from lapwing.cli.main import app
 from lapwing.cli.progress import Display
 from lapwing.kernels import kernel
 from lapwing.runs import compile_notice, precompile
-from lapwing.runs.compile_notice import EACH, FILE, Compilation, told
+from lapwing.runs.compile_notice import EACH, FILE, Compilation, notify_on_compile
 from lapwing.runs.precompile import compile_ahead
 from lapwing.services.scene_resolver import load, resolve
 
@@ -54,23 +54,23 @@ class Compiling:
 
 def test_it_is_said_once_and_only_where_something_compiles(setup, folder):
     said = []
-    with told(setup, said.append):
+    with notify_on_compile(setup, said.append):
         pass
     assert said == []
     assert not (folder / FILE).exists()
-    with told(setup, said.append):
+    with notify_on_compile(setup, said.append):
         compile_something()
     assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
 
 
 def test_the_guess_is_the_time_that_it_took_before(setup, folder):
-    with told(setup, lambda _: None):
+    with notify_on_compile(setup, lambda _: None):
         compile_something()
     (key,) = known = json.loads((folder / FILE).read_text())
     assert 0.0 <= known[key] < EACH
     (folder / FILE).write_text(json.dumps({key: 81.5}))
     said = []
-    with told(setup, said.append):
+    with notify_on_compile(setup, said.append):
         compile_something()
     assert [what.seconds for what in said] == [81.5]
     assert json.loads((folder / FILE).read_text()) == {key: 81.5}
@@ -80,7 +80,7 @@ def test_the_guess_is_the_time_that_it_took_before(setup, folder):
 def test_a_damaged_memory_is_none(setup, folder, content):
     (folder / FILE).write_text(content)
     said = []
-    with told(setup, said.append):
+    with notify_on_compile(setup, said.append):
         compile_something()
     assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
 
@@ -117,7 +117,7 @@ def test_one_broken_scene_of_a_folder_stops_no_other(tmp_path, monkeypatch):
     for name in ("a", "c"):
         (tmp_path / f"{name}.toml").write_text("[run")
     (tmp_path / "b.toml").write_bytes(Path("scenes/hover.toml").read_bytes())
-    result = CliRunner().invoke(app, ["warm", str(tmp_path)])
+    result = CliRunner().invoke(app, ["precompile", str(tmp_path)])
     assert (result.exit_code, compiled) == (2, [str(tmp_path / "b.toml")])
     assert [line.partition(": not valid TOML")[0] for line in result.output.splitlines()] == [
         f"lapwing: {tmp_path / name}.toml" for name in ("a", "c")

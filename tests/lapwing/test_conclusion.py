@@ -12,7 +12,7 @@ from lapwing.studies.flight_data import SHOWN, FlightData
 from lapwing.studies.metrics import metrics
 from lapwing.studies.report.page import flight_page
 
-HOVER = ["run", "hover", "--mode", "single", "--log", "a.mcap", "--json", "a.json"]
+HOVER = ["run", "hover", "--mode", "single-process", "--log", "a.mcap", "--json", "a.json"]
 FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
 RUN_AWAY = ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]
 
@@ -54,7 +54,7 @@ def test_success_criteria_decide_the_exit_code(lapwing, require, code):
     assert "Completed at 2.00 s: the run ends before its trajectory" in out
 
 
-@pytest.mark.parametrize("mode", ["single", "processes"])
+@pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_divergence_is_reported_in_both_modes(lapwing, mode):
     code, out, err = lapwing(
         *("run", "gyrostat_feedback", "--mode", mode, "--key-prefix", "test-diverge", "--log", "a.mcap"),

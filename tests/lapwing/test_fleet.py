@@ -24,7 +24,9 @@ def command(*arguments):
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fleet")
-    said = command("run", "fleet", *SHORT, "--mode", "single", "--log", folder / "a.mcap", "--json", folder / "a.json")
+    said = command(
+        "run", "fleet", *SHORT, "--mode", "single-process", "--log", folder / "a.mcap", "--json", folder / "a.json"
+    )
     return folder, said, json.loads((folder / "a.json").read_text())
 
 
@@ -63,7 +65,7 @@ def test_info_verify_and_refly_take_its_log(flown):
     assert "left, right, scout" in told
     assert [told.count(f"\n{name}:\n") for name in ("left", "right", "scout")] == [1, 1, 1]  # events of each
     assert figures["digest"] in command("verify", log)
-    assert f"the same digest {figures['digest']}" in command("refly", log)
+    assert f"the same digest {figures['digest']}" in command("resimulate", log)
 
 
 def test_in_processes_it_has_the_same_digest(flown):
@@ -75,7 +77,7 @@ def test_in_processes_it_has_the_same_digest(flown):
 def test_a_fleet_of_one_is_told_as_a_fleet(tmp_path):
     hover = (SHIPPED / "hover.toml").read_text().replace("[vehicle]", "[[vehicle]]")
     (tmp_path / "one.toml").write_text(hover)
-    command("run", tmp_path / "one.toml", *SHORT, "--mode", "single", "--log", tmp_path / "a.mcap",
+    command("run", tmp_path / "one.toml", *SHORT, "--mode", "single-process", "--log", tmp_path / "a.mcap",
             "--json", tmp_path / "a.json")  # fmt: skip
     figures = json.loads((tmp_path / "a.json").read_text())
     assert (list(figures["vehicles"]), figures["separation"]) == (["drone1"], None)

@@ -34,7 +34,7 @@ def run(folder, size, mode):
     )
 
 
-@pytest.mark.parametrize("mode", ["single", "processes"])
+@pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_the_run_ends_with_one_line_and_a_whole_log(tmp_path, mode):
     done = run(tmp_path, 400_000, mode)  # the first chunk has room, the second has not
     assert done.returncode == 2
@@ -49,6 +49,6 @@ def test_the_run_ends_with_one_line_and_a_whole_log(tmp_path, mode):
 
 
 def test_a_log_without_anything_flown_is_not_left(tmp_path):
-    done = run(tmp_path, 20_000, "single")
+    done = run(tmp_path, 20_000, "single-process")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert list(tmp_path.iterdir()) == []

@@ -31,7 +31,7 @@ def start(*words):
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """Kernels are there: a mission does not wait for them as long as a busy machine may take."""
-    subprocess.run([sys.executable, "-m", "lapwing", "warm", "hover"], check=True, capture_output=True)
+    subprocess.run([sys.executable, "-m", "lapwing", "precompile", "hover"], check=True, capture_output=True)
 
 
 def flies(log):
@@ -48,7 +48,7 @@ def test_dead_service_is_named_and_the_outcome_is_aborted(tmp_path):
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, "mission"]).items())
     log, figures = tmp_path / "log.mcap", tmp_path / "figures.json"
 
-    common = [*SETS, "--peers", table, "--insecure", "--key-prefix", "joined"]
+    common = [*SETS, "--endpoints", table, "--insecure", "--key-prefix", "joined"]
     more = {"plant": ["--speed", "1"], "recorder": ["--log", str(log)]}
     services = {name: start("service", name, "hover", *common, *more.get(name, [])) for name in names}
     mission = start("run", "hover", *common, "--log", str(log), "--json", str(figures))
@@ -73,7 +73,7 @@ def test_viewers_are_told_of_events_while_it_flies(tmp_path):
     ends = loopback_endpoints([*names, FOXGLOVE, "mission", "door"])
     port = int(ends.pop("door").rpartition(":")[2])
     table, log = ",".join(f"{name}={at}" for name, at in ends.items()), tmp_path / "log.mcap"
-    common = ["--set", "run.duration=3.0", "--peers", table, "--insecure", "--key-prefix", "told"]
+    common = ["--set", "run.duration=3.0", "--endpoints", table, "--insecure", "--key-prefix", "told"]
     viewer = start("service", FOXGLOVE, "hover", *common, "--foxglove", f"127.0.0.1:{port}")
     started = [viewer]
     try:

@@ -50,7 +50,7 @@ def test_info_tells_the_making_the_topics_and_the_gaps(lapwing, tmp_path):
     assert lines["/drone1/truth"].startswith("490 250 ")
     assert lines["/drone1/truth"].endswith(" lapwing_msgs/msg/VehicleState 1, longest 0.044 s")
     assert "0.00 mode a;b" in " ".join(out.split())
-    assert lines["no"] == "refly lacks an attachment setup.json"
+    assert lines["no"] == "resimulate lacks an attachment setup.json"
 
 
 def test_verify_recomputes_the_digest(lapwing, tmp_path):

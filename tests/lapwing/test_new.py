@@ -11,7 +11,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.resimulate import refly
+from lapwing.runs.resimulate import resimulate
 from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.simulate import fly
@@ -61,8 +61,8 @@ def test_it_flies_to_the_same_bits_in_processes_and_from_the_log_alone(scene, tm
     with LogReader(log) as read:
         assert read.digest() == fly(from_resolved(own.resolved, "hover")).digest
     with pytest.raises(ValueError, match="carries code of its author"):
-        refly(log)
-    before, after = refly(log, run_code=True)
+        resimulate(log)
+    before, after = resimulate(log, allow_code=True)
     assert before == after
     assert without != before
 

@@ -39,7 +39,7 @@ def test_shared_locks_exclude_exclusive_locks_only(tmp_path):
     OutputLock(tmp_path).close()
 
 
-@pytest.mark.parametrize("mode", ["single", "processes"])
+@pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_run_rejects_a_log_that_is_being_written(tmp_path, mode):
     log = tmp_path / "a.mcap"
     with LogWriter(log, {}, {}):
@@ -54,7 +54,7 @@ def test_run_rejects_a_log_that_is_being_written(tmp_path, mode):
 
 
 def test_simultaneous_runs_write_separate_logs(tmp_path):
-    options = ["--mode", "single", "--set", "run.duration=1.0"]
+    options = ["--mode", "single-process", "--set", "run.duration=1.0"]
     runs = [start(tmp_path, "run", SCENE, *options, "--set", f"run.seed={seed}") for seed in (1, 2, 3)]
     for run in runs:
         assert run.communicate()[1] == ""

@@ -48,7 +48,7 @@ def visit(command, door, **security):
 
 def command(tmp_path, door, *more):
     sets = ["--set", "run.duration=4", "--key-prefix", PREFIX, "--log", str(tmp_path / "log.mcap")]
-    return [sys.executable, "-m", "lapwing", "run", "hover", "--speed", "2", "--open", door, *sets, *more]
+    return [sys.executable, "-m", "lapwing", "run", "hover", "--speed", "2", "--listen", door, *sets, *more]
 
 
 def test_a_viewer_reads_and_is_not_heard_and_nobody_else_reads(tmp_path):

@@ -36,7 +36,7 @@ def in_memory(run):
 @pytest.fixture(scope="module")
 def recorded(run, tmp_path_factory):
     path = tmp_path_factory.mktemp("flight") / "hover.mcap"
-    with LogWriter(path, metadata(run, "single"), attachments(run, {})) as writer:
+    with LogWriter(path, metadata(run, "single-process"), attachments(run, {})) as writer:
         run_single(BlockDiagram(run, create_all(run), PAGE), Recording(writer, run))
     return FlightData.read(path)
 

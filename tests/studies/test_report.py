@@ -47,7 +47,13 @@ SETUP = synthetic_flights.setup(
     run={"title": "a circle <by> formula"},
     published={"source": "paper, Table 7", "rmse": {"x": 0.2373, "yaw": 0.0220}},
 )
-METADATA = {"scene": "circle", "seed": "7", "mode": "single", "solver_integrator": "rk4", "solver_step": "0.001"}
+METADATA = {
+    "scene": "circle",
+    "seed": "7",
+    "mode": "single-process",
+    "solver_integrator": "rk4",
+    "solver_step": "0.001",
+}
 
 
 def rotation(roll, pitch, yaw):

@@ -80,7 +80,9 @@ def tls(folder: Path, name: str) -> dict[str, Any]:
     own = folder.absolute() / name
     for file in (AUTHORITY, CERTIFICATE, KEY):
         if not os.access(own / file, os.R_OK):
-            raise ValueError(f"--keys {folder}: {name}/{file} cannot be read; `lapwing keys {folder}` makes them")
+            raise ValueError(
+                f"--keys {folder}: {name}/{file} cannot be read; `lapwing certificates {folder}` makes them"
+            )
     if stat.S_IMODE((own / KEY).stat().st_mode) & 0o077:
         raise ValueError(f"--keys {folder}: others can read {name}/{KEY}; chmod 600 mends it")
     return {"transport/link/tls": _tls(own)}

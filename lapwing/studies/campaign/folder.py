@@ -2,7 +2,7 @@
 
 campaign.json      the plan, the scene's texts, versions; a campaign is its hash
 shards/00007.csv   the rows of one shard, written whole or not at all
-last_shard         where the table ends that `--until-ci` has ended; shards after it stay for a command without
+last_shard         where the table ends that `--ci-half-width` has ended; shards after it stay for a command without
 runs.parquet       all rows in their order (runs.csv without pyarrow)
 report.html
 """

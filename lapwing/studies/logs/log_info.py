@@ -46,7 +46,7 @@ class Info(NamedTuple):
         elif self.other_versions:
             found["report"] = found["replay"] = f"messages of this version: {'; '.join(self.other_versions.values())}"
         if SETUP_FILE not in self.files:
-            found["refly"] = f"an attachment {SETUP_FILE}"
+            found["resimulate"] = f"an attachment {SETUP_FILE}"
         if "digest" not in self.metadata:
             found["verify"] = "a digest in its metadata"
         return found

@@ -5,7 +5,7 @@ import pytest
 from flights import ACCEPTED, OPERATED, RATE, REJECTED, UP, command, fly, results, said, scripted
 
 from lapwing.cosim.log import LogReader
-from lapwing.runs.resimulate import refly
+from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
@@ -52,7 +52,7 @@ def test_they_hold_between_their_stamps_within_what_the_motors_take_and_the_cont
     assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
     assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # it has been pushed hard
     assert np.abs(truth["velocity"][-1]).max() < 0.1  # and stands again
-    assert refly(log) == (stated, stated)
+    assert resimulate(log) == (stated, stated)
 
 
 def test_where_no_more_come_a_failsafe_takes_over():

@@ -7,7 +7,7 @@ from flights import OPERATED, UP, command, scripted
 
 from lapwing.cosim.config.serialise import first_difference
 from lapwing.cosim.log import LogReader
-from lapwing.runs.resimulate import recorded_setup, refly
+from lapwing.runs.resimulate import recorded_setup, resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 
@@ -25,20 +25,20 @@ def test_commands_come_again_at_their_ticks(tmp_path):
     log = tmp_path / "flight.mcap"
     script = UP | {4: [command("goto", 2.0, 1.0, 3.0)]}
     flown = fly(log, resolve(load("hover", [*OPERATED, "run.duration=6"])), scripted(script))
-    assert refly(log) == (flown, flown)
+    assert resimulate(log) == (flown, flown)
 
 
 def test_the_commands_of_a_plan_come_once(tmp_path):
     log = tmp_path / "plan.mcap"
     setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
     flown = fly(log, setup)
-    assert refly(log) == (flown, flown)
+    assert resimulate(log) == (flown, flown)
 
 
 def test_a_run_that_listened_to_nobody_is_flown_again_too(tmp_path):
     log = tmp_path / "hover.mcap"
     flown = fly(log, resolve(load("hover", ["run.duration=2"])))
-    assert refly(log) == (flown, flown)
+    assert resimulate(log) == (flown, flown)
 
 
 def test_the_log_alone_is_enough(tmp_path):
@@ -47,7 +47,7 @@ def test_the_log_alone_is_enough(tmp_path):
     shutil.rmtree(copy)
     log, setup = tmp_path / "hover.mcap", resolve(scene)
     flown = fly(log, setup, sources={name: content.decode() for name, content in scene.sources.items()})
-    assert refly(log) == (flown, flown)
+    assert resimulate(log) == (flown, flown)
     with LogReader(log) as read:
         assert first_difference(recorded_setup(read), setup) is None
         assert read.attachments["airframe.toml"] == (SCENES / "vehicles" / "delivery_drone.toml").read_bytes()

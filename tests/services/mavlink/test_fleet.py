@@ -10,7 +10,7 @@ from pymavlink import mavutil
 
 from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput, VehicleState
-from lapwing.runs.resimulate import refly
+from lapwing.runs.resimulate import resimulate
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links import numbered
 
@@ -66,7 +66,7 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
     assert set(told["left"]) | set(told["scout"]) <= {"link"}  # that a station is there
     assert {"arm", "takeoff"} <= set(told["right"])
     assert up["right"] > 1.0 > max(up["left"], up["scout"])
-    before, after = refly(log)
+    before, after = resimulate(log)
     assert before == after
 
 

@@ -26,7 +26,7 @@ from mavsdk.offboard import (  # noqa: E402
 from mavsdk.param import ParamError  # noqa: E402
 
 from lapwing.cosim.log import LogReader  # noqa: E402
-from lapwing.runs.resimulate import refly  # noqa: E402
+from lapwing.runs.resimulate import resimulate  # noqa: E402
 
 pytestmark = pytest.mark.long
 
@@ -130,7 +130,7 @@ def test_arm_take_off_go_to_return_disarm_and_the_log_is_flown_again(tmp_path):
     log = session(tmp_path, "test-mavsdk-go", story, "autopilot.parameters.RTL_RETURN_ALT=6.0")
     with LogReader(log) as read:
         assert read.complete
-    before, again = refly(log)
+    before, again = resimulate(log)
     assert before == again
 
 

@@ -97,7 +97,7 @@ def test_links_keep_their_lengths_and_the_load_its_path(number, tmp_path):
 
 def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
     digests = set()
-    for mode in ("processes", "single"):
+    for mode in ("multi-process", "single-process"):
         figures = tmp_path / f"{mode}.json"
         command = [sys.executable, "-m", "lapwing", "run", str(LOAD), "--mode", mode, "--set", "run.duration=0.5"]
         command += ["--json", str(figures), "--log", str(tmp_path / f"{mode}.mcap"), "--key-prefix", "test-formation"]

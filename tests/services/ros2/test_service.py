@@ -225,7 +225,7 @@ def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tm
     sets = ["--set", "run.duration=8", "--set", "autopilot.operator=true", "--set", "autopilot.estimator=truth"]
     names = [*needed(resolve(load("groundstation", sets[1::2]))), ROS2]
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, MONITOR]).items())
-    common = ["groundstation", *sets, "--set", "success.require=[]", "--peers", table, "--key-prefix", "elsewhere"]
+    common = ["groundstation", *sets, "--set", "success.require=[]", "--endpoints", table, "--key-prefix", "elsewhere"]
     log = ["--log", str(tmp_path / "a.mcap")]
     graph_at = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}"]
     own = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}

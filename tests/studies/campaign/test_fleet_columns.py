@@ -104,7 +104,7 @@ def test_a_run_is_its_figures_and_the_same_each_time():
 
 def test_a_run_is_flown_again_to_the_bit(folder, tmp_path):
     code, said = lapwing(
-        "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single", "--log", tmp_path / "a.mcap"
+        "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single-process", "--log", tmp_path / "a.mcap"
     )
     assert "the same end, to the bit" in said
     assert code == 4  # as it had failed

@@ -10,7 +10,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
 from lapwing.runs.observer import Silent
-from lapwing.runs.resimulate import refly
+from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import from_resolved, load, resolve
@@ -128,8 +128,8 @@ def test_a_log_is_flown_again_without_the_file_once_its_code_may_be_run(scene, t
     fly_single(resolve(own), log)
     (tmp_path / "own_python.py").unlink()
     with pytest.raises(ValueError, match=r"carries code of its author \(modules.own_python.py\)"):
-        refly(log)
-    before, after = refly(log, run_code=True)
+        resimulate(log)
+    before, after = resimulate(log, allow_code=True)
     assert before == after
 
 
