@@ -78,7 +78,7 @@ def test_who_has_no_certificate_starts_only_where_that_is_asked_for(tmp_path):
     plant = participant("plant", peers, tmp_path, insecure=False)
     _, said = plant.communicate(timeout=60)
     assert plant.returncode == 2
-    assert "anybody could join there: expected tls/HOST:PORT with --keys FOLDER, or --insecure" in said
+    assert "endpoint is not authenticated; use tls/HOST:PORT with --keys FOLDER, or --insecure" in said
 
 
 def test_a_participant_speaks_for_itself_alone(tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import lapwing
+from lapwing.cli.app import GROUPS
 from lapwing.cosim.transport.key_prefix import check_key_prefix
 from lapwing.runs import single_process_run
 
@@ -61,29 +62,29 @@ BAD = {
     "too few peers": ([HOVER, "--endpoints", PEERS, "--insecure"], "no endpoint for trajectory, recorder, mission"),
     "open door": (
         [HOVER, "--listen", "tcp/0.0.0.0:1"],
-        "--listen tcp/0.0.0.0:1: anybody could join there: expected tls/",
+        "--listen tcp/0.0.0.0:1: endpoint is not authenticated; use tls/",
     ),
     "no keys": (
         [HOVER, "--listen", "tls/0.0.0.0:1"],
-        "expected --keys FOLDER with it; `lapwing certificates FOLDER` makes one",
+        "needs certificates; use --keys FOLDER",
     ),
     "viewers": (
         [HOVER, "--foxglove", "0.0.0.0:8799"],
         "--foxglove 0.0.0.0:8799: anybody could look on there: expected",
     ),
-    "view alone": ([HOVER, "--mode", "single-process", "--view"], "--view: belongs to a run in processes"),
-    "ROS 2 alone": ([HOVER, "--mode", "single-process", "--ros2", "0"], "--ros2: belongs to a run in processes"),
+    "view alone": ([HOVER, "--mode", "single-process", "--view"], "--view: needs --mode multi-process"),
+    "ROS 2 alone": ([HOVER, "--mode", "single-process", "--ros2", "0"], "--ros2: needs --mode multi-process"),
     "ROS 2 in a scene": (
         [HOVER, "--mode", "single-process", "--set", "bus.ros2=true"],
-        "--ros2: belongs to a run in processes",
+        "--ros2: needs --mode multi-process",
     ),
     "ROS 2 domain": ([HOVER, "--ros2", "233"], "'--ros2': Input should be less than or equal to 232"),
     "router alone": ([HOVER, "--ros2-router", "127.0.0.1:7447"], "--ros2-router 127.0.0.1:7447: expected with --ros2"),
     "router elsewhere": ([HOVER, "--ros2", "0", "--ros2-router", "robot:7447"], "robot:7447: is not this machine"),
-    "program": ([HOVER, "--external", "autopilot=tcp/[::1]:1"], "expected unixsock-stream/PATH in a folder of your"),
+    "program": ([HOVER, "--external", "autopilot=tcp/[::1]:1"], "use unixsock-stream/PATH in a folder of your"),
     "real time": (
         [HOVER, "--realtime", "--speed", "max"],
-        "--realtime: belongs to a run that keeps a speed",
+        "--realtime: needs a limited speed",
     ),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
@@ -115,7 +116,7 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["run", "hover", "--report", "a.txt"], "--report a.txt: expected a name that ends in .html, .pdf or .png"),
         (["replay", "none.mcap"], "none.mcap"),
         (["replay", "none.mcap", "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
-        (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999"], "tcp/0.0.0.0:7999: anybody could listen there: exp"),
+        (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999"], "tcp/0.0.0.0:7999: endpoint is not authenticated"),
         (["replay", "none.mcap", "--listen", "tcp/[::]:7999"], "127.0.0.1:7447, or --insecure"),
         (["replay", "none.mcap", "--listen", "tcp/[::1]:7999"], "none.mcap: cannot read the log"),
         (["replay", "none.mcap", "--listen", "tcp/localhost:7999"], "none.mcap: cannot read the log"),
@@ -167,11 +168,18 @@ def test_version(lapwing):
     assert out.startswith("lapwing ")
 
 
-def test_without_a_command_the_help_is_shown(lapwing):
-    code, out, _ = lapwing()
-    assert code == 0
-    for command in ("run", "scenes", "check", "precompile", "report", "replay"):
-        assert f"\n  {command} " in out
+def test_help_lists_commands_in_groups_on_single_lines():
+    command = [sys.executable, "-m", "lapwing", "--help"]
+    result = subprocess.run(command, env=os.environ | {"COLUMNS": "80"}, capture_output=True, text=True, check=True)
+    lines = result.stdout.split("Fly:\n")[1].splitlines()
+    names = [line.split()[0] for line in lines if line.startswith("  ")]
+    assert names == [name for group in GROUPS.values() for name in group]
+    assert all(line.endswith(".") and len(line) <= 80 for line in lines if line.startswith("  "))
+    assert "Other:" not in result.stdout
+    without = subprocess.run(
+        command[:-1], env=os.environ | {"COLUMNS": "80"}, capture_output=True, text=True, check=True
+    )
+    assert without.stdout == result.stdout
 
 
 def test_scenes_are_listed_a_line_each_broken_ones_too(lapwing, tmp_path):

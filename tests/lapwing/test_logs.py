@@ -63,7 +63,7 @@ def test_verify_recomputes_the_digest(lapwing, tmp_path):
     path.write_bytes(other)
     code, _, err = lapwing("verify", path)
     assert code == 3
-    assert f"states the digest {'0' * 32}" in err
+    assert f"recorded {'0' * 32}" in err
 
 
 def test_verify_finds_the_first_message_that_differs_and_how_it_grows(lapwing, tmp_path):
@@ -85,7 +85,7 @@ def test_logs_with_the_same_messages_are_the_same_whatever_their_chunks(lapwing,
         for topic, kind, time_ns, payload in log.messages():
             other.write(topic, kind, payload, time_ns)
     code, out, _ = lapwing("verify", path, "b.mcap")
-    assert (code, out) == (0, f"{path} and b.mcap: the same messages\n")
+    assert (code, out) == (0, f"{path} and b.mcap: identical messages\n")
 
 
 def test_a_message_that_one_log_lacks_is_a_difference(lapwing, tmp_path):
@@ -254,7 +254,7 @@ def test_what_is_not_otherwise_is_still_replayed_and_exported(lapwing, old):
         (["info", "none.mcap"], "none.mcap: cannot read the log"),
         (["info", "text.mcap"], "text.mcap: not an MCAP file"),
         (["verify", "whole.mcap", "whole.mcap"], "is the same file as FILE"),
-        (["verify", "foreign.mcap"], "states no digest"),
+        (["verify", "foreign.mcap"], "has no digest"),
         (["recover", "whole.mcap"], "there is nothing to recover"),
         (["recover", "cut.mcap", "--out", "none/a.mcap"], "none/a.mcap: cannot be written"),
         (["export", "whole.mcap"], "expected --parquet FOLDER, --csv FOLDER or --mat FILE"),

@@ -8,7 +8,7 @@ from lapwing.cli import plan_options
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import fly
 
-PLAN = "scenes/plans/delivery.plan"
+PLAN = "lapwing/scenes/plans/delivery.plan"
 
 
 def test_one_vehicle_needs_no_name():

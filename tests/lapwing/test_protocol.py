@@ -7,7 +7,7 @@ def test_it_tells_the_services_their_ports_and_columns(lapwing):
     code, out, _ = lapwing("protocol", "hover")
     assert code == 0
     assert "\nplant\n" in out
-    assert "gives truth every tick" in out
+    assert "output truth, every tick" in out
 
 
 def test_json_and_picture_are_written(lapwing, tmp_path):

@@ -126,11 +126,11 @@ def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
 def test_a_part_counts_its_own_runs(flown, tmp_path):
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
     code, said = lapwing(*words, "--shard", "2/2")
-    assert (code, "2 of 2 flights" in said, "3 shards are still missing" in said) == (0, True, True)
+    assert (code, "2 of 2 flights" in said, "3 shards missing" in said) == (0, True, True)
     again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process"]
     told = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
     assert f"run 0 of {tmp_path / 'c'}: it has not been flown there yet" in told[0]
-    assert f"run 1 of {tmp_path / 'c'}: the same end, to the bit" in told[1]
+    assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in told[1]
     code, said = lapwing(*words)
     assert (code, "3 of 3 flights" in said) == (0, True)
 
@@ -243,7 +243,10 @@ def test_report_json_and_a_run_flown_again_to_the_bit(flown, tmp_path, monkeypat
     assert command in page
     monkeypatch.chdir(tmp_path)
     code, said = lapwing(*command.split()[1:], "--mode", "single-process", "--log", "again.mcap")
-    assert (code, f"run {worst} of {folder.path}: the same end, to the bit" in said) == (4, True)  # one that fails
+    assert (code, f"run {worst} of {folder.path}: final state bit-for-bit identical" in said) == (
+        4,
+        True,
+    )  # one that fails
     code, said = lapwing("run", SCENE, "--run", RUNS, "--campaign", folder.path)
     assert (code, f"--run {RUNS}: expected a run of {folder.path}, 0 to 39" in said) == (2, True)
     code, said = lapwing("run", "hover", "--run", 1, "--campaign", folder.path)
@@ -300,7 +303,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
         (["hover", "--ci-half-width", "2"], "--ci-half-width 2: expected a probability between 0 and 1"),
         (
             ["hover", "--ci-half-width", "0.1", "--shard", "1/2"],
-            "--ci-half-width: a part does not know how the others end",
+            "--ci-half-width: needs the results of all runs",
         ),
         (["hover", "--workers", "2", "--cluster", "tcp://127.0.0.1:1"], "--workers: a cluster has its own"),
         (["hover", "--workers", "0"], "--workers 0: expected at least 1"),

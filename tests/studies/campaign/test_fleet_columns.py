@@ -106,5 +106,5 @@ def test_a_run_is_flown_again_to_the_bit(folder, tmp_path):
     code, said = lapwing(
         "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single-process", "--log", tmp_path / "a.mcap"
     )
-    assert "the same end, to the bit" in said
+    assert "final state bit-for-bit identical" in said
     assert code == 4  # as it had failed
