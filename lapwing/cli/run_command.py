@@ -238,6 +238,4 @@ def _check_success(scene: "Scene", flights: "Sequence[Flight]") -> None:
     for flight, vehicle in zip(flights, scene.vehicles or (scene,), strict=False):
         if unmet := vehicle[Success].unmet(metrics(flight)):
             of = f" of {flight.vehicle}" if scene.vehicles else ""
-            fail(
-                f"flight{of} failed: {flight.outcome.kind}; success.require not met: {'; '.join(unmet)}", FLIGHT_FAILED
-            )
+            fail(f"flight{of} failed: {flight.outcome.kind}; success.require: {'; '.join(unmet)}", FLIGHT_FAILED)
