@@ -69,7 +69,7 @@ def card(subject: Path) -> list[Row]:
         subject: an airframe's file, or a scene, whose vehicle is taken.
 
     Raises:
-        ValueError: neither of the two, or nothing says what the rotors give.
+        ValueError: neither of the two, or the rotor thrust is undefined.
     """
     vehicle, rotor = _vehicle(subject)
     rows = []

@@ -1,8 +1,8 @@
-"""Control allocation: each rotor's share of every demand, for rotors at any place (theory.md, eq. (4.27)).
+"""Control allocation for arbitrary rotor positions (theory.md, eq. (4.27)).
 
-The least thrusts, in the sum of their squares, that give the wanted lift and torques: the pseudo-inverse of the
-effectiveness matrix, scaled so that four rotors in a cross get shares of +1 and -1. The thrust of a rotor is the one
-that it gives by itself: where some stand in the wake of others, the effectiveness has what they lose.
+The least-squares thrusts of the desired lift and torques: the pseudo-inverse of the effectiveness matrix, scaled so
+that four rotors in a cross get shares of +1 and -1. Thrusts are those of isolated rotors; the effectiveness matrix
+includes the losses in the wakes of other rotors.
 """
 
 import numpy as np
@@ -12,30 +12,30 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.services.autopilot.interface import PerRotor
 from lapwing.services.autopilot.mixer import Share, Shares
 
-LEAST_LIFT = 0.05  # share of the lift that every rotor must have in hover, to be turned down for control
-WORST_CONDITION = 1e3  # of the scaled effectiveness, above which a torque counts as one that the rotors cannot give
-ARM_DIGITS = 9  # behind the point of an arm [m], to which those of two rotors over one another are the same
+LEAST_LIFT = 0.05  # minimum share of the hover lift per rotor, which leaves room for control
+WORST_CONDITION = 1e3  # condition number of the scaled effectiveness above which a torque is uncontrollable
+ARM_DIGITS = 9  # decimals of arms [m] for the comparison of coaxial rotors
 YAW = 3  # row of the effectiveness
 
 
 def effectiveness(rotor_x: PerRotor, rotor_y: PerRotor, rotor_yaw: PerRotor) -> np.ndarray:
-    """Lift [N] and torques about body x, y, z [N m] of 1 N of thrust of every rotor: shape (4, rotors).
+    """Return lift [N] and torques about body x, y, z [N m] per 1 N of thrust of every rotor, shape (4, rotors).
 
     Args:
         rotor_x: [m] body.
         rotor_y: [m] body.
-        rotor_yaw: torque about body z of 1 N of thrust [m].
+        rotor_yaw: torque about body z per 1 N of thrust [m].
     """
     return np.array([np.ones(len(rotor_x)), rotor_y, -np.array(rotor_x), rotor_yaw])
 
 
 def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], rotor_reaction: PerRotor) -> np.ndarray:
-    """The same for rotors that push along axes of their own (theory.md, eq. (4.27a)).
+    """Return the effectiveness of tilted rotors, shape (4, rotors) (theory.md, eq. (4.27a)).
 
     Args:
         positions: [m] body.
-        axes: unit vectors in the body.
-        rotor_reaction: torque about its axis of 1 N of thrust [m].
+        axes: unit vectors of thrust, body.
+        rotor_reaction: torque about its axis per 1 N of thrust [m].
     """
     axis = np.array(axes)
     torques = np.cross(positions, axis) + np.array(rotor_reaction)[:, None] * axis
@@ -43,20 +43,20 @@ def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], ro
 
 
 def in_wakes(still: np.ndarray, turning: np.ndarray, torque_per_thrust: float, wakes: WakeSlopes) -> np.ndarray:
-    """The same for rotors of which some stand in the wake of others (theory.md, eq. (4.27b)).
+    """Return the effectiveness of rotors in the wakes of others, shape (4, rotors) (theory.md, eq. (4.27b)).
 
     Args:
-        still: `effectiveness` of the rotors without their reaction torques, shape (4, rotors).
-        turning: torques about body x, y, z of 1 N m of each rotor's reaction, below a row of 0; shape (4, rotors).
-        torque_per_thrust: [m] of a rotor by itself.
-        wakes: with a row and a column for each rotor.
+        still: `effectiveness` of the rotors without reaction torques, shape (4, rotors).
+        turning: torques about body x, y, z per 1 N m of each rotor's reaction, below a row of 0; shape (4, rotors).
+        torque_per_thrust: [m] of an isolated rotor.
+        wakes: slopes with a row and a column per rotor.
     """
     thrust, torque = np.array(wakes.thrust), np.array(wakes.torque)
     return still @ thrust + turning @ (torque_per_thrust * np.eye(len(thrust)) + torque)
 
 
 def demand_effects(B: np.ndarray) -> np.ndarray:
-    """Lift [N] and torques [N m] of demands of 1 N: rotors times mean arm, shape (4,).
+    """Return lift [N] and torques [N m] of virtual controls of 1 N: rotors times mean arm, shape (4,).
 
     Args:
         B: `effectiveness` of the rotors, shape (4, rotors).
@@ -65,15 +65,14 @@ def demand_effects(B: np.ndarray) -> np.ndarray:
 
 
 def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None) -> Shares | None:
-    """(collective, roll, pitch, yaw) share of every rotor in the demands; None where they cannot hover in balance.
+    """Return the (collective, roll, pitch, yaw) share of every rotor. Return None if a balanced hover is impossible.
 
-    Where the rotors that are left after a failure cannot give yaw torque beside the others, it is given up: its shares
-    are 0.
+    If the remaining rotors after a failure cannot control yaw too, the yaw shares are 0.
 
     Args:
         B: `effectiveness` of the rotors, shape (4, rotors).
-        failed: number of the rotor that gives nothing, from 1; 0: none.
-        weights: of the squares of the thrusts, shape (rotors,); 1 if left out.
+        failed: number of the failed rotor, from 1; 0: none.
+        weights: weights of the squared thrusts, shape (rotors,); default 1.
     """
     effects = demand_effects(B)
     if effects.min() <= 0.0:
@@ -94,19 +93,17 @@ def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None)
 
 
 def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ...]:
-    """Shares with all rotors, then with each one failed; with all rotors alone where one that fails ends control.
+    """Return the shares with all rotors, then with each one failed. See `shares_of` for arguments.
 
-    Arguments as of `shares_of`.
-
-    It does so where four rotors fly, and where two stand over one another, since what the gyroscopes say does not tell
-    which of both has failed.
+    Only the first table is returned if a failed rotor ends control, as with four rotors, or cannot be identified by
+    the gyroscopes, as with coaxial rotors.
 
     Raises:
-        ValueError: the rotors cannot hover in balance, or give no torque about an axis.
+        ValueError: a balanced hover is impossible, or no torque acts about an axis.
     """
     whole, count = shares_of(B, 0, weights), B.shape[1]
     if whole is None:
-        expected = "lift from each in hover, and torques about all three axes that do not come with one another"
+        expected = "lift from each rotor in hover, and independent torques about all three axes"
         raise ValueError(f"the {count} rotors cannot be balanced; expected {expected}")
     arms = np.round(B[1:YAW] / B[0], ARM_DIGITS)
     if len(np.unique(arms, axis=1).T) < count:

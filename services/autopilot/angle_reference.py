@@ -1,5 +1,4 @@
-"""The angle that the inner loop follows: the outer loop's output, smoothed, with rate and acceleration
-(theory.md, eqs. (4.14)-(4.16))."""
+"""Smoothed angle reference of the inner loop with rate and acceleration (theory.md, eqs. (4.14)-(4.16))."""
 
 import math
 from typing import NamedTuple
@@ -8,19 +7,19 @@ from lapwing.kernels import always_inline
 
 
 class Smoothing(NamedTuple):
-    """A second-order filter, followed by the lag of the motors where their torque is fed forward."""
+    """A second-order filter, followed by the motor lag if the torque is fed forward."""
 
     bandwidth: float  # natural frequency [rad/s]
     damping: float  # 1 = critical
-    lag: float  # [s]; 0 where nothing is fed forward
+    lag: float  # [s]; 0 without feed-forward
 
 
 class Angle(NamedTuple):
-    """State of the smoothing; the demand runs ahead of the reference by the lag."""
+    """State of the filter; the demand leads the reference by the lag."""
 
     demand: float  # [rad]
     demand_rate: float  # [rad/s]
-    demand_acceleration: float  # [rad/s^2] what the motors are asked for now
+    demand_acceleration: float  # [rad/s^2] motor command
     angle: float  # the reference [rad]
     rate: float  # [rad/s]
     acceleration: float  # [rad/s^2]
@@ -31,13 +30,13 @@ AT_REST = Angle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @always_inline
 def advance(p: Smoothing, s: Angle, target: float, dt: float) -> Angle:
-    """The state one tick of dt [s] on, towards `target` [rad]: dt times bandwidth must stay well below 1."""
+    """Return the state after dt [s] with input `target` [rad]; dt times bandwidth must stay well below 1."""
     acceleration = p.bandwidth * (p.bandwidth * (target - s.demand) - 2.0 * p.damping * s.demand_rate)
     demand = s.demand + dt * (s.demand_rate + 0.5 * dt * acceleration)
     demand_rate = s.demand_rate + dt * acceleration
     if p.lag == 0.0:
         return Angle(demand, demand_rate, acceleration, demand, demand_rate, acceleration)
-    # Exact for an acceleration that lags behind a constant demand: what the rotors deliver within this tick.
+    # Exact response of a first-order lag to a constant demand.
     excess = s.acceleration - acceleration
     decay = math.exp(-dt / p.lag)
     first = p.lag * (1.0 - decay)

@@ -1,4 +1,4 @@
-"""Attitude error and its rate about the body axes, in two ways: angle by angle, or on SO(3)."""
+"""Attitude error and its rate about the body axes, by Euler angles or on SO(3)."""
 
 import math
 
@@ -9,13 +9,13 @@ from lapwing.kernels import always_inline
 
 @always_inline
 def wrap(angle: float) -> float:
-    """The same angle in [-pi, pi] [rad]."""
+    """Return the equivalent angle in [-pi, pi] [rad]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
 
 
 @always_inline
 def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
-    """Rates of roll, pitch and yaw [rad/s] from the body rates (theory.md, eq. (4.17)); pitch away from +-pi/2."""
+    """Return the rates of roll, pitch and yaw [rad/s] from body rates (theory.md, eq. (4.17)); singular at +-pi/2."""
     s, c = math.sin(roll), math.cos(roll)
     turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
     return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
@@ -23,7 +23,7 @@ def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
 
 @always_inline
 def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
-    """Inverse of `angle_rates`: omega_body of the rates of roll, pitch and yaw."""
+    """Return omega_body of the rates of roll, pitch and yaw, the inverse of `angle_rates`."""
     s, c = math.sin(roll), math.cos(roll)
     turn = math.cos(pitch) * rates[2]
     return (rates[0] - math.sin(pitch) * rates[2], c * rates[1] + s * turn, c * turn - s * rates[1])
@@ -31,7 +31,7 @@ def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
 
 @always_inline
 def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
-    """Reference minus measured (roll, pitch, yaw) [rad], and its derivative [rad/s]: the cascade of the paper."""
+    """Return reference minus measured (roll, pitch, yaw) [rad] and its derivative [rad/s], as in the paper."""
     rates = angle_rates(angles[0], angles[1], omega_body)
     roll, pitch, yaw = subtract(angles_reference, angles)
     return (roll, pitch, wrap(yaw)), subtract(rates_reference, rates)
@@ -41,9 +41,9 @@ def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, 
 def error_on_so3(
     attitude: Quaternion, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3
 ) -> tuple[Vec3, Vec3]:
-    """Rotation vector [rad] in body axes from the attitude to the reference, and its rate [rad/s].
+    """Return the rotation vector [rad] in body axes from the attitude to the reference and its rate [rad/s].
 
-    It has no preferred order of the angles and no singularity (theory.md, eq. (4.18)).
+    Free of singularities (theory.md, eq. (4.18)).
     """
     reference = from_roll_pitch_yaw(angles_reference[0], angles_reference[1], angles_reference[2])
     between = multiply(conjugate(attitude), reference)

@@ -1,4 +1,4 @@
-"""The controller of a tick, compiled: estimate and setpoint in, motor voltages and what the autopilot does out."""
+"""Compiled controller block: estimate and setpoint in, motor command and status out."""
 
 from typing import Any, NamedTuple
 
@@ -10,56 +10,56 @@ from lapwing.services.autopilot.land_detector import FLYING, ON_GROUND
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate
 
 ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
-NO_TRAJECTORY = "no_trajectory"  # stands for that of the trajectory where there is none; never written
+NO_TRAJECTORY = "no_trajectory"  # placeholder of the trajectory's port; never written
 
 
 class ControllerInput(NamedTuple):
-    """What the commander asks of the controller, until it asks for something else."""
+    """Controller input from the commander, latched."""
 
     follow: bool = True  # the scene's trajectory, instead of `reference`
     reference: Reference = Reference()
-    words: int = 0  # number of the commander's words
+    words: int = 0  # index of the commander's status texts
     armed: bool = False
     finished: bool = False  # the run may end
-    released: bool = False  # the gripper is to be open
-    restart_at: int = -1  # [tick] at which the controller begins afresh, on the ground
+    released: bool = False  # open the gripper
+    restart_at: int = -1  # [tick] of a controller reset on the ground
 
 
 class Flight(NamedTuple):
-    """Where the flight is after a tick."""
+    """State of the flight after a tick."""
 
     stage: int = ON_GROUND  # ON_GROUND, FLYING or LANDED
-    still_from: int = 0  # [tick] from which a vehicle that stands does not move
+    still_from: int = 0  # [tick] from which a vehicle on the ground is at rest
     failed_motor: int = 0  # number from 1; 0: none
 
 
 class Controller(NamedTuple):
-    """The control law on its vehicle."""
+    """Parameters of the block."""
 
     law: Any  # cell of `control.Parameters`
     watch: motor_failure.Parameters
     thresholds: Any  # cell of `BatteryThresholds`
-    interval: float  # [s] a tick
-    bounce: int  # ticks after a touch-down in which the vehicle may still move
+    interval: float  # [s] length of a tick
+    bounce: int  # [ticks] of possible motion after a touch-down
 
 
 class ControllerState(NamedTuple):
-    """Memory of the controller."""
+    """State of the block."""
 
     control: control.State
     watch: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # of the battery, fraction; NaN: not known
+    charge: float  # of the battery, fraction; NaN: unknown
 
 
 def start(p: Controller) -> ControllerState:
-    """Before the first tick."""
+    """Return the initial state."""
     return ControllerState(control.START, python_function(motor_failure.start)(p.watch), 0, float("nan"))
 
 
 @always_inline
 def setpoint_of(wanted: Reference) -> interface.Setpoint:
-    """What the control law is asked for."""
+    """Return the setpoint of the control law."""
     return interface.Setpoint(
         wanted.position_world, wanted.velocity_world, wanted.acceleration_world, wanted.yaw, wanted.yaw_rate
     )
@@ -67,7 +67,7 @@ def setpoint_of(wanted: Reference) -> interface.Setpoint:
 
 @always_inline
 def estimate_of(e: StateEstimate) -> interface.Estimate:
-    """What the control law believes."""
+    """Return the estimate for the control law."""
     return interface.Estimate(e.position_world, e.attitude, e.velocity_world, e.omega_body)
 
 
@@ -83,18 +83,18 @@ def outcome(
     stage: int,
     c: interface.Command,
 ) -> tuple[motor_failure.State, tuple[MotorCommand, Reference, AutopilotStatus, Flight]]:
-    """The motor failure detection after a tick, and what the part gives: command, setpoint, status and flight.
+    """Return the new state of the motor failure detector and the outputs of the block.
 
     Args:
-        p: Controller.
-        watched: state of the motor failure detection.
+        p: parameters of the block.
+        watched: state of the motor failure detector.
         still_from: [tick].
         battery_charge: fraction.
-        order: Order.
-        e: StateEstimate.
-        wanted: Reference that is followed.
+        order: input from the commander.
+        e: state estimate.
+        wanted: reference in use.
         stage: ON_GROUND, FLYING or LANDED.
-        c: Command of the control law.
+        c: output of the control law.
     """
     height = e.position_world[2] - p.law.value.resting_height
     watched = motor_failure.step(p.watch, watched, p.interval, e.omega_body, height, c.thrust)
@@ -116,7 +116,7 @@ def outcome(
 def step(
     p: Controller, s: ControllerState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[ControllerState, tuple, int]:
-    """The command at `tick`."""
+    """Compute the motor command at `tick`."""
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     wanted = inputs[3].value if order.follow else order.reference
     controlled, watched, still_from = s.control, s.watch, s.still_from

@@ -1,6 +1,7 @@
-"""The commander as a part of the graph that stays in Python: acts when it is called, at every tick while it steers.
+"""The commander as an event-driven Python block.
 
-Along the scene's trajectory it is asked only at the ticks at which something may change (`commander.attention`).
+It runs at every tick while it generates setpoints. Along the scene's trajectory it runs only at ticks at which its
+output may change (`commander.wakeup_conditions`).
 """
 
 import math
@@ -33,15 +34,15 @@ Operator = Callable[[int], Iterable[Any]]
 
 
 class TextTable:
-    """Texts by number; a new one gets the next number."""
+    """Growing table of texts with an index."""
 
     def __init__(self, known: Iterable[Any] = ()):
-        """With `known` texts from 0 on."""
+        """Create a table of `known` texts."""
         self.table = list(known)
         self._number = {text: i for i, text in enumerate(self.table)}
 
     def number(self, text: Any) -> int:
-        """The number of a text."""
+        """Return the index of a text; append it if it is new."""
         if text not in self._number:
             self._number[text] = len(self.table)
             self.table.append(text)
@@ -49,7 +50,7 @@ class TextTable:
 
 
 class CommanderBlock:
-    """Shows the commander what it is to see, and puts what it asks for into the port that the controller follows."""
+    """Runs the commander and writes its output to the port of the controller."""
 
     name = "autopilot.commander"
 
@@ -62,15 +63,15 @@ class CommanderBlock:
         operator: Operator,
         injection: Injection,
     ):
-        """Parameters and failures that change go into their cells.
+        """Create the block.
 
         Args:
-            given: the autopilot.
+            given: configuration of the autopilot.
             law: cell of the controller's parameters.
-            thresholds: cell of the battery's.
-            service: gets the messages.
-            operator: gives the commands that have come until a tick.
-            injection: where failures are injected.
+            thresholds: cell of the battery thresholds.
+            service: receiver of the messages.
+            operator: source of operator commands.
+            injection: failure injection.
         """
         unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), LATCHED),)
         self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
@@ -100,22 +101,22 @@ class CommanderBlock:
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
         self.phases, self.words = TextTable(given.phases), TextTable([_words(self._commander.initial_status())])
-        self._driven: tuple[float, ...] | None = None  # voltages from outside that hold
-        self._asked = -1  # [tick] at which the commander was asked last
-        self._estimate: Any = None  # that it is shown
-        self._shown = -1  # [tick] of it
+        self._driven: tuple[float, ...] | None = None  # direct motor voltages in use
+        self._asked = -1  # [tick] of the commander's last step
+        self._estimate: Any = None  # last estimate passed to the commander
+        self._shown = -1  # [tick] of that estimate
         self._estimate_every_tick = False
-        self._ordered: ControllerInput | None = None  # what stands in the port
+        self._ordered: ControllerInput | None = None  # last value of the port
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Before the first tick the trajectory is followed."""
+        """Store the diagram."""
         self._graph = graph
         self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
 
     def act(self, tick: int) -> int:
-        """Ask the commander at `tick`."""
+        """Step the commander at `tick`. Return the tick of the next wake-up."""
         graph = self._graph
         if self._given.operator and tick - self._asked > 1:
             self._skip(range(self._asked + 1, tick))
@@ -159,20 +160,20 @@ class CommanderBlock:
         return self._next(tick, request.quiet)
 
     def _next(self, tick: int, quiet: float) -> int:
-        """The tick of the next say, after a request at `tick` that is quiet for so long [s]."""
+        """Return the tick of the next wake-up after an output at `tick` that stays valid for `quiet` [s]."""
         ticks = int(quiet / self._interval) if quiet < math.inf else NEVER
         if self._given.operator:
             ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._given.answers_every)])
         return min(tick + max(1, ticks), NEVER)
 
     def _skip(self, missed: range) -> None:
-        """Let the commander take in the ticks since it was asked, in which its request was quiet."""
+        """Advance the commander over ticks at which its output stayed valid."""
         flew = next((tick for tick in reversed(missed) if self._flies(tick)), None)
         setpoint = None if flew is None else self._followed(flew)
         self._commander.skip(len(missed), self._interval, flew == missed[-1], setpoint)
 
     def _flies(self, tick: int) -> bool:
-        """Whether the vehicle flies along the trajectory, as the commander sees it."""
+        """Return True if the vehicle flies along the trajectory."""
         return self._thrust(tick) > 0.0 and self._flight(tick).stage != LANDED
 
     def _flight(self, tick: int) -> Flight:
@@ -183,13 +184,13 @@ class CommanderBlock:
         return _setpoint(self._graph.latest(ports.TRAJECTORY, tick))
 
     def _direct(self, volts: tuple[float, ...] | None) -> DirectMotorControl:
-        """Voltages from outside within what the motors take; None: the controller's."""
+        """Return the direct motor voltages within the motors' range; None: the controller's voltages."""
         if volts is None:
             return self._injection.released
         return DirectMotorControl(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
 
     def _thrust(self, tick: int) -> float:
-        """Thrust asked for at the last tick over that of hovering; without gravity nothing falls."""
+        """Return the last thrust command over the hover thrust; 1 without gravity."""
         if not self._weight > 0.0:
             return 1.0
         asked = sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
@@ -225,12 +226,12 @@ class CommanderBlock:
 
 
 def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
-    """The controller's parameters under the commander's `values`."""
+    """Return the controller's parameters with the commander's parameter `values`."""
     return build(with_gains(given.gains, values), given.airframe, given.geometric)
 
 
 def _words(status: Status) -> Status:
-    """What is left of a status without all that is numbers in the port."""
+    """Return the part of a status that the port does not have as numbers."""
     return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)
 
 

@@ -1,4 +1,4 @@
-"""What calls the commander, as the compiled parts before it look at it."""
+"""Compiled checks that wake the commander."""
 
 from typing import Any, NamedTuple
 
@@ -6,18 +6,18 @@ from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, needs_attention
 
-ESTIMATE_POLL_TICKS = 5  # ticks between two looks of the commander at the estimate
+ESTIMATE_POLL_TICKS = 5  # [ticks] between two estimates passed to the commander
 
 
 class WakeupParameters(NamedTuple):
-    """What the conditions depend on."""
+    """Parameters of the checks."""
 
-    thresholds: Any  # cell of `BatteryThresholds`, which an operator may change
+    thresholds: Any  # cell of `BatteryThresholds`
 
 
 @always_inline
 def attention_due(p: WakeupParameters, tick: int, health: int, battery: InputSample, flight: InputSample) -> bool:
-    """Whether the commander has a say at `tick`; battery and flight as they were received."""
+    """Return True if the commander must run at `tick`."""
     charge = battery.value.charge if battery.due else 1.0
     failed = flight.value.failed_motor if flight.due else 0
     return needs_attention(p.thresholds.value, health, charge, failed, tick % ESTIMATE_POLL_TICKS == 0)
@@ -25,5 +25,5 @@ def attention_due(p: WakeupParameters, tick: int, health: int, battery: InputSam
 
 @always_inline
 def battery_warning(thresholds: BatteryThresholds, charge: float) -> int:
-    """0: none, 1: low, 2: critical, 3: nearly empty; an unknown charge (NaN) is none."""
+    """Return 0 for none, 1 low, 2 critical, 3 nearly empty; 0 for an unknown charge (NaN)."""
     return int(charge < thresholds.low) + int(charge < thresholds.critical) + int(charge < thresholds.emergency)

@@ -1,5 +1,4 @@
-"""The controller: four PID loops in the paper's cascade, saturated, down to the motors' voltages
-(theory.md, section 4.2)."""
+"""Cascaded PID controller with saturation, from setpoint to motor voltages (theory.md, section 4.2)."""
 
 import math
 from collections.abc import Sequence
@@ -27,36 +26,36 @@ from lapwing.services.autopilot.pid import Pid, integrate, output
 
 
 class Parameters(NamedTuple):
-    """A gain set on an airframe; `gains.build` makes it."""
+    """Controller parameters; see `controller_parameters.build`."""
 
     altitude: Pid  # [N] of every rotor over [m]
     yaw: Pid  # [N] over [rad]
-    roll_inner: Pid  # [N] over [rad] of the tilt to the left: negative gains
+    roll_inner: Pid  # [N] over [rad] of tilt to the left: negative gains
     pitch_inner: Pid  # [N] over [rad]
     roll_outer: Pid  # [rad] of tilt over [m]
     pitch_outer: Pid  # [rad] over [m]
     smoothing: Smoothing  # of the tilt references
     tilt_limit: float  # [rad] about either axis
-    hover_demand: float  # [N] fed forward to every rotor; 0 where nothing is fed forward
+    hover_demand: float  # [N] feed-forward of every rotor; 0 without feed-forward
     gravity: float  # [m/s^2]
-    torque_demands: Vec3  # (roll, pitch, yaw) demand of an angular acceleration [N/(rad/s^2)]; 0 for no feed-forward
-    geometric: bool  # attitude error on SO(3) instead of angle by angle
-    shares: tuple[Shares, ...]  # with all rotors, and where that serves, with each one failed
+    torque_demands: Vec3  # roll, pitch, yaw control per angular acceleration [N/(rad/s^2)]; 0 without feed-forward
+    geometric: bool  # attitude error on SO(3) instead of Euler angles
+    shares: tuple[Shares, ...]  # with all rotors, then with each one failed
     thrust_max: float  # [N] of a rotor
     motor: Motor
-    resting_height: float  # world z of the vehicle's origin when it stands [m]
+    resting_height: float  # [m] world z of the vehicle's origin at rest on the ground
 
 
 class State(NamedTuple):
-    """Memory of the controller."""
+    """State of the controller."""
 
     stage: LandedState
     integral_world: Vec3  # of the position error [m s]
     integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
     tilt_x: Angle  # reference of the pitch
     tilt_y: Angle  # reference of the tilt to the left, -roll
-    cut: VirtualControls  # sign of what saturation cut off each demand at the last tick
-    tilt_cut: tuple[float, float]  # the same of the limited tilts, in world axes
+    cut: VirtualControls  # sign of the part of each control that saturation removed at the last tick
+    tilt_cut: tuple[float, float]  # sign of the part of the tilts that the limit removed, world axes
 
 
 START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
@@ -64,13 +63,13 @@ START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 
 
 @always_inline
 def sign(x: float) -> float:
-    """-1.0, 0.0 or 1.0."""
+    """Return -1.0, 0.0 or 1.0."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
 @always_inline
 def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
-    """Components along the heading and to its left of a vector in world axes (theory.md, eq. (4.11))."""
+    """Return the components of a world vector along the heading and to its left (theory.md, eq. (4.11))."""
     s, c = math.sin(yaw), math.cos(yaw)
     return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
 
@@ -79,7 +78,7 @@ def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
 def tilt_targets(
     p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
 ) -> tuple[float, float]:
-    """Tilts [rad] towards the heading and to its left that the outer loops ask for (theory.md, eq. (4.12))."""
+    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12))."""
     x, y = to_heading(yaw, error)
     vx, vy = to_heading(yaw, error_rate)
     ix, iy = to_heading(yaw, integral)
@@ -94,7 +93,7 @@ def tilt_targets(
 def collective_demand(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:
-    """Lift [N] of every rotor; with feed-forward, the weight and the tilt are made up for (theory.md, eq. (4.13))."""
+    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13))."""
     collective = output(p.altitude, integral, error, error_rate)
     if p.hover_demand > 0.0:
         upright = max(math.cos(roll) * math.cos(pitch), 0.5)
@@ -106,15 +105,15 @@ def collective_demand(
 def step(
     p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpoint, failed: int
 ) -> tuple[State, Command]:
-    """The command of one tick, and the state after it.
+    """Return the state and the command after a tick.
 
     Args:
-        p: Parameters.
-        s: State; `START` at first.
+        p: parameters.
+        s: state; initially `START`.
         dt: length of the tick [s].
-        estimate: Estimate at the tick.
-        setpoint: Setpoint at the tick.
-        failed: number of the rotor that is known to have failed, from 1; 0: none.
+        estimate: state estimate.
+        setpoint: setpoint.
+        failed: number of the failed rotor, from 1; 0: none.
     """
     roll, pitch, yaw = to_roll_pitch_yaw(estimate.attitude)
     angles = (roll, pitch, yaw)
@@ -126,7 +125,7 @@ def step(
 
     error = subtract(setpoint.position_world, estimate.position_world)
     error_rate = subtract(setpoint.velocity_world, estimate.velocity_world)
-    # Along the two tilts the integral is kept in world axes: a steady wind does not turn with the heading.
+    # The horizontal integral is in world axes: a steady wind does not turn with the heading.
     pushes = error[0] * s.tilt_cut[0] + error[1] * s.tilt_cut[1] > 0.0
     integral = (
         s.integral_world[0] if pushes else s.integral_world[0] + dt * error[0],
@@ -139,7 +138,7 @@ def step(
     tilt_x = advance(p.smoothing, s.tilt_x, limited_x, dt)
     tilt_y = advance(p.smoothing, s.tilt_y, limited_y, dt)
 
-    # References valid at this tick are those of the old state where the motors' lag is modelled: see eq. (4.16).
+    # With a modelled motor lag the references of this tick are those of the old state: see eq. (4.16).
     now_x, now_y = (s.tilt_x, s.tilt_y) if p.smoothing.lag > 0.0 else (tilt_x, tilt_y)
     angles_reference = (-now_y.angle, now_x.angle, setpoint.yaw)
     rates_reference = (-now_y.rate, now_x.rate, setpoint.yaw_rate)

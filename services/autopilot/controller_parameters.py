@@ -1,4 +1,4 @@
-"""A gain set put on an airframe: the parameters of the controller."""
+"""Controller parameters from a gain set and an airframe."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -20,52 +20,50 @@ Triple = tuple[float, float, float]  # P, I, D
 
 
 class Gains(NamedTuple):
-    """The numbers of a gain set; outputs of altitude, yaw and the inner loops are the force demand of every rotor [N],
-    those of the outer loops are tilts [rad]."""
+    """Numbers of a gain set. Altitude, yaw and inner loops output a force per rotor [N], outer loops a tilt [rad]."""
 
     altitude: Triple  # over [m]
     yaw: Triple  # over [rad]
-    roll_inner: Triple  # over [rad] of tilt to the left, which is minus the roll: negative
+    roll_inner: Triple  # over [rad] of tilt to the left, minus the roll: negative
     pitch_inner: Triple  # over [rad]
     roll_outer: Triple  # over [m]
     pitch_outer: Triple  # over [m]
     tilt_limit: float  # [rad]
     reference_bandwidth: float  # of the tilt references' filter [rad/s]
     reference_damping: float
-    feed_forward: bool  # weight, tilt, setpoint acceleration, and the torque that the tilt references need
+    feed_forward: bool  # weight, tilt, setpoint acceleration, and torque of the tilt references
 
 
 class Airframe(NamedTuple):
-    """What the controller knows of the vehicle."""
+    """Vehicle parameters of the controller."""
 
     mass: float  # [kg]
     inertia_body: Vec3  # principal [kg m^2]
     rotor_x: PerRotor  # positions of the rotors in body axes [m]
     rotor_y: PerRotor
-    reaction_sign: PerRotor  # +1 where thrust turns the vehicle to the left about the rotor's axis
+    reaction_sign: PerRotor  # +1 if thrust yaws the vehicle to the left about the rotor's axis
     torque_per_thrust: float  # reaction torque of a rotor over its thrust [m]
     motor: Motor
     voltage_max: float  # [V]
-    resting_height: float  # world z of the vehicle's origin when it stands [m]
+    resting_height: float  # [m] world z of the vehicle's origin at rest on the ground
     gravity: float = 9.80665  # [m/s^2]
-    spin_up_zero: float = 0.0  # [s] torque of speeding the rotors up, over the reaction torque that grows with it
-    rotor_z: PerRotor = ()  # [m] of rotors that have axes
-    rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () where that is body z
-    wakes: WakeSlopes = WakeSlopes()  # of rotors that stand in the wake of others; thrusts are what each has by itself
+    spin_up_zero: float = 0.0  # [s] torque of rotor acceleration over the change of reaction torque
+    rotor_z: PerRotor = ()  # [m] of tilted rotors
+    rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust, body; (): body z
+    wakes: WakeSlopes = WakeSlopes()  # of rotors in the wakes of others; thrusts are those of isolated rotors
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
-    """The controller's parameters: the gain set on an airframe; `geometric` takes the attitude error on SO(3).
+    """Return the controller's parameters; `geometric` selects the attitude error on SO(3).
 
-    Raises ValueError where the airframe cannot hover, or not in balance.
+    Raises:
+        ValueError: the airframe cannot hover in balance.
     """
-    thrust_max = python_function(thrust_at)(airframe.motor, airframe.voltage_max)  # a start waits for no compiler
+    thrust_max = python_function(thrust_at)(airframe.motor, airframe.voltage_max)  # avoids compilation at the start
     weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
     share, needed = shares(airframe), hover_thrust(airframe)
     if thrust_max <= needed:
-        raise ValueError(
-            f"the rotors give at most {thrust_max:.1f} N each, less than the {needed:.1f} N that hovering needs"
-        )
+        raise ValueError(f"maximum thrust of {thrust_max:.1f} N per rotor is below the {needed:.1f} N needed to hover")
     forward = 1.0 if gains.feed_forward else 0.0
     x, y, z = (forward * i / moment for i, moment in zip(airframe.inertia_body, moments(airframe), strict=True))
     return Parameters(
@@ -89,40 +87,40 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
 
 
 def hover_thrust(airframe: Airframe) -> float:
-    """Thrust [N] in hover of the rotor that carries the most; by itself, where some stand in the wake of others."""
+    """Return the hover thrust [N] of the most loaded rotor, as an isolated rotor."""
     weight = airframe.mass * airframe.gravity / lift(airframe)
     return weight * max(collective for collective, *_ in shares(airframe)[0])
 
 
 def hover_torque(airframe: Airframe) -> float:
-    """Torque [N m] against the rotor that turns hardest in hover."""
+    """Return the hover torque [N m] of the most loaded rotor."""
     gained = max((sum(row) for row in airframe.wakes.torque), default=0.0)
     return hover_thrust(airframe) * (airframe.torque_per_thrust + max(gained, 0.0))
 
 
 def lift(airframe: Airframe) -> float:
-    """Force along body z [N] of a collective demand of 1 N: the number of rotors where none is tilted."""
+    """Return the force along body z [N] of a collective of 1 N: the number of rotors if none is tilted."""
     return _demand_effects(*_geometry(airframe))[0]
 
 
 def moments(airframe: Airframe) -> Vec3:
-    """Torques about body x, y, z [N m] of demands of 1 N."""
+    """Return the torques about body x, y, z [N m] of virtual controls of 1 N."""
     _, x, y, z = _demand_effects(*_geometry(airframe))
     return x, y, z
 
 
 def shares(airframe: Airframe) -> tuple[Shares, ...]:
-    """Each rotor's share of the demands, as of `allocation.tables`."""
+    """Return the rotors' shares of the virtual controls. See `allocation.tables`."""
     return _tables(*_geometry(airframe))
 
 
 def rotor_effectiveness(a: Airframe) -> np.ndarray:
-    """Force along body z [N] and torques [N m] of 1 N of thrust of every rotor, as of `allocation.effectiveness`."""
+    """Return lift [N] and torques [N m] per 1 N of thrust of every rotor. See `allocation.effectiveness`."""
     return _effectiveness(*_geometry(a))
 
 
 def _geometry(a: Airframe) -> tuple:
-    """All that the rotors' effectiveness depends on: the arguments of `_effectiveness`."""
+    """Return the arguments of `_effectiveness`."""
     return a.rotor_x, a.rotor_y, a.rotor_z, a.rotor_axis, a.reaction_sign, a.torque_per_thrust, a.wakes
 
 
@@ -140,7 +138,7 @@ def _effectiveness(
     return in_wakes(alone(0.0), alone(1.0) - alone(0.0), torque, wakes)
 
 
-# asked for several times at a start, and by every run of a campaign
+# used several times at a start, and by every run of a campaign
 @lru_cache(maxsize=16)
 def _demand_effects(*geometry: Any) -> tuple[float, ...]:
     return tuple(map(float, demand_effects(_effectiveness(*geometry))))
@@ -152,5 +150,5 @@ def _tables(*geometry: Any) -> tuple[Shares, ...]:
     x, y, z, axes, signs, torque, wakes = geometry
     if not wakes.thrust:
         return tables(B)
-    # so weighed, all rotors hover at one speed, about which the slopes hold
+    # these weights make all rotors hover at the speed about which the slopes hold
     return tables(B, B[0] / _effectiveness(x, y, z, axes, signs, torque, WakeSlopes())[0])

@@ -1,4 +1,4 @@
-"""What the autopilot does, as messages."""
+"""Topic encoders of the autopilot."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,14 +19,14 @@ from lapwing.services.common.reference_encoder import reference_wire
 def wires(
     setup: RunConfig, estimate_every: int, status_every: int, texts: Sequence[str], words: Sequence[Any]
 ) -> list[TopicEncoder]:
-    """The autopilot's topics.
+    """Return the encoders of the autopilot's topics.
 
     Args:
-        setup: the run.
+        setup: run configuration.
         estimate_every: ticks between two messages of the estimate.
-        status_every: the same of the status.
-        texts: names of phases by number; may grow.
-        words: what the commander says besides numbers (`StatusWords`) by number; may grow.
+        status_every: ticks between two messages of the status.
+        texts: phase names by index; may grow.
+        words: status texts of the commander by index; may grow.
     """
     actuators = setup.port(ports.ACTUATORS).like
     command = Actuators(header(0, "body"), actuators.motor_voltage, False, actuators.thrust)

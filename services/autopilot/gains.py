@@ -1,4 +1,4 @@
-"""Gain sets: one TOML file each in `gains/`, or anywhere by its path; validated, then put on an airframe."""
+"""Gain sets: TOML files in `gains/` or at a path."""
 
 import tomllib
 from pathlib import Path
@@ -19,8 +19,8 @@ Triple = tuple[Finite, Finite, Finite]  # P, I, D
 
 
 class GainSet(SceneTable):
-    """A gain set as its file writes it: P, I, D of each loop; outputs of altitude, yaw and the inner loops are the
-    force demand of every rotor [N], those of the outer loops are tilts [rad]."""
+    """A gain set with P, I, D of each loop. Altitude, yaw and inner loops output a force per rotor [N], outer loops a
+    tilt [rad]."""
 
     TABLE: ClassVar[str] = "gains"
     OPTIONAL: ClassVar[bool] = True
@@ -34,25 +34,26 @@ class GainSet(SceneTable):
     pitch_inner: Triple  # [N/rad], [N/(rad s)], [N s/rad] pitch
     roll_outer: Triple  # [rad/m], [rad/(m s)], [rad s/m] position along y
     pitch_outer: Triple  # [rad/m], [rad/(m s)], [rad s/m] position along x
-    tilt_limit: Annotated[Positive, Lt(1.4)]  # [rad] largest roll and pitch reference
+    tilt_limit: Annotated[Positive, Lt(1.4)]  # [rad] maximum roll and pitch reference
     reference_bandwidth: Positive  # [rad/s] of the tilt references' filter
     reference_damping: Positive  # ratio, of the tilt references' filter
-    feed_forward: bool  # weight, tilt, setpoint acceleration, and the torque that the tilt references need
+    feed_forward: bool  # weight, tilt, setpoint acceleration, and torque of the tilt references
 
     def plain(self) -> Gains:
-        """The gains as a NamedTuple of numbers, as the control law takes them."""
+        """Return the numbers for the control law."""
         return Gains(*(getattr(self, name) for name in Gains._fields))
 
 
 def names() -> list[str]:
-    """The gain sets that ship."""
+    """Return the names of the shipped gain sets."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load(name: str) -> GainSet:
-    """The gain set of a name, or of a path that ends in .toml.
+    """Return the gain set of a name, or of a path that ends in .toml.
 
-    Raises ValueError (one line) for an unknown name (lists the choices), a file that cannot be read, a wrong content.
+    Raises:
+        ValueError: (one line) the name is unknown, or the file is unreadable or invalid.
     """
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if path.parent == FOLDER and path.stem not in names():

@@ -1,13 +1,13 @@
-"""Which sensor tells the filter how far the ground is."""
+"""Choice of the distance sensor for the filter."""
 
 from lapwing.cosim.scene import Scene
 from lapwing.services.common import ports
 
-DOWN = -90.0  # [deg] elevation of a ray that meets the ground under a level vehicle
+DOWN = -90.0  # [deg] elevation of a vertical ray
 
 
 def distance_sensor(scene: Scene) -> str | None:
-    """The sonar; where there is none, a rangefinder that looks straight down; None without either."""
+    """Return the port of the sonar, or of a rangefinder that points straight down. Return None without either."""
     carried = scene.tables("sensors")
     if ports.SONAR in carried:
         return ports.SONAR

@@ -1,14 +1,14 @@
-"""The estimate before there is one."""
+"""Estimates before the filter has started."""
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.services.common.ports import StateEstimate
 
-NOT_STARTED = 0xFF  # health before the estimator has begun
+NOT_STARTED = 0xFF  # health before the filter has started
 
 EXACT = StateEstimate()
-"""An estimate at the origin, at rest, without error."""
+"""Estimate at the origin, at rest, without error."""
 
 
 def before(position_world: Vec3) -> StateEstimate:
-    """The estimate before the filter has begun, of a vehicle that is put down at a place [m]."""
+    """Return the estimate before the filter has started, at the start position [m]."""
     return EXACT._replace(position_world=position_world, health=NOT_STARTED)

@@ -1,15 +1,15 @@
-"""What goes into the controller and what comes out of it."""
+"""Inputs and outputs of the control law."""
 
 from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import Vec3
 
-PerRotor = tuple[float, ...]  # as many as the vehicle has rotors
+PerRotor = tuple[float, ...]  # one value per rotor
 
 
 class Estimate(NamedTuple):
-    """What the controller believes of the vehicle."""
+    """State estimate for the controller."""
 
     position_world: Vec3  # [m]
     attitude: Quaternion  # body to world
@@ -18,7 +18,7 @@ class Estimate(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """What the vehicle is asked to do now."""
+    """Desired motion."""
 
     position_world: Vec3  # [m]
     velocity_world: Vec3  # [m/s]
@@ -31,8 +31,8 @@ class Command(NamedTuple):
     """The controller's output."""
 
     motor_voltage: PerRotor  # [V]
-    thrust: PerRotor  # asked of each rotor [N]
-    roll_reference: float  # what the inner loop follows [rad]
+    thrust: PerRotor  # [N]
+    roll_reference: float  # of the inner loop [rad]
     pitch_reference: float  # [rad]
     yaw_reference: float  # [rad]
-    finished: bool  # landed, motors off for good
+    finished: bool  # landed, motors off

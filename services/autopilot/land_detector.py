@@ -1,4 +1,4 @@
-"""When the motors run: take-off, landing, cut-off (theory.md, section 4.5)."""
+"""Land detector: take-off, landing and motor cut-off (theory.md, section 4.5)."""
 
 from typing import NamedTuple
 
@@ -9,16 +9,16 @@ ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, fly
 CUT_HEIGHT = (
     0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
 )
-LANDED_TIME = 2.0  # [s] asked to stand and not moving: the motors stop although the estimated height says otherwise
-LANDED_HEIGHT_ERROR = 0.5  # [m] how wrong the estimated height may be for that
-LANDED_SPEED = 0.1  # [m/s] greatest estimated vertical speed of a vehicle that stands
+LANDED_TIME = 2.0  # [s] at rest with a setpoint on the ground, after which the motors stop at any estimated height
+LANDED_HEIGHT_ERROR = 0.5  # [m] maximum error of the estimated height for that
+LANDED_SPEED = 0.1  # [m/s] maximum estimated vertical speed at rest
 
 
 class LandedState(NamedTuple):
-    """Where the flight is."""
+    """State of the land detector."""
 
     name: int  # ON_GROUND, FLYING or LANDED
-    waiting: float  # [s] since the vehicle was asked to stand and seemed still
+    waiting: float  # [s] at rest with a setpoint on the ground
 
 
 INITIAL_STAGE = LandedState(ON_GROUND, 0.0)
@@ -28,7 +28,7 @@ INITIAL_STAGE = LandedState(ON_GROUND, 0.0)
 def advance_stage(
     stage: LandedState, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float
 ) -> LandedState:
-    """The stage one tick of dt [s] on; `resting_height` is world z of the standing vehicle [m]."""
+    """Return the state after a tick of dt [s]; `resting_height` is world z at rest on the ground [m]."""
     height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
     asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
     if stage.name == ON_GROUND:

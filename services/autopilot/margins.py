@@ -1,4 +1,4 @@
-"""Stability margins of the loops about hover, from their frequency responses (theory.md, eqs. (4.30)-(4.34))."""
+"""Stability margins of the control loops about hover (theory.md, eqs. (4.30)-(4.34))."""
 
 from typing import Any, NamedTuple
 
@@ -8,43 +8,41 @@ from lapwing.services.autopilot.control import Parameters
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, moments
 from lapwing.services.autopilot.pid import Pid
 
-FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to Nyquist's at 250 Hz
+FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to the Nyquist frequency at 250 Hz
 
 
 class Margins(NamedTuple):
-    """How far a loop is from instability."""
+    """Stability margins of a loop."""
 
-    crossover: (
-        float  # the highest frequency of unit gain [rad/s]; inf or 0 where the gain is above or below 1 throughout
-    )
-    phase: float  # least phase margin over all crossings of unit gain [rad]; inf without one
-    gain: float  # factor on the gain that makes the loop unstable, from above
-    reduction: float  # factor below 1 on the gain that makes it unstable, 0 where none does
+    crossover: float  # highest frequency of unit gain [rad/s]; inf if the gain is always above 1, 0 if always below
+    phase: float  # minimum phase margin over all crossings of unit gain [rad]; inf without one
+    gain: float  # smallest destabilising gain factor above 1; inf without one
+    reduction: float  # largest destabilising gain factor below 1; 0 without one
 
 
 def open_loops(
     p: Parameters, airframe: Airframe, tick: float, delay: int = 1, gain: float = 1.0
 ) -> dict[str, np.ndarray]:
-    """Open-loop responses at FREQUENCIES of every loop.
+    """Return the open-loop responses of all loops at FREQUENCIES.
 
-    altitude, yaw: their single loops; roll, pitch: the inner loops, the outer ones open; y, x: the outer loops, the
-    inner ones closed; y_plant_input, x_plant_input: both loops of an axis, broken at the plant input.
+    altitude, yaw: single loops; roll, pitch: inner loops with open outer loops; y, x: outer loops with closed inner
+    loops; y_plant_input, x_plant_input: both loops of an axis, opened at the plant input.
 
     Args:
-        p: the controller.
-        airframe: what it controls.
-        tick: the controller's period [s]; the command is held over it, which delays by half of it.
-        delay: whole ticks between a measurement and its command's effect.
-        gain: true over assumed acceleration per thrust, as a lighter or stronger vehicle has it.
+        p: controller parameters.
+        airframe: vehicle parameters.
+        tick: controller period [s]; the zero-order hold adds half of it as delay.
+        delay: [ticks] between a measurement and the effect of its command.
+        gain: true over assumed acceleration per thrust.
     """
     s = 1j * FREQUENCIES
     return loops(p, airframe, s, gain * np.exp(-(delay + 0.5) * tick * s))
 
 
 def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any]:
-    """The loops of `open_loops` at the complex frequencies `s` [rad/s], where the loop's delay and gain come to `late`.
+    """Return the loops of `open_loops` at complex frequencies `s` [rad/s] with delay and gain `late`.
 
-    Both may also be transfer functions, s that of a derivative.
+    Both may also be transfer functions, with s as the derivative.
     """
     lag = 1.0 / (1.0 + airframe.motor.time_constant * s)
     moment_x, moment_y, moment_z = moments(airframe)
@@ -61,10 +59,10 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
         ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, moment_y / i_y),
     ):
         turn = effect * lag * late / s**2  # tilt over demand
-        demand = feedback * smooth  # demand over tilt asked for
+        demand = feedback * smooth  # demand over desired tilt
         if p.smoothing.lag > 0.0:
             demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
-        position = _pid(outer, s) * p.gravity / s**2  # tilt asked for over tilt
+        position = _pid(outer, s) * p.gravity / s**2  # desired tilt over tilt
         found[tilt] = turn * feedback
         found[way] = position * turn * demand / (1.0 + turn * feedback)
         found[f"{way}_plant_input"] = turn * (feedback + position * demand)
@@ -72,10 +70,10 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
 
 
 def margins(loop: np.ndarray) -> Margins:
-    """The margins of an open loop sampled at FREQUENCIES; it may begin with any number of integrators."""
+    """Return the margins of an open loop sampled at FREQUENCIES; it may have any number of integrators."""
     size, angle = np.abs(loop), np.unwrap(np.angle(loop))
     unit = np.flatnonzero(np.diff(np.sign(size - 1.0)))
-    turn = np.flatnonzero(np.diff(np.sign(np.cos(0.5 * angle))))  # crossings of -180 degrees and its like
+    turn = np.flatnonzero(np.diff(np.sign(np.cos(0.5 * angle))))  # crossings of odd multiples of 180 degrees
     at = size[turn]
     above, below = at[at < 1.0], at[at >= 1.0]
     return Margins(
@@ -87,10 +85,10 @@ def margins(loop: np.ndarray) -> Margins:
 
 
 def stable(loop: np.ndarray) -> bool:
-    """Whether the closed loop is stable, by Nyquist's criterion; the open loop's poles lie at 0 or to the left.
+    """Return True if the closed loop is stable by the Nyquist criterion; open-loop poles must be at 0 or stable.
 
-    1 + L turns by a quarter for each integrator on the way up the frequencies, and by a full turn less for each
-    pair of unstable poles.
+    With increasing frequency, 1 + L turns by a quarter per integrator, and by a full turn less per pair of unstable
+    poles.
     """
     integrators = round(-np.log(np.abs(loop[1] / loop[0])) / np.log(FREQUENCIES[1] / FREQUENCIES[0]))
     angle = np.unwrap(np.angle(1.0 + loop))
@@ -98,7 +96,7 @@ def stable(loop: np.ndarray) -> bool:
 
 
 def excess(loop: np.ndarray) -> float:
-    """Factor by which the gain of an unstable loop is too high (below 1: too low); 1 for a stable one, NaN for none."""
+    """Return the factor by which the gain is too high (below 1: too low), 1 for a stable loop, NaN if none helps."""
     if stable(loop):
         return 1.0
     for decibels in np.arange(0.5, 60.0, 0.5):

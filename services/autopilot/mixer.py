@@ -1,4 +1,4 @@
-"""Four force demands to the rotors' thrusts, with saturation by priority (theory.md, eqs. (4.20)-(4.23), (4.28))."""
+"""Mixer: virtual controls to rotor thrusts with prioritised saturation (theory.md, eqs. (4.20)-(4.23), (4.28))."""
 
 import math
 from typing import NamedTuple
@@ -7,12 +7,12 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.interface import PerRotor
 
-Share = tuple[float, float, float, float]  # of a rotor in the demands: collective, roll, pitch, yaw
+Share = tuple[float, float, float, float]  # of a rotor in collective, roll, pitch, yaw
 Shares = tuple[Share, ...]  # of every rotor
 
 
 class VirtualControls(NamedTuple):
-    """What each loop asks of every rotor [N], on the mean over the rotors; shares give each its own."""
+    """Virtual controls: mean force per rotor [N] that each loop commands; multiplied by the shares of a rotor."""
 
     collective: float
     roll: float  # positive turns about body x (left side up)
@@ -27,13 +27,13 @@ def _nothing(_: float, share: Share, other: Share) -> float:
 
 @always_inline
 def at_rest(shares: Shares) -> PerRotor:
-    """No thrust [N] of any rotor."""
+    """Return zero thrust [N] for every rotor."""
     return map_tuple(_nothing, 0.0, shares, shares)
 
 
 @always_inline
 def shares_in_force(tables: tuple[Shares, ...], failed: int) -> Shares:
-    """The shares with a rotor failed, by its number from 1; those with all rotors where there are no others."""
+    """Return the shares for a failed rotor, by its number from 1; those of all rotors if there is no such table."""
     return tables[failed if failed < len(tables) else 0]
 
 
@@ -44,13 +44,13 @@ def _thrust(q: VirtualControls, share: Share, _: Share) -> float:
 
 @always_inline
 def mix(shares: Shares, q: VirtualControls) -> PerRotor:
-    """The rotors' thrusts [N] of demands q without saturation."""
+    """Return the unsaturated rotor thrusts [N] of virtual controls q."""
     return map_tuple(_thrust, q, shares, shares)
 
 
 @always_inline
 def clamp(x: float, low: float, high: float) -> float:
-    """The nearest value to x in [low, high]."""
+    """Return the nearest value to x in [low, high]."""
     return min(max(x, low), high)
 
 
@@ -61,19 +61,18 @@ def _clamped(highest: float, value: float, _: float) -> float:
 
 @always_inline
 def possible(values: PerRotor, highest: float) -> PerRotor:
-    """The nearest values within 0..highest, thrusts [N] or voltages [V]."""
+    """Return the nearest values within 0..highest."""
     return map_tuple(_clamped, highest, values, values)
 
 
 @always_inline
 def saturate(shares: Shares, q: VirtualControls, thrust_max: float) -> VirtualControls:
-    """The nearest demands that ask every rotor for 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
+    """Return the nearest virtual controls with thrusts of 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
-    Attitude comes first, then collective; yaw is given up first: it gets what room the others leave. So demands stay
-    as they are where they are possible with their yaw and without it. Rotors without a share of the collective, which
-    have failed, are left out.
+    Priority: roll and pitch, then collective, then yaw within the remaining range. Failed rotors, which have no share
+    of the collective, are ignored.
     """
-    lowest = math.inf  # of what roll and pitch ask of a rotor, over its share of the collective
+    lowest = math.inf  # minimum roll and pitch thrust of a rotor, over its share of the collective
     for s in shares:
         if s[0] > 0.0:
             lowest = min(lowest, (s[1] * q.roll + s[2] * q.pitch) / s[0])

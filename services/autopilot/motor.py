@@ -1,4 +1,4 @@
-"""From thrust to the motor's voltage: the propulsion's static chain backwards (theory.md, eq. (4.24))."""
+"""Inverse static motor model, from thrust to voltage (theory.md, eq. (4.24))."""
 
 import math
 from typing import NamedTuple
@@ -7,11 +7,11 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.interface import PerRotor
 
-RPM = 30.0 / math.pi  # revolutions per minute of 1 rad/s
+RPM = 30.0 / math.pi  # [rpm] per rad/s
 
 
 class Motor(NamedTuple):
-    """What the autopilot knows of a motor with its belt and propeller."""
+    """Motor parameters of the autopilot, with belt and propeller."""
 
     thrust_coefficient: float  # thrust over the square of the propeller's speed [N/(rad/s)^2]
     gear_ratio: float  # propeller speed / motor speed
@@ -21,7 +21,7 @@ class Motor(NamedTuple):
 
 @always_inline
 def voltage(motor: Motor, thrust: float) -> float:
-    """The voltage [V] that holds the speed of a thrust [N] >= 0."""
+    """Return the steady voltage [V] of a thrust [N] >= 0."""
     propeller = math.sqrt(thrust / motor.thrust_coefficient)
     return RPM * propeller / (motor.gear_ratio * motor.speed_constant)
 
@@ -33,12 +33,12 @@ def _voltage(motor: Motor, thrust: float, _: float) -> float:
 
 @always_inline
 def voltages(motor: Motor, thrust: PerRotor) -> PerRotor:
-    """The voltages [V] that hold the speeds of thrusts [N] >= 0."""
+    """Return the steady voltages [V] of thrusts [N] >= 0."""
     return map_tuple(_voltage, motor, thrust, thrust)
 
 
 @always_inline
 def thrust_at(motor: Motor, volts: float) -> float:
-    """The steady thrust [N] at a voltage [V]; inverse of `voltage`."""
+    """Return the steady thrust [N] at a voltage [V], the inverse of `voltage`."""
     propeller = motor.speed_constant * volts * motor.gear_ratio / RPM
     return motor.thrust_coefficient * propeller * propeller

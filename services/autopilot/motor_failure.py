@@ -1,9 +1,7 @@
-"""Notices a rotor that gives less thrust than it is asked for, by what the gyroscopes say of the torques.
+"""Detector of rotors with a loss of thrust, from gyroscope readings (theory.md, eqs. (4.25)-(4.26)).
 
-An observer of the angular acceleration about the two horizontal body axes: what the commands explain is predicted, the
-rest is a disturbance. A rotor that lacks a share of its thrust makes one along its own arm. Without telemetry of the
-motor controllers this is what an autopilot has; ArduPilot's thrust-loss check looks for the same by way of saturation.
-Theory.md, eqs. (4.25)-(4.26).
+An observer estimates the angular acceleration about body x and y that the commands do not explain. A weak rotor
+causes one along its own arm. ArduPilot's thrust-loss check detects the same failure by saturation.
 """
 
 import math
@@ -16,37 +14,37 @@ from lapwing.services.autopilot.controller_parameters import Airframe, lift, rot
 from lapwing.services.autopilot.interface import PerRotor
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
-LOST = 0.3  # share of its thrust that a rotor must lack
-ALIGNED = 0.25  # share of the disturbance, squared, that may point elsewhere than along the rotor's arm
-DETECTION_TIME = 0.1  # [s] for so long
-CLEAR = 0.3  # [m] over the ground, below which the feet may push too
-LEAST = 0.3  # of the hovering thrust: rotors that are asked for less are judged by this
+LOST = 0.3  # minimum fraction of lost thrust
+ALIGNED = 0.25  # maximum squared fraction of the disturbance that is not along the rotor's arm
+DETECTION_TIME = 0.1  # [s]
+CLEAR = 0.3  # [m] height below which the feet may push too
+LEAST = 0.3  # minimum expected thrust, as a fraction of the hover thrust
 
 
 class Parameters(NamedTuple):
-    """The vehicle as the autopilot knows it."""
+    """Vehicle parameters of the detector."""
 
-    roll_arm: PerRotor  # [m] torque about body x of 1 N of each rotor's thrust
-    pitch_arm: PerRotor  # [m] about body y
+    roll_arm: PerRotor  # [m] torque about body x per 1 N of each rotor's thrust
+    pitch_arm: PerRotor  # [m] torque about body y per 1 N of each rotor's thrust
     inertia_body: Vec3  # [kg m^2]
     time_constant: float  # of the rotor speeds [s]
     hovering: float  # thrust of each rotor [N]
 
 
 class State(NamedTuple):
-    """Memory of the watch."""
+    """State of the detector."""
 
-    asked: PerRotor  # thrusts of the last tick [N]
-    root: PerRotor  # square root of the thrusts that the rotors should give by now [N^(1/2)]
+    asked: PerRotor  # commanded thrusts of the last tick [N]
+    root: PerRotor  # square root of the expected thrusts [N^(1/2)]
     rate: tuple[float, float]  # omega x, y as predicted [rad/s]
-    disturbance: tuple[float, float]  # angular acceleration that the commands do not explain [rad/s^2]
-    suspect: int  # number of the rotor, from 1
-    lasting: float  # [s]
-    failed: int  # number of the rotor, from 1; 0: none
+    disturbance: tuple[float, float]  # unexplained angular acceleration [rad/s^2]
+    suspect: int  # number of the suspected rotor, from 1; 0: none
+    lasting: float  # [s] since it is suspected
+    failed: int  # number of the failed rotor, from 1; 0: none
 
 
 def build(airframe: Airframe) -> Parameters:
-    """The watch of an airframe."""
+    """Return the detector of an airframe."""
     a = airframe
     _, roll, pitch, _ = rotor_effectiveness(a).tolist()
     return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, a.mass * a.gravity / lift(a))
@@ -59,7 +57,7 @@ def _none(_: float, x: float, y: float) -> float:
 
 @always_inline
 def start(p: Parameters) -> State:
-    """Before a flight."""
+    """Return the initial state."""
     none = map_tuple(_none, 0.0, p.roll_arm, p.pitch_arm)
     return State(none, none, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
 
@@ -71,14 +69,14 @@ def _follow(share: float, root: float, asked: float) -> float:
 
 @always_inline
 def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
-    """Angular acceleration [rad/s^2] about x and y that rotor k should give."""
+    """Return the expected angular acceleration [rad/s^2] of rotor k about x and y."""
     thrust = max(root[k] * root[k], LEAST * p.hovering)
     return p.roll_arm[k] * thrust / p.inertia_body[0], p.pitch_arm[k] * thrust / p.inertia_body[1]
 
 
 @always_inline
 def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> int:
-    """Number of the rotor, from 1, whose lack of thrust explains the disturbance; 0 if none does."""
+    """Return the number, from 1, of the rotor whose loss of thrust explains the disturbance, 0 if none does."""
     x, y = disturbance
     found, most = 0, LOST
     for k in range(len(p.roll_arm)):
@@ -92,15 +90,15 @@ def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> 
 
 @always_inline
 def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: PerRotor) -> State:
-    """The watch after a tick of dt [s].
+    """Return the state after a tick.
 
     Args:
-        p: Parameters.
-        s: State; `start` before a flight.
-        dt: [s].
-        omega_body: body rates now [rad/s].
-        height: over the standing height [m].
-        asked: thrusts of the rotors that are asked for from now on [N].
+        p: parameters.
+        s: state; initially `start`.
+        dt: length of the tick [s].
+        omega_body: body rates [rad/s].
+        height: above the resting height [m].
+        asked: commanded thrusts from now on [N].
     """
     share = 1.0 - math.exp(-dt / p.time_constant)
     root = map_tuple(_follow, share, s.root, s.asked)

@@ -1,4 +1,4 @@
-"""Whether the motors can hover within the limits that `motor_electrics` keeps."""
+"""Check of the motors' limits in hover."""
 
 import math
 
@@ -9,10 +9,10 @@ from lapwing.services.common.vehicle_schema import Effects, airframe
 
 
 def check(scene: Scene, known: Airframe) -> None:
-    """A motor in hover keeps its current, power and voltage (theory.md, eq. (2.9)).
+    """Check current, power and voltage of a motor in hover if `motor_electrics` is active (theory.md, eq. (2.9)).
 
     Raises:
-        KeyedError: it does not; `airframe.motor` is the key.
+        KeyedError: a limit is exceeded.
     """
     if "motor_electrics" not in scene[Effects].tables:
         return
@@ -27,7 +27,7 @@ def check(scene: Scene, known: Airframe) -> None:
         (voltage, motor.max_voltage, "V"),
     ):
         if needed >= limit:
-            message = f"hovering takes {needed:.1f} {unit} of a motor, which gets {limit:.1f} {unit} at the most"
+            message = f"hovering needs {needed:.1f} {unit} per motor, the limit is {limit:.1f} {unit}"
             raise ConfigError(
                 "airframe.motor", message, "a lighter vehicle, or higher limits of motor, ESC and battery"
             )

@@ -1,4 +1,4 @@
-"""What the autopilot is told of the vehicle of a scene."""
+"""Nominal vehicle parameters of the autopilot."""
 
 import math
 
@@ -17,7 +17,7 @@ from lapwing.services.common.vehicle_schema import (
 
 
 def known_airframe(scene: Scene) -> Airframe:
-    """What the autopilot is told of the vehicle: nominal numbers, in the air of home."""
+    """Return the nominal vehicle parameters in the air at home."""
     return scene.once(_known_airframe)
 
 
@@ -47,6 +47,6 @@ def _known_airframe(scene: Scene) -> Airframe:
     if "gyroscopic_torque" not in scene[Effects].tables or known.gravity <= 0.0:
         return known
     slope = 2.0 * math.sqrt(known.mass * known.gravity / lift(known) * thrust_coefficient)  # [N s/rad] in hover
-    # of tilted rotors the thrust turns, too, and of their spinning up only the part about z
+    # thrust of tilted rotors yaws too, and only the z part of their spin-up torque does
     torque = moments(known)[2] / lift(alone) if axis or known.wakes.thrust else torque_per_thrust
     return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

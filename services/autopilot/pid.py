@@ -1,4 +1,4 @@
-"""One proportional-integral-derivative loop with anti-windup (theory.md, eq. (4.10))."""
+"""PID loop with anti-windup (theory.md, eq. (4.10))."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from lapwing.kernels import always_inline
 
 
 class Pid(NamedTuple):
-    """Gains in output units u over error units e; their common sign is free."""
+    """Gains in output units u over error units e, with a common sign."""
 
     p: float  # [u/e]
     i: float  # [u/(e s)]
@@ -15,14 +15,14 @@ class Pid(NamedTuple):
 
 @always_inline
 def integrate(gains: Pid, integral: float, error: float, cut: float, dt: float) -> float:
-    """The integral of the error [e s] after dt [s], held while it would push further into saturation.
+    """Return the integral of the error [e s] after dt [s], held if it would increase saturation.
 
-    `cut` is the sign of the part of the last output that saturation cut off, 0 where nothing was cut.
+    `cut` is the sign of the part of the last output that saturation removed, 0 without saturation.
     """
     return integral if gains.i * error * cut > 0.0 else integral + dt * error
 
 
 @always_inline
 def output(gains: Pid, integral: float, error: float, error_rate: float) -> float:
-    """P error + I integral + D error_rate [u]."""
+    """Return P error + I integral + D error_rate [u]."""
     return gains.p * error + gains.i * integral + gains.d * error_rate

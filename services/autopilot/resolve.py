@@ -1,4 +1,4 @@
-"""From a scene's `[autopilot]` to what the autopilot is given."""
+"""Resolution of a scene's `[autopilot]` into the service's configuration."""
 
 from collections.abc import Callable
 
@@ -26,7 +26,7 @@ FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR,
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
-    """The autopilot of the scene; None where there is none."""
+    """Return the configuration of the autopilot. Return None if the scene has no `[autopilot]`."""
     if not scene.has(Autopilot):
         return None
     config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
@@ -38,7 +38,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if truth else [InputPort(name) for name in (carried if own else sensors)]
     if ports.AIRSPEED in carried and config.operator and not own:
-        inputs.append(InputPort(ports.AIRSPEED))  # not flown by: told to the operator
+        inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)
@@ -80,7 +80,7 @@ def _phases(scene: Scene) -> tuple[str, ...]:
 
 
 def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
-    """The code that the key names, tried."""
+    """Return the user code that the key names, after a trial step."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Communication].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
     found = rate(name, user_modules.texts(scene), vehicle, options)
@@ -94,7 +94,7 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
     ground = surface(around.terrain, *start_place(scene)[:2])[0]
     if distance_sensor(scene) == ports.RANGEFINDER:
         found = found._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
-        ground -= scene.lookup("sensors.rangefinder.position")[2]  # the distance counts from its place
+        ground -= scene.lookup("sensors.rangefinder.position")[2]  # origin of the distance
     return found._replace(
         interval=scene[Communication].interval * imu_every,
         home=around.home,
@@ -102,11 +102,11 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
         atmosphere=around.atmosphere,
         magnetic_field_world=around.magnetic_field_world,
         ground_height=ground,
-        sonar_height_max=found.sonar_height_max if level else 0.0,  # the filter knows no other ground than level
+        sonar_height_max=found.sonar_height_max if level else 0.0,  # the filter assumes level ground
     )
 
 
 def _lateness(scene: Scene, imu_every: int) -> int:
-    """Readings of the IMU by which the receiver is late."""
+    """Return the delay of the receiver in IMU readings."""
     late = scene.lookup("sensors.gps.latency_samples") / scene.lookup("sensors.gps.rate")
     return round(round(late * 1e9) / scene[Communication].interval_ns / imu_every)

@@ -1,4 +1,4 @@
-"""The `[autopilot]` of a scene: gains, what the controller flies on, and the attitude loop."""
+"""The `[autopilot]` table of a scene: gains, estimator, controller, operator."""
 
 import math
 from typing import Any, ClassVar, Literal
@@ -19,30 +19,30 @@ from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.parameter_file import parse
 
 ESTIMATORS = ("sensors", "truth")
-NEEDED = ("imu", "magnetometer", "gps")  # sensors without which the estimator cannot start
+NEEDED = ("imu", "magnetometer", "gps")  # sensors that the filter needs to start
 WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unreliable
 
 Option = bool | int | float | str | list[float]
 
 
 class Autopilot(SceneTable):
-    """How the vehicle is flown."""
+    """The autopilot."""
 
     TABLE: ClassVar[str] = "autopilot"
     OPTIONAL: ClassVar[bool] = True
-    gains: str = "tuned"  # one that ships or lies in gains/ beside the scene, or the path of a .toml file
-    estimator: str = "sensors"  # the Kalman filter; "truth": the true state; or "module:Name" of one of the user's own
-    estimator_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
-    attitude: Literal["angles", "so3"] = "angles"  # the paper's error angle by angle, or the geometric one
-    controller: str | None = None  # "module:Name" of one of the user's own, in the place of the cascaded PID
-    controller_options: dict[str, Option] = Field(default_factory=dict)  # of its constructor
-    operator: bool = False  # whether commands from outside are listened to
-    trajectory: bool = True  # follow the scene's [trajectory]; false: stand disarmed and wait for commands
-    parameters: dict[str, float] = Field(default_factory=dict)  # by name; a scene may name a file of them instead
+    gains: str = "tuned"  # shipped, in gains/ next to the scene, or the path of a .toml file
+    estimator: str = "sensors"  # the Kalman filter; "truth": the true state; or "module:Name" of a user's class
+    estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
+    attitude: Literal["angles", "so3"] = "angles"  # attitude error by Euler angles, as in the paper, or geometric
+    controller: str | None = None  # "module:Name" of a user's controller, instead of the cascaded PID
+    controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
+    operator: bool = False  # accept commands of an operator
+    trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
+    parameters: dict[str, float] = Field(default_factory=dict)  # by name, or the path of a file of them
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """The gain set becomes the table `gains`, a file of parameters their values."""
+        """Read the gain set into the table `gains`, a parameter file into its values, and store user modules."""
         if isinstance(name := named(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
             path = files.find("autopilot.gains", "gain set", name, "gains", FOLDER)
             content = files.toml(GainSet.TABLE, "autopilot.gains", path)
@@ -60,10 +60,10 @@ class Autopilot(SceneTable):
             tree[cls.TABLE]["parameters"] = parse(text, path)
 
     def check(self, scene: Scene) -> None:
-        """The parameters are sound, the vehicle suits the controller, and the sensors that it needs are carried."""
+        """Raise KeyedError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
         parameters.table(scene)
         if not self.trajectory and not self.operator:
-            message = "false leaves nobody to say what to fly; set operator = true too"
+            message = "false leaves no source of setpoints; set operator = true too"
             raise ConfigError("autopilot.trajectory", message)
         told = known_airframe(scene)
         try:
@@ -75,19 +75,18 @@ class Autopilot(SceneTable):
         motor_limits.check(scene, told)
         for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
-                message = "nobody to take them"
-                raise ConfigError(f"autopilot.{key}_options", message, f'autopilot.{key} = "module:Name" too')
+                raise ConfigError(f"autopilot.{key}_options", "is not used", f'autopilot.{key} = "module:Name" too')
         if self.estimator == "sensors":
             missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
                 raise ConfigError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
             horizontal = math.hypot(*environment(scene).magnetic_field_world[:2])
             if horizontal < WEAKEST_FIELD:
-                message = f"got {horizontal:.1g} T across the vertical, of which the estimator takes its heading"
+                message = f"got {horizontal:.1g} T horizontally, too little for the estimator's heading"
                 raise ConfigError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
             reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
             sensor = parameters.HEIGHT_SENSORS[reference]
             known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
             if known not in scene.tables("sensors"):
-                message = f"{reference} takes the height from a sensor that is not carried"
+                message = f"{reference} needs a sensor that the vehicle does not have"
                 raise ConfigError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")

@@ -1,4 +1,4 @@
-"""The autopilot as a service: sensors (or the truth) and references in, motor voltages out."""
+"""The autopilot service: sensors or ground truth and references in, motor command out."""
 
 import math
 from typing import Any
@@ -32,12 +32,12 @@ from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGH
 from lapwing.services.common.failure_types import SOUND, Faults
 
 NAME = "autopilot"
-NO_HEIGHT = 1e8  # [m^2] variance of a height that tells nothing
-BOUNCE = 1.0  # [s] after a touch-down in which the vehicle may still move
+NO_HEIGHT = 1e8  # [m^2] variance of an ignored height
+BOUNCE = 1.0  # [s] of possible motion after a touch-down
 
 
 def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
-    """The autopilot of a run; `operator` gives the commands that have come until a tick, besides those of the plan."""
+    """Return the autopilot of a run; `operator` is a source of commands in addition to the plan."""
     given: AutopilotSetup = setup.services[NAME].parameters
     outputs = {port.name: port for port in setup.services[NAME].ports}
     values = {p.name: p.default for p in given.parameters}
@@ -77,7 +77,7 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
 def _navigation(
     setup: RunConfig, given: AutopilotSetup, attention: WakeupParameters, estimate: Port, injection: Injection
 ) -> list[Block]:
-    """The parts that make the estimate, in their order."""
+    """Return the estimator blocks in order."""
     battery, flight = InputPort(injection.received(ports.BATTERY)), InputPort(FLIGHT, 1)
     p = given.estimator
     if given.own_estimator is not None:

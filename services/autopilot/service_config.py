@@ -1,4 +1,4 @@
-"""What the autopilot is given."""
+"""Resolved configuration of the autopilot."""
 
 from typing import Any, NamedTuple
 
@@ -10,31 +10,31 @@ from lapwing.services.common.controller_api import VehicleModel
 
 
 class CustomCode(NamedTuple):
-    """The user's own code in the place of a part of the autopilot."""
+    """User code in the autopilot."""
 
-    name: str  # "module:Name"; the set-up carries the module's text
-    options: dict[str, Any]  # handed to the constructor
-    every: int  # ticks between two of its steps
+    name: str  # "module:Name"; the run configuration stores the module's text
+    options: dict[str, Any]  # options of the constructor
+    every: int  # [ticks] between two steps
 
 
 class AutopilotSetup(NamedTuple):
-    """An autopilot on its vehicle."""
+    """Configuration of an autopilot."""
 
-    estimator: Estimator | None  # None: the truth is taken for the estimate
-    start_world: Vec3  # [m] where the vehicle is put down
-    imu_every: int  # ticks between two readings of the IMU
-    gps_age: int  # readings of the IMU by which the receiver is late
+    estimator: Estimator | None  # None: ground truth or user code
+    start_world: Vec3  # [m] start position
+    imu_every: int  # [ticks] between two IMU readings
+    gps_age: int  # delay of the receiver in IMU readings
     gains: Gains
-    geometric: bool  # attitude error on SO(3) instead of angle by angle
+    geometric: bool  # attitude error on SO(3) instead of Euler angles
     airframe: Airframe
     parameters: tuple[Parameter, ...]
-    phases: tuple[str, ...]  # of the scene's trajectory; empty where none is followed
-    operator: bool  # somebody may give commands
-    plan: tuple[Any, ...]  # operator commands that come at the first tick
-    estimate_every: int  # ticks between two messages of the estimate
+    phases: tuple[str, ...]  # of the scene's trajectory; empty if none is followed
+    operator: bool  # commands are accepted
+    plan: tuple[Any, ...]  # operator commands at the first tick
+    estimate_every: int  # [ticks] between two messages of the estimate
     status_every: int
     answers_every: int
     controller: CustomCode | None = None  # None: the cascaded PID
     own_estimator: CustomCode | None = None
-    vehicle: VehicleModel | None = None  # what the user's own code is told of it
-    distance_sensor: str | None = None  # port of the sensor that tells how far the ground is
+    vehicle: VehicleModel | None = None  # vehicle parameters for user code
+    distance_sensor: str | None = None  # port of the sensor of the distance to the ground

@@ -1,4 +1,4 @@
-"""A warning before the flight: gains that make a loop unstable about hover."""
+"""Warning about gains that make a loop unstable in hover."""
 
 import math
 
@@ -10,15 +10,15 @@ from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication
 
-MODELS = ("reduced", "multibody", "slung_load")  # of vehicles whose hover the margins are for
+MODELS = ("reduced", "multibody", "slung_load")  # plant models to which the margins apply
 
 
 def unstable_loops(scene: Scene) -> list[str]:
-    """A line for each loop of the scene's autopilot that is unstable about hover, with how far; empty if none is."""
+    """Return a line for each loop of the scene's autopilot that is unstable in hover, with its gain margin."""
     if not scene.has(Autopilot) or scene.lookup("vehicle.model") not in MODELS or not known_airframe(scene).gravity:
         return []
     if scene[Autopilot].controller is not None:
-        return []  # whose loops are not known
+        return []  # the loops of user code are unknown
     config, exchange, airframe = scene[Autopilot], scene[Communication], known_airframe(scene)
     p = build(scene[GainSet].plain(), airframe)
     loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)

@@ -1,1 +1,1 @@
-"""What several services agree on: tables of a scene, parameters, flight plans."""
+"""Definitions that several services share: scene tables, ports, parameters, flight plans."""

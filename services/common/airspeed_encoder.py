@@ -1,4 +1,4 @@
-"""The readings of an airspeed sensor as messages."""
+"""Topic encoder of airspeed sensor readings."""
 
 import math
 
@@ -13,11 +13,11 @@ from lapwing.services.common.ports import AirspeedReading
 
 
 def airspeed_wire(topic: Topic, frame: str, port: Port) -> TopicEncoder:
-    """A topic of the readings on `port`; `frame` is the vehicle's name."""
+    """Return the encoder of the readings on `port`; `frame` is the vehicle's name."""
     return TopicEncoder(topic, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))
 
 
 def _fields(r: AirspeedReading, time_ns: np.ndarray) -> Fields:
-    """Differential pressure; no reading: NaN."""
+    """Return the message columns; an invalid pressure is NaN."""
     pressure = np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan)
     return {**stamp_columns(time_ns), "fluid_pressure": pressure, "variance": r.variance}

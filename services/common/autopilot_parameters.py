@@ -1,9 +1,8 @@
-"""The autopilot's parameters that can be changed in flight: what each means, its default and its bounds.
+"""Autopilot parameters that can be changed in flight: meaning, default and bounds.
 
-Names are PX4's where the meaning is the same, and then so is the unit (degrees for angles); at most 16 characters, as
-MAVLink wants. Names of our own are those of the controllers' gains (PID_...) and of the failsafes' actions (FS_...).
-The defaults of the gains are those of the scene's gain set; `[autopilot.parameters]` of a scene sets others, or
-`parameters` in its `[autopilot]` names a file of them (parameter_file.py).
+Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only controller gains (PID_...)
+and failsafe actions (FS_...) have own names. Gain defaults come from the scene's gain set. `[autopilot.parameters]`
+sets other values, or `autopilot.parameters` names a file of them (parameter_file.py).
 """
 
 import math
@@ -12,25 +11,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from lapwing.dynamics.config_error import ConfigError
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # keeps pydantic out of service processes
     from lapwing.cosim.scene import Scene
 
-_YAW_MODES = "0 to the waypoint, 1 home, 2 away from home, 3 along the flight, 4 to the waypoint before moving, 5 stays"
+_YAW_MODES = "0 waypoint, 1 home, 2 away from home, 3 along the velocity, 4 waypoint before moving, 5 unchanged"
 _RETURNS = (
-    "0 home or the nearest rally point, 1 to the mission's landing, 2 there along the mission, else back along it, "
-    "3 to the nearest of these"
+    "0 home or the nearest rally point, 1 the mission's landing, 2 the mission's landing along the mission or back "
+    "along it, 3 the nearest of these"
 )
 BAROMETER_HEIGHT, GPS_HEIGHT, SONAR_HEIGHT = 0, 1, 2  # EKF2_HGT_REF
 HEIGHT_SENSORS = ("barometer", "gps", "sonar")
-"""The sensor that each value of EKF2_HGT_REF stands for."""
-_LEVELS = "1 a low charge, 2 a critical one, 3 an almost empty pack"
+"""Sensor of each value of EKF2_HGT_REF."""
+_LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
-NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # what a failsafe does
-_ACTION = "0 a warning, 1 hold, 2 return, 3 land, 4 descend, which needs no position"
+NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # failsafe actions
+_ACTION = "0 warning, 1 hold, 2 return, 3 land, 4 descend (needs no position)"
 
 
 class Parameter(NamedTuple):
-    """One number that the autopilot can be told."""
+    """A numeric autopilot parameter."""
 
     name: str
     unit: str
@@ -39,27 +38,27 @@ class Parameter(NamedTuple):
     most: float
     meaning: str
     whole: bool = False  # only whole numbers
-    at_start: bool = False  # a change acts from the next start on
+    at_start: bool = False  # a change takes effect at the next start
 
     def allows(self, value: float) -> bool:
-        """Whether it can have this value."""
+        """Return True if the value is valid."""
         return self.least <= value <= self.most and not (self.whole and value != int(value))
 
     def check(self, value: float) -> None:
-        """KeyedError if it cannot have this value."""
+        """Raise KeyedError if the value is invalid."""
         if not self.allows(value):
             kind = "a whole number" if self.whole else "a number"
             raise ConfigError(self.name, f"got {value:g}", f"{kind} from {self.least:g} to {self.most:g}")
 
 
 _FLIGHT = (
-    Parameter("MIS_TAKEOFF_ALT", "m", 2.5, 0.5, 100.0, "height above home of a take-off that names none"),
-    Parameter("MPC_TKO_SPEED", "m/s", 1.5, 0.1, 5.0, "speed of taking off"),
-    Parameter("MPC_LAND_SPEED", "m/s", 0.7, 0.1, 2.0, "speed of the last metres of landing"),
-    Parameter("MPC_XY_CRUISE", "m/s", 5.0, 0.1, 20.0, "horizontal speed where none is asked for"),
+    Parameter("MIS_TAKEOFF_ALT", "m", 2.5, 0.5, 100.0, "default take-off height above home"),
+    Parameter("MPC_TKO_SPEED", "m/s", 1.5, 0.1, 5.0, "take-off speed"),
+    Parameter("MPC_LAND_SPEED", "m/s", 0.7, 0.1, 2.0, "landing speed near the ground"),
+    Parameter("MPC_XY_CRUISE", "m/s", 5.0, 0.1, 20.0, "default horizontal speed"),
     Parameter("MPC_XY_VEL_MAX", "m/s", 8.0, 0.1, 20.0, "maximum horizontal speed"),
-    Parameter("MPC_Z_VEL_MAX_UP", "m/s", 3.0, 0.1, 8.0, "maximum speed of climbing"),
-    Parameter("MPC_Z_VEL_MAX_DN", "m/s", 1.5, 0.1, 4.0, "maximum speed of sinking"),
+    Parameter("MPC_Z_VEL_MAX_UP", "m/s", 3.0, 0.1, 8.0, "maximum climb speed"),
+    Parameter("MPC_Z_VEL_MAX_DN", "m/s", 1.5, 0.1, 4.0, "maximum descent speed"),
     Parameter("MPC_ACC_HOR", "m/s^2", 2.0, 0.2, 5.0, "maximum acceleration of the setpoint"),
     Parameter("MPC_JERK_AUTO", "m/s^3", 8.0, 1.0, 50.0, "maximum jerk of the setpoint"),
     Parameter("MPC_YAWRAUTO_MAX", "deg/s", 45.0, 5.0, 180.0, "maximum yaw rate of the setpoint"),
@@ -68,38 +67,40 @@ _FLIGHT = (
     Parameter("MC_ACRO_R_MAX", "deg/s", 100.0, 0.0, 1800.0, "roll rate at full stick in acro"),
     Parameter("MC_ACRO_P_MAX", "deg/s", 100.0, 0.0, 1800.0, "pitch rate at full stick in acro"),
     Parameter("MC_ACRO_Y_MAX", "deg/s", 45.0, 0.0, 1800.0, "yaw rate at full stick in acro"),
-    Parameter("MPC_YAW_MODE", "", 0, 0, 5, f"where the nose points on the way: {_YAW_MODES}", True),
-    Parameter("MIS_YAW_ERR", "deg", 12.0, 0.0, 90.0, "error within which an item's heading is reached"),
-    Parameter("NAV_ACC_RAD", "m", 2.0, 0.05, 200.0, "a waypoint that names no radius is reached within this"),
+    Parameter("MPC_YAW_MODE", "", 0, 0, 5, f"heading during a leg: {_YAW_MODES}", True),
+    Parameter("MIS_YAW_ERR", "deg", 12.0, 0.0, 90.0, "heading error at which a mission item counts as reached"),
+    Parameter("NAV_ACC_RAD", "m", 2.0, 0.05, 200.0, "default acceptance radius of waypoints"),
+    Parameter("RTL_RETURN_ALT", "m", 15.0, 1.0, 200.0, "minimum height above home during a return"),
+    Parameter("RTL_TYPE", "", 0, 0, 3, f"destination of a return: {_RETURNS}", True),
+    Parameter("RTL_DESCEND_ALT", "m", 10.0, 1.0, 200.0, "height above home at which a return waits before it lands"),
+    Parameter("RTL_LAND_DELAY", "s", 0.0, -1.0, 300.0, "waiting time of a return before it lands; below 0: forever"),
+    Parameter("COM_DISARM_LAND", "s", 2.0, -1.0, 60.0, "time from landing to disarming; 0 or less: never"),
     Parameter(
-        "RTL_RETURN_ALT", "m", 15.0, 1.0, 200.0, "height above home of the way there; a vehicle that is higher stays so"
+        "COM_DISARM_PRFLT", "s", 10.0, -1.0, 600.0, "time from arming to disarming without take-off; 0 or less: never"
     ),
-    Parameter("RTL_TYPE", "", 0, 0, 3, f"where a return leads: {_RETURNS}", True),
-    Parameter("RTL_DESCEND_ALT", "m", 10.0, 1.0, 200.0, "height above home where a return waits before it lands"),
-    Parameter("RTL_LAND_DELAY", "s", 0.0, -1.0, 300.0, "time that it waits there; below 0: it stays"),
-    Parameter("COM_DISARM_LAND", "s", 2.0, -1.0, 60.0, "after landing the motors are disarmed; not above 0: never"),
-    Parameter("COM_DISARM_PRFLT", "s", 10.0, -1.0, 600.0, "the same where nobody takes off"),
 )
 _FAILSAFES = (
-    Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "offboard setpoints older than this are lost"),
-    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"when they are: {_ACTION}", True),
-    Parameter("COM_DL_LOSS_T", "s", 10.0, 1.0, 300.0, "a ground station that is silent for so long is lost"),
-    Parameter("NAV_DLL_ACT", "", RETURN, 0, 3, "when it is: 0 a warning, 1 hold, 2 return, 3 land", True),
-    Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
-    Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"when it is: {_ACTION}", True),
-    Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which it is critical, and the motors are not armed"),
-    Parameter("FS_BAT_CRIT_ACT", "", RETURN, 0, 4, f"when it is: {_ACTION}", True),
-    Parameter("BAT_EMERGEN_THR", "", 0.05, 0.0, 0.5, "charge below which it is nearly empty"),
-    Parameter("FS_BAT_EMER_ACT", "", LAND, 0, 4, f"when it is: {_ACTION}", True),
-    Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"when a motor gives less than it is asked for: {_ACTION}", True),
-    Parameter("COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "without GPS or a sure position for so long it is lost"),
-    Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"when it is: {_ACTION}", True),
+    Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "time after which offboard setpoints are lost"),
+    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"action on lost offboard setpoints: {_ACTION}", True),
+    Parameter("COM_DL_LOSS_T", "s", 10.0, 1.0, 300.0, "time after which a silent ground station is lost"),
     Parameter(
-        "EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"what the height comes from, from the start on: {_HEIGHTS}", True, True
+        "NAV_DLL_ACT", "", RETURN, 0, 3, "action on a lost ground station: 0 warning, 1 hold, 2 return, 3 land", True
     ),
-    Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "whether failures may be injected", True),
-    Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"what a battery that is wrong reports: {_LEVELS}", True),
-    Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"outside of the fence: {_ACTION}", True),
+    Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
+    Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"action on a low battery: {_ACTION}", True),
+    Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which the battery is critical and arming is denied"),
+    Parameter("FS_BAT_CRIT_ACT", "", RETURN, 0, 4, f"action on a critical battery: {_ACTION}", True),
+    Parameter("BAT_EMERGEN_THR", "", 0.05, 0.0, 0.5, "charge below which the battery is nearly empty"),
+    Parameter("FS_BAT_EMER_ACT", "", LAND, 0, 4, f"action on a nearly empty battery: {_ACTION}", True),
+    Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"action on a motor failure: {_ACTION}", True),
+    Parameter(
+        "COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "time without GPS or a certain position after which it is lost"
+    ),
+    Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"action on a lost position: {_ACTION}", True),
+    Parameter("EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"height reference from the start: {_HEIGHTS}", True, True),
+    Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "1: failures may be injected", True),
+    Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
+    Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
 )
 _LOOPS = {
     "altitude": "PID_Z",
@@ -114,10 +115,10 @@ _UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # o
 
 
 def table(scene: "Scene") -> dict[str, Parameter]:
-    """The parameters of a scene with an `[autopilot]`, by name; defaults are what the scene says.
+    """Return the parameters of a scene with an `[autopilot]` by name, with the scene's defaults.
 
     Raises:
-        KeyedError: the scene sets a parameter that is not there, or to a value that it cannot have.
+        KeyedError: the scene sets an unknown parameter or an invalid value.
     """
     return dict(scene.once(_table))
 
@@ -136,7 +137,7 @@ def _table(scene: "Scene") -> dict[str, Parameter]:
 
 
 def changed(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, float]:
-    """The values after an operator's commands, as the autopilot has taken them."""
+    """Return the values after the accepted parameter commands among `commands`."""
     values = {p.name: p.default for p in table.values()}
     for command in commands:
         known = table.get(command.text) if command.kind == "parameter" else None
@@ -146,7 +147,7 @@ def changed(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, f
 
 
 def of_gains(gains: Any) -> list[Parameter]:
-    """Those that are gains, with the numbers of a gain set as defaults."""
+    """Return the gain parameters, with the numbers of a gain set as defaults."""
     limit = math.degrees(gains.tilt_limit)
     tilt = Parameter("MPC_TILTMAX_AIR", "deg", limit, min(limit, 5.0), 89.0, "maximum tilt about either axis")
     return [tilt, *(_gain(loop, k, getattr(gains, loop)[k]) for loop in _LOOPS for k in range(3))]
@@ -160,8 +161,8 @@ def _gain(loop: str, term: int, value: float) -> Parameter:
 
 
 def with_gains(gains: Any, values: dict[str, float]) -> Any:
-    """The gain set with the gains among the parameters' `values`."""
+    """Return the gain set with the gains in `values`, the parameters by name."""
     loops = {loop: tuple(values[f"{stem}_{term}"] for term in _TERMS) for loop, stem in _LOOPS.items()}
     tilt = values["MPC_TILTMAX_AIR"]
-    unchanged = tilt == math.degrees(gains.tilt_limit)  # then to the bit
+    unchanged = tilt == math.degrees(gains.tilt_limit)  # avoids rounding
     return gains._replace(**loops, tilt_limit=gains.tilt_limit if unchanged else math.radians(tilt))

@@ -1,4 +1,4 @@
-"""When services exchange messages: the tick of the run, and the rates that are made of it."""
+"""Communication step of a run and message rates derived from it."""
 
 from typing import ClassVar, Literal
 
@@ -10,12 +10,12 @@ from lapwing.messages.topics import Topic
 
 
 class Communication(SceneTable):
-    """The communication step: how often services exchange messages, and whether the command closes the loop at once."""
+    """Communication step between services and coupling of the control loop."""
 
     TABLE: ClassVar[str] = "exchange"
     SHARED: ClassVar[bool] = True
     rate: int = Field(default=250, gt=0, le=10_000)  # [Hz] one tick is 1/rate
-    coupling: Literal["sequential", "parallel"] = "sequential"  # Gauss-Seidel, or Jacobi: services overlap
+    coupling: Literal["sequential", "parallel"] = "sequential"  # Gauss-Seidel, or Jacobi: services run concurrently
 
     @property
     def interval_ns(self) -> int:
@@ -29,41 +29,41 @@ class Communication(SceneTable):
 
     @property
     def loop_delay(self) -> int:
-        """Ticks after which the plant applies a command: at once, or one exchange later so that services overlap."""
+        """Delay of the plant's command input [ticks]; one more with Jacobi coupling."""
         return 1 if self.coupling == "sequential" else 2
 
     def check(self, scene: Scene) -> None:
-        """A tick is a whole number of nanoseconds."""
+        """Raise KeyedError unless a tick is a whole number of nanoseconds."""
         if 1_000_000_000 % self.rate:
-            expected = "a rate whose interval is a whole number of ns (100, 125, 200, 250, 400, 500, 1000, ...)"
+            expected = "a rate with a whole number of ns per tick (100, 125, 200, 250, 400, 500, 1000, ...)"
             raise ConfigError("exchange.rate", f"got {self.rate} Hz", expected)
 
 
 class Rates(SceneTable):
-    """How often derived messages are published [Hz], at the most once a tick; each divides exchange.rate."""
+    """Publication rates of derived messages [Hz], at most one message a tick; each divides exchange.rate."""
 
     TABLE: ClassVar[str] = "rates"
     SHARED: ClassVar[bool] = True
     pose: int = Field(default=50, gt=0)  # [Hz] pose, odometry, transform and clock
-    estimate: int = Field(default=50, gt=0)  # [Hz] what the autopilot takes for the state
+    estimate: int = Field(default=50, gt=0)  # [Hz] state estimate of the autopilot
     status: int = Field(default=10, gt=0)  # [Hz] phase, armed, landed, failures
     battery: int = Field(default=10, gt=0)  # [Hz] charge, voltage, current
-    bodies: int = Field(default=50, gt=0)  # [Hz] the single bodies of a vehicle that has several
-    operator: int = Field(default=50, gt=0)  # [Hz] what comes from outside, and the answers
-    contact: int | None = Field(default=None, gt=0)  # [Hz] forces on every foot of a multirotor; without it, not told
+    bodies: int = Field(default=50, gt=0)  # [Hz] states of the bodies of a multibody vehicle
+    operator: int = Field(default=50, gt=0)  # [Hz] external commands and their acknowledgements
+    contact: int | None = Field(default=None, gt=0)  # [Hz] forces on every foot of a multirotor; unset: not published
 
     def check(self, scene: Scene) -> None:
-        """Every rate divides the exchange rate."""
+        """Raise KeyedError unless every rate divides the exchange rate."""
         for key in type(self).model_fields:
             if (rate := getattr(self, key)) is not None:
                 ticks(scene, min(rate, scene[Communication].rate), f"rates.{key}")
 
 
 def ticks(scene: Scene, rate: float, key: str) -> int:
-    """Ticks between messages of `rate` [Hz].
+    """Return the ticks between messages at `rate` [Hz].
 
     Raises:
-        KeyedError: the rate, which is that of `key`, does not divide the exchange rate.
+        KeyedError: the rate of `key` does not divide the exchange rate.
     """
     exchange = scene[Communication].rate
     if rate <= 0 or exchange % rate:
@@ -73,7 +73,7 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
 
 
 def period(scene: Scene, topic: Topic) -> int:
-    """Ticks between two messages of a topic: its rate is the scene key that the topic table names."""
+    """Return the ticks between two messages of a topic; the topic table names the scene key of its rate."""
     if topic.rate is None:
         return 1
     return ticks(scene, min(scene.lookup(topic.rate), scene[Communication].rate), topic.rate)

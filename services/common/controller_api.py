@@ -1,4 +1,4 @@
-"""What a controller of one's own is given, and what it returns.
+"""Interface of user-defined controllers.
 
 In a scene:
 
@@ -7,7 +7,7 @@ In a scene:
     [autopilot.controller_options]
     stiffness = 4.0
 
-In `my_module.py`, beside the scene or on Python's path:
+In `my_module.py`, next to the scene or on Python's path:
 
     class MyController:
         rate = 250.0                                              # [Hz], divides the exchange rate
@@ -16,12 +16,12 @@ In `my_module.py`, beside the scene or on Python's path:
 
         def step(self, time: float, estimate: StateEstimate, setpoint: Reference) -> ThrustAndMoments: ...
 
-It is constructed anew at every take-off, and asked at its rate while the motors run; in between, its command holds.
-Randomness, wall time and files make a run one that cannot be flown again.
+A new controller is constructed at every take-off. Its `step` is called at its rate while the motors run; its last
+command holds in between. A controller that uses random numbers, wall time or files cannot be resimulated.
 
-A compiled controller takes part in the compiled loop at full speed. Its name is that of a function that makes its
-parameters and its first state, NamedTuples of numbers; the parameters have a field `rate`. Its module has `step`, and
-returns at every step the same types:
+A compiled controller runs in the compiled loop. The scene names a function that returns its parameters and initial
+state, NamedTuples of numbers; the parameters have a field `rate`. The module defines `step`, which always returns the
+same types:
 
     def build(vehicle: VehicleModel, **options) -> tuple[Parameters, State]: ...
 
@@ -39,35 +39,35 @@ __all__ = ["MotorVoltages", "Reference", "StateEstimate", "ThrustAndMoments", "V
 
 
 class MotorVoltages(NamedTuple):
-    """A command to the motors themselves; clipped to 0 to `voltage_max`."""
+    """Direct motor command; clipped to 0..`voltage_max`."""
 
     volts: tuple[float, ...]  # [V] of each motor, in the order of the airframe
-    roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] that it steers to, for the log
+    roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] references, for the log
 
 
 class ThrustAndMoments(NamedTuple):
-    """A command that control allocation turns into thrusts of the rotors, and the motor model into voltages.
+    """Wrench command; control allocation and the motor model turn it into voltages.
 
-    Where the rotors cannot give it, thrust yields to roll and pitch, and yaw to both.
+    Priority in saturation: roll and pitch, then thrust, then yaw.
     """
 
-    thrust: float  # [N] of all rotors together, along body z
+    thrust: float  # [N] total, along body z
     moments_body: Vec3  # [N m]
-    roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] that it steers to, for the log
+    roll_pitch: tuple[float, float] = (0.0, 0.0)  # [rad] references, for the log
 
 
 class VehicleModel(NamedTuple):
-    """What a controller knows of the vehicle: nominal values, at standard air density."""
+    """Nominal vehicle parameters for a controller, at standard air density."""
 
     mass: float  # [kg]
     inertia_body: Vec3  # [kg m^2] principal moments
     gravity: float  # [m/s^2]
     rotor_positions_body: tuple[Vec3, ...]  # [m]
-    spin_directions: tuple[float, ...]  # of each rotor: +1 where its thrust turns the vehicle to the left
+    spin_directions: tuple[float, ...]  # of each rotor: +1 if its thrust yaws the vehicle to the left
     torque_per_thrust: float  # [m] reaction torque of a rotor over its thrust
     thrust_max: float  # [N] of a rotor
     voltage_max: float  # [V]
     motor_time_constant: float  # [s] of the rotor speed
-    resting_height: float  # [m] world z of the vehicle's origin when it stands
-    interval: float  # [s] a tick
+    resting_height: float  # [m] world z of the vehicle's origin at rest on the ground
+    interval: float  # [s] length of a tick
     rotor_axes_body: tuple[Vec3, ...]  # unit vector of each rotor's thrust

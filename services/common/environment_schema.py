@@ -1,4 +1,4 @@
-"""The `[environment]` of a scene: where and when it flies, in which air, over which ground."""
+"""The `[environment]` table of a scene: place, date, atmosphere, terrain."""
 
 import datetime
 from functools import lru_cache
@@ -27,20 +27,20 @@ Pair = Annotated[tuple[Place, Place], Field(strict=False)]
 
 
 class Table(BaseModel):
-    """A table within `[environment]`."""
+    """A subtable of `[environment]`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class Steps(Table):
-    """Level treads and upright risers across a direction, from home on."""
+    """Level treads and vertical risers along a direction, starting at home."""
 
-    distance: tuple[Length, ...] = Field(strict=False)  # [m] from home to each riser, growing
-    rise: tuple[Height, ...] = Field(strict=False)  # [m] of each, negative where it goes down
-    heading: Turn = 0.0  # [rad] in which they follow one another, 0 along x
+    distance: tuple[Length, ...] = Field(strict=False)  # [m] from home to each riser, ascending
+    rise: tuple[Height, ...] = Field(strict=False)  # [m] of each, negative if downwards
+    heading: Turn = 0.0  # [rad] direction in which they are lined up, 0 along x
 
     def pairs(self) -> list[tuple[float, float]]:
-        """(distance, rise) of each; KeyedError where there are not as many of one as of the other."""
+        """Return (distance, rise) of each step. Raise KeyedError if the keys differ in length."""
         if len(self.distance) != len(self.rise):
             raise ConfigError(
                 "steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}"
@@ -49,17 +49,17 @@ class Steps(Table):
 
 
 class Grid(Table):
-    """Heights of points of a grid, bilinear between them, beyond it as at its edge; they count from that at home."""
+    """Heights on a grid relative to the height at home, bilinear between points, constant beyond the edge."""
 
     file: str | None = None  # path relative to the scene: an .npy array, rows along world y, columns along x; a GeoTIFF
-    heights: tuple[Heights, ...] | None = Field(default=None, strict=False)  # [m] the same here; one of both
-    corner: Pair | None = None  # [m] world x and y of the first row and column; (0, 0), or what follows from reach
+    heights: tuple[Heights, ...] | None = Field(default=None, strict=False)  # [m] rows, instead of a file
+    corner: Pair | None = None  # [m] world x and y of the first row and column; default (0, 0), or from reach
     spacing: Length = 1.0  # [m] between neighbours
-    reach: Length | None = None  # [m] from home to each side of the square that is taken out of a GeoTIFF
+    reach: Length | None = None  # [m] from home to each side of the square that is read from a GeoTIFF
 
 
 class Box(Table):
-    """A box that stands on the ground, its top level: something to land on, or to run into."""
+    """A box on the ground with a level top: a landing place or an obstacle."""
 
     position: Pair  # [m] world x and y of its centre
     size: Annotated[tuple[Length, Length], Field(strict=False)]  # [m] length along its heading, width across
@@ -68,7 +68,7 @@ class Box(Table):
 
 
 class Cylinder(Table):
-    """An upright cylinder that stands on the ground, its top level."""
+    """An upright cylinder on the ground with a level top."""
 
     position: Pair  # [m] world x and y of its axis
     radius: Length  # [m]
@@ -76,21 +76,21 @@ class Cylinder(Table):
 
 
 class Terrain(Table):
-    """The ground: the sum of slope, bumps and grid, or steps; boxes and cylinders stand on it. Level without keys."""
+    """The ground: sum of slope, bumps and grid, or steps; with boxes and cylinders on it. Level without keys."""
 
     slope: Annotated[tuple[Rise, Rise], Field(strict=False)] = (0.0, 0.0)  # rise of the ground along world x and y
     bump_height: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0  # [m] amplitude A of bumps A sin(k x) sin(k y)
     bump_length: Annotated[float, Field(ge=0.01, le=1e4)] = 1.0  # [m] their wavelength 2 pi / k
     steps: Steps | None = None
     grid: Grid | None = None
-    box: tuple[Box, ...] = Field(default=(), strict=False)  # each with a level top: to land on, or to run into
-    cylinder: tuple[Cylinder, ...] = Field(default=(), strict=False)  # the same, round
+    box: tuple[Box, ...] = Field(default=(), strict=False)  # boxes with level tops
+    cylinder: tuple[Cylinder, ...] = Field(default=(), strict=False)  # upright cylinders with level tops
 
     def ground(self) -> Level | Relief:
-        """What kernels are given. Raises KeyedError, the key seen from this table."""
+        """Return the terrain for compiled code. Raise KeyedError with a key relative to this table."""
         grid, steps = self.grid, self.steps
         if grid and grid.heights is None:
-            raise ConfigError("grid", "got neither", "heights, or a file of them")
+            raise ConfigError("grid", "has neither file nor heights", "one of them")
         rows = [len(row) for row in grid.heights or ()] if grid else []
         if len(set(rows)) > 1:
             raise ConfigError("grid.heights", f"got rows of {min(rows)} to {max(rows)} numbers", "rows of equal length")
@@ -109,29 +109,29 @@ class Terrain(Table):
 
 
 class EnvironmentTable(SceneTable):
-    """Where and when: home on the Earth, the day's air, gravity, the magnetic field, the ground."""
+    """Home on the Earth, date, atmosphere, gravity, magnetic field and terrain."""
 
     TABLE: ClassVar[str] = "environment"
     SHARED: ClassVar[bool] = True
     date: str = Field(default="2025-07-01", pattern=r"^\d{4}-\d{2}-\d{2}$")  # of the magnetic field
-    gravity_model: Literal["standard", "wgs84"] = "standard"  # 9.80665 m/s^2, or that of home's latitude
-    gravity: float | None = Field(default=None, ge=0.0, le=30.0)  # [m/s^2] at sea level, in the place of a model's
-    magnetic_field: MagneticField | None = None  # [T] east, north, up; if left out, the World Magnetic Model's at home
+    gravity_model: Literal["standard", "wgs84"] = "standard"  # 9.80665 m/s^2, or from home's latitude
+    gravity: float | None = Field(default=None, ge=0.0, le=30.0)  # [m/s^2] at sea level, instead of the model's
+    magnetic_field: MagneticField | None = None  # [T] east, north, up; default: the World Magnetic Model at home
     home: Home = STANDARD.home
     atmosphere: Atmosphere = STANDARD.atmosphere
     terrain: Terrain = Terrain()
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """The heights of a grid's file become its `heights`."""
+        """Read the file of a grid into its `heights`."""
         try:
             given = cls.model_validate(tree.get(cls.TABLE, {}))
         except ValidationError:
-            return  # refused with its key once all tables are there
+            return  # reported with its key when all tables are validated
         grid, key = given.terrain.grid, "environment.terrain.grid"
         if grid is None or grid.file is None:
             if grid and grid.reach is not None:
-                raise ConfigError(f"{key}.reach", "of heights all are taken", "none, or a GeoTIFF")
+                raise ConfigError(f"{key}.reach", "needs a GeoTIFF", "no reach, or the file of a GeoTIFF")
             return
         if grid.heights is not None:
             raise ConfigError(key, "has file and heights", "one of them")
@@ -143,26 +143,26 @@ class EnvironmentTable(SceneTable):
         elif path.suffix != ".npy":
             raise ConfigError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")
         elif grid.reach is not None:
-            raise ConfigError(f"{key}.reach", "of an array all is taken", "none, or a GeoTIFF")
+            raise ConfigError(f"{key}.reach", "needs a GeoTIFF", "no reach, or the file of a GeoTIFF")
         else:
             heights = height_file.of_array(f"{key}.file", path)
         table["heights"] = heights.tolist()
 
     def check(self, scene: Scene) -> None:
-        """There is such a day, and such a ground."""
+        """Raise KeyedError if the date or the terrain is invalid."""
         try:
             _resolved(self)
         except ConfigError as error:
             raise error.under(self.TABLE) from None
 
     def resolved(self) -> dict[str, Any]:
-        """As of any table."""
+        """Return the table with plain nested values."""
         return {**super().resolved(), "home": self.home._asdict(), "atmosphere": self.atmosphere._asdict()}
 
 
 @lru_cache(maxsize=16)
 def _resolved(table: EnvironmentTable) -> Environment:
-    """In numbers. Raises KeyedError, the key seen from the table."""
+    """Return the environment in numbers. Raise KeyedError with a key relative to the table."""
     try:
         terrain = table.terrain.ground()
     except ConfigError as error:
@@ -178,19 +178,19 @@ def _day(date: str) -> datetime.date:
     try:
         day = datetime.date.fromisoformat(date)
     except ValueError as error:
-        raise ConfigError("date", f"got {date}: {error}", "a day, as 2025-07-01") from None
+        raise ConfigError("date", f"got {date}: {error}", "a date such as 2025-07-01") from None
     if not FIRST_YEAR <= day.year <= LAST_YEAR:
-        expected = f"a day of {FIRST_YEAR} to {LAST_YEAR}, or magnetic_field"
-        raise ConfigError("date", f"got {date}, of which no World Magnetic Model is known", expected)
+        expected = f"a date from {FIRST_YEAR} to {LAST_YEAR}, or magnetic_field"
+        raise ConfigError("date", f"got {date}, which no World Magnetic Model covers", expected)
     return day
 
 
 def _points(grid: Grid, key: str) -> int:
-    """How many points of a GeoTIFF's grid there are from home to each side."""
+    """Return the number of grid points of a GeoTIFF from home to each side."""
     if grid.reach is None:
-        raise ConfigError(f"{key}.reach", "missing", "[m] from home to each side of what is taken out of the GeoTIFF")
+        raise ConfigError(f"{key}.reach", "missing", "distance [m] from home to each side of the square to read")
     if grid.corner is not None:
-        raise ConfigError(f"{key}.corner", "follows from reach", "none beside a GeoTIFF")
+        raise ConfigError(f"{key}.corner", "cannot be set with a GeoTIFF", "reach only")
     points = int(grid.reach / grid.spacing)
     if points < 1:
         raise ConfigError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
@@ -201,5 +201,5 @@ def _points(grid: Grid, key: str) -> int:
 
 
 def environment(scene: Scene) -> Environment:
-    """What all services of the scene's run agree on."""
+    """Return the environment that all services of the scene share."""
     return _resolved(scene[EnvironmentTable])

@@ -1,4 +1,4 @@
-"""What an estimator of one's own is given, and what it returns.
+"""Interface of user-defined estimators.
 
 In a scene:
 
@@ -7,7 +7,7 @@ In a scene:
     [autopilot.estimator_options]
     cutoff = 2.0
 
-In `my_module.py`, beside the scene or on Python's path:
+In `my_module.py`, next to the scene or on Python's path:
 
     class MyEstimator:
         rate = 250.0                                              # [Hz], divides the exchange rate
@@ -16,9 +16,9 @@ In `my_module.py`, beside the scene or on Python's path:
 
         def step(self, time: float, readings: Mapping[str, Any]) -> StateEstimate: ...
 
-It is constructed once, and asked at its rate from tick 0 on; in between, its estimate holds. `readings` has, by the
-sensor's name ("imu", "gps"), the newest reading that has come since the last step, and nothing of a sensor that has
-given none; the types are those of `lapwing.services.common.ports`. The vehicle stands at the origin at first, at
+The estimator is constructed once. Its `step` is called at its rate from tick 0; its last estimate holds in between.
+`readings` maps the sensor's name ("imu", "gps") to the newest reading since the last step and omits sensors without a
+new one; the types are defined in `lapwing.services.common.ports`. The vehicle starts at the origin, at
 `vehicle.resting_height`.
 """
 
@@ -34,19 +34,19 @@ __all__ = ["StateEstimate", "VehicleModel", "checked_estimate"]
 WIDTH = row_width(StateEstimate())
 
 
-def checked_estimate(found: Any) -> StateEstimate:
-    """What a step has returned, with tuples for arrays and lists.
+def checked_estimate(result: Any) -> StateEstimate:
+    """Return the estimate that a step returned, with tuples for arrays and lists.
 
     Raises:
-        TypeError: no estimate, or one of another shape.
+        TypeError: the result is no `StateEstimate` or has the wrong shape.
         ValueError: a number is not finite.
     """
-    if not isinstance(found, StateEstimate):
-        raise TypeError(f"step returned {type(found).__name__}, expected StateEstimate")
-    made = StateEstimate(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in found))  # type: ignore[arg-type]
-    row = pack_row(made)
+    if not isinstance(result, StateEstimate):
+        raise TypeError(f"step returned {type(result).__name__}, expected StateEstimate")
+    estimate = StateEstimate(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in result))  # type: ignore[arg-type]
+    row = pack_row(estimate)
     if len(row) != WIDTH:
         raise TypeError(f"step returned an estimate of {len(row)} numbers, expected {WIDTH}")
     if not all(map(math.isfinite, row)):
-        raise ValueError("an estimate that is not finite")
-    return made
+        raise ValueError("step returned an estimate that is not finite")
+    return estimate

@@ -1,13 +1,13 @@
-"""The kinds of events of a flight, in the order in which events of the same time are told."""
+"""Kinds of flight events, in the order in which simultaneous events are listed."""
 
 from typing import NamedTuple
 
 
 class Kind(NamedTuple):
-    """What events of a kind have in common."""
+    """Properties of an event kind."""
 
-    serious: bool = False  # viewers are to show them as warnings
-    afterwards: bool = False  # what is told of them is known only when they are over
+    serious: bool = False  # viewers show it as a warning
+    afterwards: bool = False  # its text is known only when it is over
 
 
 KINDS = {
@@ -22,5 +22,5 @@ KINDS = {
     "motors": Kind(afterwards=True),
     "battery": Kind(),
 }
-"""By name: faults, doubts about the models, failsafes, modes and phases, arming, contact with
-the ground, slack links, motors at a limit, charge."""
+"""Event kinds by name: faults, validity warnings, failsafes, modes and phases, arming, ground
+contact, slack links, motors at a limit, charge."""

@@ -1,21 +1,21 @@
-"""Failures that an operator may inject, as MAVLink's failure injection names them: which unit, and what is wrong."""
+"""Units and failure types of MAVLink's failure injection."""
 
 from typing import NamedTuple
 
 KINDS = ("sound", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
-"""What may be wrong with a unit; numbered as MAVLink's FAILURE_TYPE."""
+"""Failure types, numbered as MAVLink's FAILURE_TYPE."""
 SOUND, OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT = range(len(KINDS))
 UNITS = (
     "gyro", "accelerometer", "magnetometer", "barometer", "gps", "distance_sensor", "battery", "motor", "optical_flow",
     "airspeed",
 )  # fmt: skip
-"""In the order in which an operator's command counts them."""
+"""Units, in the order of the operator command's numbering."""
 OF_SYSTEMS = {"battery": (SOUND, OFF, STUCK, WRONG), "motor": (SOUND, OFF, STUCK, WRONG, SLOW)}
-"""What may be wrong with a unit that is no sensor; with a sensor, everything."""
+"""Failure types of units that are no sensors; sensors support all."""
 
 
 class Faults(NamedTuple):
-    """What is wrong now."""
+    """Failure type of each unit."""
 
     gyro: int = SOUND
     accelerometer: int = SOUND
@@ -27,14 +27,14 @@ class Faults(NamedTuple):
     airspeed: int = SOUND
     battery: int = SOUND
     battery_charge: float = 0.0  # fraction that a wrong battery reports
-    motors: tuple[int, ...] = ()  # one for each
+    motors: tuple[int, ...] = ()  # of each motor
 
 
 def possible(unit: str) -> tuple[int, ...]:
-    """What may be wrong with a unit."""
+    """Return the failure types that a unit supports."""
     return OF_SYSTEMS.get(unit, tuple(range(len(KINDS))))
 
 
 def refusal(unit: str) -> str:
-    """What to tell somebody who asks for a failure that a unit does not know."""
+    """Return the message for a failure type that a unit does not support."""
     return f"{unit} can be {', '.join(KINDS[kind] for kind in possible(unit))}"

@@ -1,7 +1,7 @@
-"""Missions from files: QGroundControl's .plan (JSON) and .waypoints (QGC WPL 110), in the autopilot's terms.
+"""Import of QGroundControl missions: .plan (JSON) and .waypoints (QGC WPL 110).
 
-Sources: MAVLink guide, "File formats"; QGroundControl developer guide, "Plan file format". Places are relative to the
-home of the simulated world; altitudes of frame 3 count from where the vehicle stands, those of frame 0 from the sea.
+Sources: MAVLink guide, "File formats"; QGroundControl developer guide, "Plan file format". Positions are relative to
+the scene's home. Altitudes of frame 3 are above the resting vehicle, those of frame 0 above sea level.
 """
 
 import json
@@ -14,8 +14,8 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
 from lapwing.messages import MissionItem, OperatorCommand, Vector3
 
-OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # overrides of a scene that flies a plan
-READY_TIMEOUT = 60.0  # [s] the vehicle gets to become ready for take-off
+OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # scene overrides for flying a plan
+READY_TIMEOUT = 60.0  # [s] for the vehicle to become ready for take-off
 SOURCE = "plan"
 HEADER = "QGC WPL 110"
 _ABOVE_SEA, _ABOVE_HOME, _NO_PLACE = (0, 5), (3, 6), 2  # MAV_FRAME
@@ -36,22 +36,22 @@ _ACTIONS: dict[int, tuple[str, Callable[[_Params], dict[str, Any]]]] = {  # by M
 
 
 class _Datum(NamedTuple):
-    """What places in a plan count from."""
+    """Origin of positions in a plan."""
 
     home: Home
-    ground: float  # [m] world z of the vehicle where it stands
+    ground: float  # [m] world z of the resting vehicle
 
 
 def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -> list[OperatorCommand]:
-    """The commands that upload a plan, fly it, and end the run with the landing.
+    """Return the commands that upload a plan, fly it, and end the run after landing.
 
     Args:
-        path: of the file.
-        standing_height: world z [m] of the vehicle where it stands, from which altitudes above home count.
+        path: file.
+        standing_height: world z [m] of the resting vehicle, the origin of altitudes above home.
         home: origin of the world frame.
 
     Raises:
-        ValueError: (one line) no such file, not of these formats, or an item that cannot be flown.
+        ValueError: (one line) the file is missing, has another format, or contains an unsupported item.
     """
     datum = _Datum(home, standing_height)
     try:
@@ -74,7 +74,7 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     if not items:
-        raise ValueError(f"{path}: holds no mission item")
+        raise ValueError(f"{path}: contains no mission item")
 
     steps: list[tuple[str, tuple[float, ...], Sequence[Any]]] = [
         ("mission_upload", (), items),
@@ -98,13 +98,13 @@ def _waypoints(text: str, datum: _Datum) -> tuple[list[Any], list[Any], list[Any
             raise ValueError(f"item {number}: expected 12 columns, got {len(row)}")
         place = [float(v) for v in row[8:11]]
         if number == 0 and row[3] == "16" and row[2] == "0":
-            continue  # by custom the first row is home
+            continue  # the first row is home by convention
         items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place, datum))
     return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
 
 
 def _jump_back(item: Any, left_out: int) -> Any:
-    """Jumps count the rows with home."""
+    """Renumber a jump, whose target counts the home row."""
     return item._replace(values=(item.values[0] - left_out, item.values[1])) if item.action == "jump" else item
 
 
@@ -153,7 +153,7 @@ def _item(number: int, command: int, frame: int, params: list[float], place: lis
 
 
 def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:
-    """An item at a place on the Earth, at a world z of `height` [m]; without a place, NaN."""
+    """Return an item at a geodetic position and a world z of `height` [m]; NaN without a position."""
     if math.isnan(latitude) or (latitude, longitude) == (0.0, 0.0):
         return _made(action, (math.nan, math.nan, height), **more)
     x, y, _ = geodetic_to_enu(datum.home, float(latitude), float(longitude), datum.home.height + height)
@@ -170,5 +170,5 @@ def _zero(value: float) -> float:
 
 
 def _yaw(heading_deg: float) -> float:
-    """World yaw [rad] of a heading [deg]."""
+    """Return the world yaw [rad] of a heading [deg]."""
     return math.nan if math.isnan(heading_deg) else math.remainder(0.5 * math.pi - math.radians(heading_deg), math.tau)

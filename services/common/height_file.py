@@ -1,4 +1,4 @@
-"""Heights of the ground from a file: a numpy array, or a GeoTIFF brought onto metres east and north of home."""
+"""Import of terrain heights: a NumPy array, or a GeoTIFF resampled to metres east and north of home."""
 
 from pathlib import Path
 from typing import Any
@@ -9,42 +9,42 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home
 
 GEOTIFF = (".tif", ".tiff")
-METRES = ("", "m", "metre", "meter")  # what a band says of its unit; most files say nothing
-MOST = 1_000_000  # points that a scene keeps
+METRES = ("", "m", "metre", "meter")  # accepted units of a band; most files have none
+MOST = 1_000_000  # points of a scene's grid
 
 
 def of_array(key: str, path: Path) -> np.ndarray:
-    """The array of an .npy file.
+    """Return the array of an .npy file.
 
     Raises:
-        KeyedError: there is none of numbers in two dimensions; `key` is what names the file.
+        KeyedError: for `key`, if the file has no two-dimensional array of numbers.
     """
     try:
-        found = np.load(path, allow_pickle=False)
+        array = np.load(path, allow_pickle=False)
     except OSError as error:
         raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except (ValueError, EOFError) as error:
-        raise ConfigError(key, f"{path}: {error}", "an array of numbers, as numpy.save writes it") from None
-    if found.ndim != 2 or found.dtype.kind not in "fiu":
-        raise ConfigError(key, f"{path}: {found.ndim} dimensions of {found.dtype}", "two dimensions of numbers")
-    return found.astype(float)
+        raise ConfigError(key, f"{path}: {error}", "an array of numbers written by numpy.save") from None
+    if array.ndim != 2 or array.dtype.kind not in "fiu":
+        raise ConfigError(key, f"{path}: {array.ndim} dimensions of {array.dtype}", "two dimensions of numbers")
+    return array.astype(float)
 
 
 def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) -> np.ndarray:
-    """Heights of a GeoTIFF on a square about home, bilinear (theory.md, section 2.9).
+    """Return the heights of a GeoTIFF on a square about home, bilinear (theory.md, section 2.9).
 
     Args:
-        key: that names the file, for messages.
-        path: of the file, in any coordinate system that it states.
+        key: scene key of the file, for messages.
+        path: file with any coordinate system.
         home: centre of the square.
-        points: from home to each side.
+        points: number of points from home to each side.
         spacing: [m] between neighbours.
 
     Returns:
         [m] rows from south to north, columns from west to east, shape (2 points + 1, 2 points + 1).
 
     Raises:
-        KeyedError: rasterio is missing, the file is none of heights in metres, or it does not cover the square.
+        KeyedError: rasterio is missing, or the file has no heights in metres or does not cover the square.
     """
     try:
         import rasterio
@@ -53,7 +53,7 @@ def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) ->
         raise ConfigError(key, "rasterio is not installed; pip install lapwing[geotiff]") from None
     side = 2 * points + 1
     east_north = f"+proj=aeqd +lat_0={home.latitude_deg!r} +lon_0={home.longitude_deg!r} +datum=WGS84 +units=m"
-    edge = (points + 0.5) * spacing  # a pixel is an area about its point
+    edge = (points + 0.5) * spacing  # a pixel extends half a spacing around its point
     heights = np.full((side, side), np.nan)
     try:
         with rasterio.open(path) as file:
@@ -81,6 +81,6 @@ def _check(key: str, path: Path, file: Any) -> None:
     if file.count != 1:
         raise ConfigError(key, f"{path} has {file.count} bands", "one band of heights")
     if file.crs is None:
-        raise ConfigError(key, f"{path} states no coordinate system", "a GeoTIFF that does")
+        raise ConfigError(key, f"{path} has no coordinate system", "a georeferenced GeoTIFF")
     if (unit := file.units[0] or "").lower() not in METRES:
         raise ConfigError(key, f"{path} has heights in {unit!r}", "metres")

@@ -1,4 +1,4 @@
-"""The surface of the vehicle that an airframe names, as the set-up carries it: for those who show the vehicle."""
+"""The vehicle mesh that an airframe names, stored in the run configuration for viewers."""
 
 import base64
 from pathlib import Path
@@ -13,11 +13,11 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.mesh_file import SUFFIXES, Mesh, read
 
 KEY = "airframe.mesh"
-WIDEST = 20.0  # times as far as the farthest rotor is from the origin: no vehicle, but one in millimetres
+WIDEST = 20.0  # mesh size over the distance of the farthest rotor; more means a mesh in millimetres
 
 
 class Meshes(SceneTable):
-    """The triangles of the file that `airframe.mesh` names, by that name."""
+    """Triangles of the file `airframe.mesh`, by its name."""
 
     TABLE: ClassVar[str] = "meshes"
     OPTIONAL: ClassVar[bool] = True
@@ -26,19 +26,19 @@ class Meshes(SceneTable):
     __pydantic_extra__: dict[str, str]
 
     def text(self, name: str) -> str | None:
-        """The triangles of a file; None where it was not read."""
+        """Return the packed triangles of a file. Return None if it was not read."""
         return self.__pydantic_extra__.get(name)
 
 
 def embed(tree: dict[str, Any], folder: Path) -> None:
-    """Put the triangles of the airframe's mesh into the table `meshes`.
+    """Store the triangles of the airframe's mesh in the table `meshes`.
 
     Args:
-        tree: the scene's data, not yet validated.
-        folder: of the file that names the mesh.
+        tree: scene data, not yet validated.
+        folder: folder of the file that names the mesh.
 
     Raises:
-        KeyedError: no such file, or nothing in it that can be shown.
+        KeyedError: the file is missing or invalid.
     """
     if not isinstance(name := named(tree, "airframe", "mesh"), str):
         return
@@ -54,25 +54,25 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
 
 
 def check(scene: Scene, mesh: str | None, reach: float) -> None:
-    """Refuse a mesh that was not read, or is no vehicle with rotors at most `reach` [m] from the origin; KeyedError."""
+    """Raise KeyedError if the mesh was not read or is too large for rotors within `reach` [m] of the origin."""
     if mesh is None:
         return
     text = scene[Meshes].text(mesh) if scene.has(Meshes) else None
     if text is None:
-        raise ConfigError(KEY, f"got {mesh!r} as an override", "it in the airframe's file or the scene's [airframe]")
+        raise ConfigError(KEY, f"got {mesh!r} as an override", "mesh in the airframe's file or the scene's [airframe]")
     far = float(np.abs(unpack(text).vertices).max())
     if far > WIDEST * reach:
-        message = f"{mesh} reaches {far:g} m from the origin, and the rotors {reach:g} m"
-        raise ConfigError(KEY, message, "metres along the airframe's axes (of millimetres, scale it by 0.001)")
+        message = f"{mesh} extends {far:g} m from the origin, but the rotors only {reach:g} m"
+        raise ConfigError(KEY, message, "a mesh in metres (scale one in millimetres by 0.001)")
 
 
 def pack(mesh: Mesh) -> str:
-    """A mesh as a text: vertices and faces row by row, little-endian, in base64."""
+    """Return the mesh as text: vertices and faces row by row, little-endian, in base64."""
     parts = (mesh.vertices.astype("<f4"), mesh.faces.astype("<u2"))
     return " ".join(base64.b64encode(part.tobytes()).decode("ascii") for part in parts)
 
 
 def unpack(text: str) -> Mesh:
-    """The mesh of a text."""
+    """Return the mesh of a packed text."""
     vertices, faces = map(base64.b64decode, text.split())
     return Mesh(np.frombuffer(vertices, "<f4").reshape(-1, 3), np.frombuffer(faces, "<u2").reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""A table of tables: `[effects.NAME]`, `[sensors.NAME]`."""
+"""Scene tables with one subtable per name: `[effects.NAME]`, `[sensors.NAME]`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,31 +11,31 @@ from lapwing.services.common import user_code, user_modules
 
 
 class NamedTables(SceneTable):
-    """A table for each thing of a kind, by its name; one of the user's own has the key `module`."""
+    """Subtables by name; a user-defined entry has the key `module`."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
     @property
     def tables(self) -> Mapping[str, Any]:
-        """The table of each that the scene names."""
+        """Subtables of the scene by name."""
         return self.__pydantic_extra__ or {}
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """The modules of the user's own become part of the table `modules`."""
+        """Store the user modules in the table `modules`."""
         entries = tree.get(cls.TABLE, {})
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             if isinstance(entry, dict) and isinstance(module := entry.get("module"), str):
                 user_modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
 
     def check(self, scene: Scene) -> None:
-        """Every entry is a table."""
+        """Raise KeyedError unless every entry is a table."""
         for name, table in self.tables.items():
             if not isinstance(table, dict):
                 raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
 
     def load(self, scene: Scene) -> None:
-        """Import the modules of the user's own. KeyedError where one cannot be imported."""
+        """Import the user modules. Raise KeyedError if one cannot be imported."""
         texts = user_modules.texts(scene)
         for name, table in self.tables.items():
             if "module" in table:

@@ -1,7 +1,7 @@
-"""What comes from outside the lock step: joined into one message of the tick at which it applies.
+"""Operator commands from outside the lock step, merged into one message per tick.
 
-The processes `mavlink` and `ros2` publish an encoded OperatorInput on the key `_operator/NAME` behind the run's key
-prefix, at any time; the autopilot stamps and records what has come.
+The processes `mavlink` and `ros2` publish encoded OperatorInput messages on the key `_operator/NAME` below the run's
+key prefix at any time. The autopilot stamps and records them.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -10,44 +10,43 @@ from typing import Any
 from lapwing.messages import OperatorCommand, OperatorInput, header
 
 OPERATOR_KEY = "_operator"
-UNREADABLE = "unreadable"  # kind of the command that stands for bytes that are no message
+UNREADABLE = "unreadable"  # kind of the command that replaces an undecodable message
 
 Operator = Callable[[int], Iterable[OperatorCommand]]
-"""Gives the commands that have come until a tick."""
+"""Function of a tick that returns the commands received since its last call."""
 
 
 def nobody(_: int) -> Iterable[OperatorCommand]:
-    """An operator who never says anything."""
+    """Return no commands."""
     return ()
 
 
 class OperatorInbox:
-    """Sorts what has come from outside by vehicle: of several, the header's `frame_id` has the name."""
+    """Queues of received commands by vehicle; with several vehicles, the header's `frame_id` names one."""
 
     def __init__(self, vehicles: Sequence[str], arrived: Callable[[], tuple[int, bytes] | None]):
-        """`arrived` gives the next encoded OperatorInput with its time, None where there is no other."""
+        """Create the queues; `arrived` returns the next time and encoded OperatorInput, or None."""
         self._arrived, self._first = arrived, vehicles[0]
         self._waiting: dict[str, list[Any]] = {vehicle: [] for vehicle in vehicles}
 
     def take(self, vehicle: str, _: int) -> list[Any]:
-        """The commands for a vehicle that have come."""
+        """Remove and return the queued commands of a vehicle."""
         while arrived := self._arrived():
-            name, found = addressed(arrived[1])
-            self._waiting.get(name, self._waiting[self._first]).extend(found)
-        taken, self._waiting[vehicle] = self._waiting[vehicle], []
-        return taken
+            name, commands = addressed(arrived[1])
+            self._waiting.get(name, self._waiting[self._first]).extend(commands)
+        queue, self._waiting[vehicle] = self._waiting[vehicle], []
+        return queue
 
 
 def addressed(payload: bytes) -> tuple[str, tuple[Any, ...]]:
-    """The vehicle's name and the commands of an encoded OperatorInput; bytes that are none become one command that will
-    be refused."""
+    """Return vehicle name and commands of an encoded OperatorInput; undecodable bytes become one invalid command."""
     try:
-        found = OperatorInput.decode(payload)
-        return found.header.frame_id, found.commands
+        message = OperatorInput.decode(payload)
+        return message.header.frame_id, message.commands
     except ValueError as error:
         return "", (OperatorCommand(UNREADABLE, text=str(error)),)
 
 
-def joined(time_ns: int, given: Iterable[OperatorCommand]) -> OperatorInput:
-    """One message of the instant `time_ns`, the commands in their order."""
-    return OperatorInput(header(time_ns, "world"), tuple(given))
+def joined(time_ns: int, commands: Iterable[OperatorCommand]) -> OperatorInput:
+    """Return one message with the commands at `time_ns`."""
+    return OperatorInput(header(time_ns, "world"), tuple(commands))

@@ -1,7 +1,7 @@
-"""Parameters in files: written as QGroundControl saves them, read also as MAVProxy does.
+"""Parameter files of QGroundControl (read and written) and MAVProxy (read).
 
-QGroundControl's rows are vehicle, component, name, value, type, joined by tabs; MAVProxy's are name and value. Lines
-that begin with # are comments. Source: QGroundControl developer guide, "Parameters file format".
+Rows of QGroundControl are vehicle, component, name, value, type, separated by tabs; those of MAVProxy are name and
+value. Lines that begin with # are comments. Source: QGroundControl developer guide, "Parameters file format".
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,22 +15,22 @@ _HEADER = ("# Onboard parameters for Vehicle 1", "#", "# Vehicle-Id Component-Id
 
 
 def read(path: Path) -> dict[str, float]:
-    """The values of a file by name.
+    """Return the values of a file by name.
 
     Raises:
-        ValueError: (one line) it cannot be read, or a line is no parameter.
+        ValueError: (one line) the file cannot be read or a line is invalid.
     """
     try:
         return parse(path.read_text(encoding="utf-8"), path)
     except OSError as error:
         raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:
-        raise ValueError(f"{path}: not a UTF-8 text file; expected parameters, a line each") from None
+        raise ValueError(f"{path}: not a UTF-8 text file; expected one parameter per line") from None
 
 
 def parse(text: str, path: Path) -> dict[str, float]:
-    """The values of the text of a file; SceneError with the line that is no parameter."""
-    found = {}
+    """Return the values in the text of a file. Raise SceneError with the line that is invalid."""
+    values = {}
     for number, line in enumerate(text.splitlines(), start=1):
         row = line.split()
         if not row or row[0].startswith("#"):
@@ -40,14 +40,14 @@ def parse(text: str, path: Path) -> dict[str, float]:
             raise SceneError("", message, "name and value (or 5 columns)", KeyOrigin(path, number))
         name, value = row if len(row) == 2 else row[2:4]
         try:
-            found[name] = float(value)
+            values[name] = float(value)
         except ValueError:
             raise SceneError(name, f"got {value!r}", "a number", KeyOrigin(path, number)) from None
-    return found
+    return values
 
 
 def write(path: Path, table: Iterable[Parameter], values: Mapping[str, float]) -> None:
-    """Write `values` of the parameters in `table`. Raises ValueError (one line) if that cannot be."""
+    """Write `values` of the parameters in `table`. Raise ValueError (one line) if the file cannot be written."""
     rows = []
     for p in sorted(table, key=lambda p: p.name):
         value, kind = (f"{values[p.name]:.0f}", _INT32) if p.whole else (repr(values[p.name]), _REAL32)

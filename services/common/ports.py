@@ -1,7 +1,6 @@
-"""The values that services hand to one another: plain NamedTuples of numbers, SI, world ENU, body FLU.
+"""Samples of the ports between services: NamedTuples of numbers in SI units, world ENU, body FLU.
 
-Each is a port of the graph; a message of the same topic is made from it (the services' `wire.py`). Tuples with an entry
-for each rotor or body are as long as the vehicle has them.
+The services' `encoders.py` turn them into messages. Tuples per rotor or per body have the vehicle's length.
 """
 
 import math
@@ -20,7 +19,7 @@ PerRotor = tuple[float, ...]
 
 
 class TrueState(NamedTuple):
-    """What the plant tells of a vehicle at every tick."""
+    """True state of a vehicle at a tick."""
 
     position_world: Vec3 = ZERO  # [m]
     attitude: Quaternion = NO_ROTATION  # body to world
@@ -42,14 +41,14 @@ class TrueState(NamedTuple):
 class BatteryReading(NamedTuple):
     """State of the battery."""
 
-    charge: float = 0.0  # fraction; NaN where no effect counts it
+    charge: float = 0.0  # fraction; NaN if no effect models it
     voltage: float = 0.0  # [V]
     current: float = 0.0  # [A] drawn
-    temperature: float = math.nan  # [K]; NaN where no effect computes it
+    temperature: float = math.nan  # [K]; NaN if no effect models it
 
 
 class BodyMotions(NamedTuple):
-    """True state of each body of a vehicle that has several; every tuple has an entry for each."""
+    """True state of each body of a multibody vehicle; every tuple has an entry per body."""
 
     position_world: tuple[Vec3, ...]  # [m]
     attitude: tuple[Quaternion, ...]
@@ -60,7 +59,7 @@ class BodyMotions(NamedTuple):
 
 
 class ContactForces(NamedTuple):
-    """What the ground does to the points of a vehicle that may touch it; every tuple has an entry for each."""
+    """Ground forces on the contact points of a vehicle; every tuple has an entry per point."""
 
     position_world: tuple[Vec3, ...]  # [m]
     force_world: tuple[Vec3, ...]  # [N]
@@ -85,12 +84,12 @@ class MagnetometerReading(NamedTuple):
 
 
 class GpsReading(NamedTuple):
-    """One reading of a satellite receiver: where the antenna was `age` seconds ago."""
+    """One reading of a satellite receiver: the antenna's state `age` seconds ago."""
 
     latitude_deg: float = 0.0  # [deg] north
     longitude_deg: float = 0.0  # [deg] east
     height: float = 0.0  # [m] over the ellipsoid
-    position_variance: Vec3 = ZERO  # [m^2] east, north, up: white and wandering error together
+    position_variance: Vec3 = ZERO  # [m^2] east, north, up: white and correlated error together
     velocity_world: Vec3 = ZERO  # [m/s]
     velocity_variance: float = 0.0  # [(m/s)^2] per axis
     age: float = 0.0  # [s]
@@ -106,25 +105,25 @@ class BarometerReading(NamedTuple):
 
 
 class DistanceReading(NamedTuple):
-    """One reading of a sonar or a rangefinder, as sensor_msgs/Range has it."""
+    """One reading of a sonar or a rangefinder, with the conventions of sensor_msgs/Range."""
 
-    range: float = 0.0  # [m]; +inf: nothing in range, -inf: nearer than range_min; a sonar's rounded to float32
-    variance: float = 0.0  # [m^2], of the white noise; a sonar's rounded to float32
+    range: float = 0.0  # [m]; +inf: nothing in range, -inf: below range_min; rounded to float32 for a sonar
+    variance: float = 0.0  # [m^2], of the white noise; rounded to float32 for a sonar
     valid: bool = False
 
 
 class OpticalFlowReading(NamedTuple):
-    """One reading of a camera that looks down."""
+    """One reading of a downward-facing optical flow camera."""
 
     flow: tuple[float, float] = (0.0, 0.0)  # [rad/s] about body x and y
-    rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same
+    rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same axes
     distance: float = 0.0  # [m] along the camera's axis
     variance: float = 0.0  # [(rad/s)^2] of the flow's white noise, per axis
     valid: bool = False
 
 
 class AirspeedReading(NamedTuple):
-    """One reading of a differential pressure."""
+    """One reading of a differential pressure sensor."""
 
     pressure: float = 0.0  # [Pa]
     variance: float = 0.0  # [Pa^2], of the white noise
@@ -132,47 +131,47 @@ class AirspeedReading(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """Where the vehicle ought to be."""
+    """Setpoint of the vehicle's motion."""
 
     position_world: Vec3 = ZERO  # [m]
     velocity_world: Vec3 = ZERO  # [m/s]
     acceleration_world: Vec3 = ZERO  # [m/s^2]
     yaw: float = 0.0  # [rad]
     yaw_rate: float = 0.0  # [rad/s]
-    phase: int = 0  # number of the text that names the present part of the mission
-    final: bool = False  # no later part of the mission ends in the air: the next landing is the last
-    release: bool = False  # the gripper is to be open while the vehicle stands
+    phase: int = 0  # index of the phase's name
+    final: bool = False  # no later phase ends in the air: the next landing is the last
+    release: bool = False  # open the gripper once the vehicle rests on the ground
 
 
 class MotorCommand(NamedTuple):
-    """What the autopilot commands."""
+    """Motor command of the autopilot."""
 
     motor_voltage: PerRotor  # [V]
     armed: bool
-    thrust: PerRotor  # [N] asked of each rotor
-    attitude_reference: Vec3  # [rad] roll, pitch, yaw that the inner loops follow
+    thrust: PerRotor  # [N] commanded
+    attitude_reference: Vec3  # [rad] roll, pitch, yaw references of the inner loops
 
 
 class AutopilotStatus(NamedTuple):
-    """What the autopilot is doing, as far as it is numbers."""
+    """Numeric part of the autopilot's status."""
 
-    phase: int = 0  # number of a text
-    words: int = 0  # number of the commander's words
+    phase: int = 0  # index of the phase's name
+    words: int = 0  # index of the commander's status texts
     armed: bool = False
     landed: bool = True
     finished: bool = False
-    battery_warning: int = 0  # 0 none or not known, 1 low, 2 critical, 3 nearly empty
+    battery_warning: int = 0  # 0 none or unknown, 1 low, 2 critical, 3 nearly empty
     failed_motor: int = 0  # from 1; 0: none
     released: bool = False  # the gripper is open
 
 
 class StateEstimate(NamedTuple):
-    """What the estimator tells. Standard deviations are those of its own error."""
+    """State estimate with the standard deviations of its error."""
 
     position_world: Vec3 = ZERO  # [m]
     attitude: Quaternion = NO_ROTATION  # (w, x, y, z), body to world
     velocity_world: Vec3 = ZERO  # [m/s]
-    omega_body: Vec3 = ZERO  # [rad/s], bias taken off
+    omega_body: Vec3 = ZERO  # [rad/s], bias removed
     acceleration_world: Vec3 = ZERO  # [m/s^2], dv/dt
     gyro_bias: Vec3 = ZERO  # [rad/s]
     accelerometer_bias: Vec3 = ZERO  # [m/s^2]
@@ -180,11 +179,11 @@ class StateEstimate(NamedTuple):
     velocity_std: Vec3 = ZERO  # [m/s] world
     attitude_std: Vec3 = ZERO  # [rad] rotation vector, body
     health: int = 0  # 0: good
-    rejected: int = 0  # bit i: the last reading of source i was refused
+    rejected: int = 0  # bit i: the last reading of source i was rejected
 
 
 class RotorWrenches(NamedTuple):
-    """What the rotors of each quadrotor of a formation do."""
+    """Rotor wrench of each quadrotor of a formation."""
 
     thrust: tuple[float, ...]  # [N] along body z
     moment_body: tuple[Vec3, ...]  # [N m]

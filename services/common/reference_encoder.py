@@ -1,4 +1,4 @@
-"""References as messages: the trajectory's, and what the autopilot follows."""
+"""Topic encoder of references: the trajectory's and the autopilot's."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from lapwing.services.common.ports import Reference
 
 
 def reference_wire(topic: Topic, port: str, texts: Sequence[str]) -> TopicEncoder:
-    """The topic of a port of references; `texts` names the phases by number, and may grow."""
+    """Return the encoder of a port of references; `texts` has the phase names by index and may grow."""
 
     def sample(phase: int) -> Any:
         return Setpoint(header(0, "world"), phase=texts[phase])

@@ -1,4 +1,4 @@
-"""The tables of a scene that more than one service reads."""
+"""Scene tables that several services read."""
 
 import importlib.resources
 from pathlib import Path
@@ -17,29 +17,29 @@ Names = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class Run(SceneTable):
-    """What ends a run, and the seed of all its randomness."""
+    """Duration, pace and random seed of a run."""
 
     TABLE: ClassVar[str] = "run"
     SHARED: ClassVar[bool] = True
     title: str = ""  # one line for `lapwing scenes`
-    seed: int = Field(default=1, ge=0, lt=2**63)  # of every random number: same scene, same seed, same bits
-    duration: float = Field(gt=0.0, le=1e6)  # [s] the run ends here at the latest
-    settle: float = Field(default=1.0, ge=0.0)  # [s] recorded after the mission has ended
-    speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; without it, as fast as it goes
+    seed: int = Field(default=1, ge=0, lt=2**63)  # of all random numbers; equal seeds give bit-for-bit equal runs
+    duration: float = Field(gt=0.0, le=1e6)  # [s] latest end of the run
+    settle: float = Field(default=1.0, ge=0.0)  # [s] from the end of the mission to the end of the run
+    speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; unset: as fast as possible
 
 
 def title(scene: Path) -> str:
-    """What a scene's file calls it; no other of its keys is looked at.
+    """Return the title in a scene's file without validating the other keys.
 
     Raises:
-        SceneError: it is not a TOML file.
+        SceneError: the file is not TOML.
     """
     run = Files(scene.parent).toml("scene", "scene", scene).get(Run.TABLE, {})
     return str(run.get("title", "")) if isinstance(run, dict) else ""
 
 
 class CooperativeLoad(SceneTable):
-    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); a tuple has an entry for each."""
+    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); tuples have an entry for each."""
 
     TABLE: ClassVar[str] = "cooperative_load"
     OPTIONAL: ClassVar[bool] = True
@@ -54,13 +54,13 @@ class CooperativeLoad(SceneTable):
 
 
 class Published(SceneTable):
-    """Figures from the literature that a run's figures are shown beside."""
+    """Published figures to compare the run with."""
 
     TABLE: ClassVar[str] = "published"
-    source: str = "published"  # where the figures are from
+    source: str = "published"  # origin of the figures
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad]
 
 
 def follows_trajectory(scene: Scene) -> bool:
-    """Whether the vehicle flies along the scene's `[trajectory]`: there is one, and no operator takes its place."""
+    """Return True if the vehicle follows the scene's `[trajectory]` rather than operator commands."""
     return scene.has("trajectory") and not (scene.has("autopilot") and not scene.lookup("autopilot.trajectory"))

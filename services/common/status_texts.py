@@ -1,4 +1,4 @@
-"""In what words the autopilot says what it did and why: ground stations are told the same by the numbers of events."""
+"""Status texts of the autopilot, for operators and, by event number, for ground stations."""
 
 POSITION_LOST = "the position is lost"
 MOTOR_FAILED = "a motor has failed"
@@ -11,20 +11,20 @@ FENCE_LEFT = "the vehicle has left the fence"
 FAILSAFES = (
     POSITION_LOST, MOTOR_FAILED, BATTERY_EMPTY, BATTERY_CRITICAL, BATTERY_LOW, LINK_LOST, SETPOINTS_LOST, FENCE_LEFT,
 )  # fmt: skip
-"""Why a failsafe takes over; an event's number for one is its place here."""
+"""Failsafe reasons; the index is the reason's event number."""
 
 NOT_STARTED = "the estimator has not started"
-NO_READINGS = "no good readings of the {}"  # and the source's name
+NO_READINGS = "no good readings of the {}"  # name of the source
 POSITION_UNCERTAIN = "the position is uncertain"
 ATTITUDE_UNCERTAIN = "the attitude is uncertain"
 NOT_LEVEL = "the vehicle does not stand level"
 OUTSIDE_FENCE = "the vehicle stands outside of the fence"
-"""Why the vehicle cannot be armed; besides BATTERY_LOW, with the charge behind it."""
+"""Arming blockers; BATTERY_LOW followed by the charge is another."""
 
 ARMED, DISARMED, LANDED = "armed", "disarmed: {}", "landed"
 AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "nobody took off"
-"""Why it was disarmed."""
-TAKEN_OVER = "{}: {}"  # why, and in which mode
+"""Reasons for disarming."""
+TAKEN_OVER = "{}: {}"  # reason and mode of a failsafe
 
 ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
-"""Texts of what happens in every flight."""
+"""Texts of events that every flight has."""

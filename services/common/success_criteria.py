@@ -1,4 +1,4 @@
-"""What a scene calls a success: expressions over the figures of a flight."""
+"""Success criteria of a scene: expressions over the metrics of a flight."""
 
 import ast
 import math
@@ -12,7 +12,7 @@ from pydantic import Field
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 
-EXPECTED = "an expression over figures of the flight, for example \"rmse.x < 0.1 and outcome == 'landed'\""
+EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
 
 _MAY_HAVE = (
@@ -23,15 +23,15 @@ _MAY_HAVE = (
 
 
 class Success(SceneTable):
-    """What a flight has to be for a success; anything else is a failure: exit code 4 of a run, counted in campaigns."""
+    """Conditions of a successful flight. A failed flight has exit code 4 and is counted in campaigns."""
 
     TABLE: ClassVar[str] = "success"
     require: tuple[str, ...] = Field(
         default=("outcome in ('landed', 'completed')",), strict=False
-    )  # expressions over figures of the flight that all have to hold
+    )  # expressions over the metrics of the flight; all must hold
 
     def check(self, scene: Scene) -> None:
-        """Every expression can be read."""
+        """Raise KeyedError unless every expression is valid."""
         for i, text in enumerate(self.require):
             try:
                 _expression(text)
@@ -39,13 +39,13 @@ class Success(SceneTable):
                 raise ConfigError(f"success.require.{i}", f"got {text!r}", EXPECTED) from None
 
     def check_names(self, known: Mapping[str, Any]) -> None:
-        """Every figure that is named is known. Raises KeyedError where one is not."""
+        """Raise KeyedError if an expression uses an unknown metric."""
         for i, text in enumerate(self.require):
             for name in sorted(_expression(text).names - set(known)):
                 raise ConfigError.unknown(f"success.require.{i}", "figure", name, known)
 
     def unmet(self, figures: Mapping[str, Any]) -> list[str]:
-        """The expressions that do not hold for these figures."""
+        """Return the expressions that do not hold for these metrics."""
         return [text for text in self.require if not holds(text, figures)]
 
 
@@ -55,7 +55,7 @@ class _Expression(NamedTuple):
 
 
 def holds(text: str, figures: Mapping[str, Any]) -> bool:
-    """Whether an expression is true. Of a figure that is NaN, as of a flight without a touch-down, only != is."""
+    """Return True if the expression holds. For a NaN, such as the touch-down speed in the air, only != holds."""
     try:
         return bool(eval(_expression(text).code, {"__builtins__": {}, **FUNCTIONS}, {"figures": figures}))
     except (ArithmeticError, TypeError, ValueError):
@@ -64,7 +64,7 @@ def holds(text: str, figures: Mapping[str, Any]) -> bool:
 
 @cache
 def _expression(text: str) -> _Expression:
-    """An expression that holds nothing but figures, constants, comparisons and arithmetic; ValueError for any other."""
+    """Compile an expression of metrics, constants, comparisons and arithmetic. Raise ValueError for any other."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except SyntaxError:
@@ -78,21 +78,21 @@ def _expression(text: str) -> _Expression:
 
 
 class _Lookup(ast.NodeTransformer):
-    """Makes of every dotted name, `rmse.x`, a look into the figures."""
+    """Replace every dotted name, such as `rmse.x`, by a lookup in the metrics."""
 
     def __init__(self) -> None:
         self.names: set[str] = set()
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """`rmse.x`."""
+        """Replace `rmse.x`."""
         return self._look(node)
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """`outcome`."""
+        """Replace `outcome`."""
         return self._look(node)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """Of one of the functions."""
+        """Accept a call of one of the functions."""
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS or node.keywords:
             raise ValueError(ast.unparse(node))
         node.args = [self.visit(argument) for argument in node.args]

@@ -1,4 +1,4 @@
-"""The user's own code, as a scene names it: "module", or "module:Name"."""
+"""User code that a scene names: "module" or "module:Name"."""
 
 import inspect
 import re
@@ -12,20 +12,20 @@ from typing import Any
 from lapwing.cosim.config import user_module
 from lapwing.dynamics.config_error import ConfigError
 
-MEMORY = "memory"  # the module in the name of an object that only this process has: "memory:MyController"
-_lent: dict[str, Any] = {}  # such objects
+MEMORY = "memory"  # module name of objects in this process only: "memory:MyController"
+_lent: dict[str, Any] = {}  # registered objects by name
 
 
 @contextmanager
 def lent(thing: Any, folder: Path) -> Iterator[str]:
-    """The name by which a scene can call for a class, a function or an object, as long as the context lasts.
+    """Register a class, function or object under a name for scenes, within the context.
 
-    What stands as it is in a module that a set-up can carry is named as in a scene's file, "module:Name"; anything
-    else, "memory:Name", lives in this process only.
+    A definition in a module that the run configuration can store is named "module:Name". Anything else is named
+    "memory:Name" and exists in this process only.
 
     Args:
-        thing: what is to be named; a text is a name already.
-        folder: of the scene.
+        thing: object to name; a text is a name already.
+        folder: folder of the scene.
     """
     if name := thing if isinstance(thing, str) else _carried(thing, folder):
         yield name
@@ -43,7 +43,7 @@ def lent(thing: Any, folder: Path) -> Iterator[str]:
 
 
 def _carried(thing: Any, folder: Path) -> str:
-    """The name of a class or function whose module, as it was imported, a set-up would carry; "" of anything else."""
+    """Return "module:Name" of a class or function whose unchanged module can be stored. Return "" otherwise."""
     if not (inspect.isclass(thing) or inspect.isfunction(thing)) or thing.__module__ == "__main__":
         return ""
     module, name = sys.modules.get(thing.__module__), thing.__qualname__
@@ -58,15 +58,15 @@ def _carried(thing: Any, folder: Path) -> str:
 
 
 def parted(key: str, text: str) -> tuple[str, str]:
-    """Module and name of "module:Name"; KeyedError where it is not of that form."""
+    """Return module and name of "module:Name". Raise KeyedError for another form."""
     module, _, name = text.partition(":")
     if not module or not name.isidentifier():
-        raise ConfigError(key, f"got {text!r}", 'a text of the form "module:Name"')
+        raise ConfigError(key, f"got {text!r}", '"module:Name"')
     return module, name
 
 
 def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
-    """A module that the set-up carries; KeyedError where it cannot be imported."""
+    """Return a module that the run configuration stores. Raise KeyedError if it cannot be imported."""
     try:
         return user_module.load(module, texts)
     except SyntaxError as error:
@@ -76,20 +76,20 @@ def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
 
 
 def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, Any]:
-    """The module of "module:Name", and what has that name in it.
+    """Return the module of "module:Name" and the object of that name.
 
     Raises:
-        KeyedError: the module cannot be imported, or has no such name; the object is not there any more.
+        KeyedError: the module cannot be imported or lacks the name, or the object is not registered.
     """
     module, name = parted(key, text)
     if module == MEMORY:
         if name not in _lent:
-            message = f"{name} was an object in the memory of the Python session that flew it"
-            raise ConfigError(key, message, "a class in a module, which a log carries")
+            message = f"{name} was an object in the memory of the Python session that ran it"
+            raise ConfigError(key, message, "a class in a module, which the log stores")
         thing = _lent[name]
         return sys.modules[getattr(thing, "__module__", type(thing).__module__)], thing
-    found = loaded(key, module, texts)
-    if not hasattr(found, name):
-        own = [n for n, value in vars(found).items() if callable(value) and value.__module__ == found.__name__]
+    code = loaded(key, module, texts)
+    if not hasattr(code, name):
+        own = [n for n, value in vars(code).items() if callable(value) and value.__module__ == code.__name__]
         raise ConfigError.unknown(key, f"name in {module}", name, own)
-    return found, getattr(found, name)
+    return code, getattr(code, name)

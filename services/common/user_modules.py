@@ -1,4 +1,4 @@
-"""The texts of the user's own modules, as the set-up carries them."""
+"""Source texts of user modules in the run configuration."""
 
 from typing import Any, ClassVar
 
@@ -9,7 +9,7 @@ from lapwing.cosim.scene import Files, Scene, SceneTable
 
 
 class Modules(SceneTable):
-    """The texts of the user's own modules, by name: what the keys that name one resolve to."""
+    """Source texts of user modules by name."""
 
     TABLE: ClassVar[str] = "modules"
     OPTIONAL: ClassVar[bool] = True
@@ -20,26 +20,26 @@ class Modules(SceneTable):
 
     @property
     def texts(self) -> dict[str, str]:
-        """By name."""
+        """Source texts by module name."""
         return dict(self.__pydantic_extra__)
 
 
 def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
-    """Put the text of a module, and of those beside it that it imports, into the table `modules`.
+    """Store the text of a module, and of the neighbouring modules that it imports, in the table `modules`.
 
     Args:
-        tree: the scene's data, not yet validated.
-        files: of the scene.
+        tree: scene data, not yet validated.
+        files: files of the scene.
         key: dotted key that names the module.
-        module: its name.
+        module: module name.
 
     Raises:
-        KeyedError: there is none, or it cannot be read.
+        KeyedError: the module is missing or cannot be read.
     """
     for name, path in user_module.find(key, module, files.folder).items():
         tree.setdefault(Modules.TABLE, {})[name] = files.text(f"{Modules.TABLE}.{name}", key, path)
 
 
 def texts(scene: Scene) -> dict[str, str]:
-    """The texts that a scene carries, by name."""
+    """Return the module texts of a scene by name."""
     return scene[Modules].texts if scene.has(Modules) else {}

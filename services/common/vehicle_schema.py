@@ -1,4 +1,4 @@
-"""What flies and under which physics: the airframe, the effects, and what follows from both."""
+"""Scene tables of the vehicle, its airframe and its effects, and quantities derived from them."""
 
 import math
 from typing import Any, ClassVar, NamedTuple
@@ -28,28 +28,28 @@ from lapwing.services.common.named_tables import NamedTables
 from lapwing.services.common.run_schema import SHIPPED, Pair
 
 BURIED = 1e-6  # [m]
-STEEPEST_START = 46.0  # [deg] that a vehicle leans at its start: ground is at most 45 degrees steep
+STEEPEST_START = 46.0  # [deg] initial tilt; terrain is at most 45 degrees steep
 
 
 class Vehicle(SceneTable):
-    """What flies."""
+    """The vehicle."""
 
     TABLE: ClassVar[str] = "vehicle"
     DISTINCT: ClassVar[str] = "name"
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
-    airframe: str | None = None  # one that ships or lies in vehicles/ beside the scene, or the path of a .toml file
+    airframe: str | None = None  # shipped, in vehicles/ next to the scene, or the path of a .toml file
     model: str = "reduced"  # a module of services/plant/models
-    mass: float | None = Field(default=None, gt=0.0)  # [kg] with payload, in the place of airframe.mass.total
-    start: Pair | None = None  # [m] east and north of home, where it stands and its trajectory begins; without it, home
+    mass: float | None = Field(default=None, gt=0.0)  # [kg] with payload, instead of airframe.mass.total
+    start: Pair | None = None  # [m] east and north of home; start of the vehicle and its trajectory; default: home
 
     @classmethod
     def numbered(cls, i: int) -> dict[str, Any]:
-        """drone1, drone2, ..."""
+        """Return the default name of vehicle i: drone1, drone2, ..."""
         return {"name": f"drone{i + 1}"}
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """The airframe's file becomes the table `airframe`; what the scene says there is laid over it."""
+        """Read the airframe's file into the table `airframe`, overridden by the scene's values."""
         folder = files.folder
         if isinstance(name := named(tree, "vehicle", "airframe"), str):
             path = files.find("vehicle.airframe", "airframe", name, "vehicles", SHIPPED / "vehicles")
@@ -63,23 +63,23 @@ class Vehicle(SceneTable):
             tree[VehicleAirframe.TABLE] = laid_over(frame, {"mass": {"total": mass}})
 
     def check(self, scene: Scene) -> None:
-        """The mass is that of the airframe."""
+        """Raise KeyedError unless the mass agrees with the airframe's."""
         if self.mass is None:
             return
         if not scene.has(VehicleAirframe):
-            raise ConfigError("vehicle.mass", "there is no airframe whose mass it could be; leave it out")
+            raise ConfigError("vehicle.mass", "the vehicle has no airframe; remove the key")
         if scene[VehicleAirframe].payload:
             raise ConfigError(
-                "vehicle.mass", "airframe.payload is part of it", "airframe.mass.total, without the payload"
+                "vehicle.mass", "conflicts with airframe.payload", "airframe.mass.total, without the payload"
             )
         if (total := airframe(scene).mass.total) != self.mass:
             raise ConfigError(
-                "vehicle.mass", f"{self.mass:g} kg, and airframe.mass.total = {total:g} kg", "one of them"
+                "vehicle.mass", f"{self.mass:g} kg, but airframe.mass.total = {total:g} kg", "one of them"
             )
 
 
 class VehicleAirframe(Airframe, SceneTable):
-    """The airframe: the content of the file that `vehicle.airframe` names."""
+    """The airframe: content of the file that `vehicle.airframe` names."""
 
     TABLE: ClassVar[str] = "airframe"
     OPTIONAL: ClassVar[bool] = True
@@ -87,19 +87,18 @@ class VehicleAirframe(Airframe, SceneTable):
     model_config = ConfigDict(strict=False)
 
     def check(self, scene: Scene) -> None:
-        """The mesh was read, and is as large as a vehicle with these rotors."""
+        """Raise KeyedError unless the mesh was read and fits the rotors in size."""
         mesh_schema.check(scene, self.mesh, max(math.hypot(*place) for place in self.rotors.position))
 
 
 class Effects(NamedTables):
-    """The physics that the scene calls for: a table for each effect of lapwing/dynamics/effects, or of the user's
-    own."""
+    """Physical effects: one table per effect of lapwing/dynamics/effects or of a user module."""
 
     TABLE: ClassVar[str] = "effects"
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """As of any; and what is in the files that effects name becomes part of their tables."""
+        """Store user modules, and read the files that effects name into their tables."""
         super().embed(tree, files)
         entries = tree.get(cls.TABLE, {})
         for name in set(entries).intersection(effects.names()) if isinstance(entries, dict) else ():
@@ -110,15 +109,16 @@ class Effects(NamedTables):
                     raise error.under(f"{cls.TABLE}.{name}") from None
 
     def check(self, scene: Scene) -> None:
-        """Every effect exists, has sound parameters, and suits the vehicle and the others."""
+        """Raise KeyedError unless all effects exist, have valid parameters and are compatible."""
         super().check(scene)
         active(scene)
 
 
 def airframe(scene: Scene) -> Airframe:
-    """The airframe of the scene with its payload, its positions from the joint centre of mass.
+    """Return the scene's airframe with its payload, with positions relative to the common centre of mass.
 
-    Raises KeyedError where it names none.
+    Raises:
+        KeyedError: the scene has no airframe.
     """
     if not scene.has(VehicleAirframe):
         raise ConfigError("vehicle.airframe", "missing", "the name of an airframe, or the path of a .toml file")
@@ -126,7 +126,7 @@ def airframe(scene: Scene) -> Airframe:
 
 
 def active(scene: Scene) -> tuple:
-    """Parameters of the scene's effects, sorted by name."""
+    """Return the parameters of the scene's effects, sorted by name."""
     return scene.once(_active)
 
 
@@ -137,18 +137,18 @@ def _active(scene: Scene) -> tuple:
 
 
 class RotorConstants(NamedTuple):
-    """Thrust and torque of a rotor at rest in the air, over the square of its speed."""
+    """Static thrust and torque of a rotor over the square of its speed."""
 
-    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where they go with the density
+    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 if `with_density`
     torque: float  # [N m s^2/rad^2]
-    with_density: bool  # whether they are in proportion to the density of the air
+    with_density: bool  # both are proportional to the air density
 
 
 def rotor_constants(scene: Scene) -> RotorConstants:
-    """Those of the effect that is in force; of the airframe's [propeller] where none of the three that are known is.
+    """Return the constants of the scene's rotor effect, or of the airframe's [propeller].
 
     Raises:
-        KeyedError: there is neither.
+        KeyedError: the scene has neither.
     """
     for effect in active(scene):
         if isinstance(effect, RotorQuadratic | RotorTable):
@@ -157,13 +157,13 @@ def rotor_constants(scene: Scene) -> RotorConstants:
     frame = airframe(scene)
     if frame.propeller is None:
         expected = "[effects.rotor_quadratic] with both constants, or an airframe with [propeller]"
-        raise ConfigError("effects", "nothing says what the rotors give", expected)
-    known = RotorThrust.from_scene({}, frame)
-    return RotorConstants(known.thrust_constant, known.torque_constant, True)
+        raise ConfigError("effects", "rotor thrust is undefined", expected)
+    rotor = RotorThrust.from_scene({}, frame)
+    return RotorConstants(rotor.thrust_constant, rotor.torque_constant, True)
 
 
 def thrust_coefficient(scene: Scene) -> float:
-    """Thrust of a rotor over the square of its speed [N s^2/rad^2], in the air of home."""
+    """Return the thrust of a rotor over the square of its speed [N s^2/rad^2] in the air at home."""
     rotor, around = rotor_constants(scene), environment(scene)
     if not rotor.with_density:
         return rotor.thrust
@@ -173,17 +173,17 @@ def thrust_coefficient(scene: Scene) -> float:
 
 
 def wake_slopes(scene: Scene) -> WakeSlopes:
-    """How the rotors' loads hang together under `coaxial_wash`, where the scene names it."""
+    """Return the coupling of the rotors' loads by `coaxial_wash`, empty if the scene does not use it."""
     return next((e.slopes() for e in active(scene) if isinstance(e, CoaxialWash)), WakeSlopes())
 
 
 def gravity(scene: Scene) -> float:
-    """Gravity at home [m/s^2]: that of whichever effect gives one, 0 without."""
+    """Return gravity at home [m/s^2] of the scene's gravity effect, 0 without one."""
     return next((e.acceleration_at_home for e in active(scene) if hasattr(e, "acceleration_at_home")), 0.0)
 
 
 def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
-    """(position of the centre of mass [m], attitude) in the world of the vehicle that stands on the ground at home."""
+    """Return (position of the centre of mass [m], attitude) of the vehicle at rest at its start, world frame."""
     return scene.once(_start_pose)
 
 
@@ -197,16 +197,16 @@ def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
 
 
 def _upright(pose: Pose) -> None:
-    """KeyedError where the feet find no ground side by side, as where a wall is under one of them."""
+    """Raise KeyedError if the feet find no common ground, for example next to a wall."""
     upward = rotate(pose[1], (0.0, 0.0, 1.0))[2]
     lean = math.degrees(math.acos(min(upward, 1.0)))
     if lean > STEEPEST_START:
-        message = f"no place for the vehicle at its start: on its feet it would lean by {lean:.0f} degrees"
-        raise ConfigError("environment.terrain", message, "room for the vehicle where it starts")
+        message = f"no room for the vehicle at its start: on its feet it would lean by {lean:.0f} degrees"
+        raise ConfigError("environment.terrain", message, "flatter ground at the start")
 
 
 def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
-    """KeyedError where a part of a vehicle that stands there is in the ground."""
+    """Raise KeyedError if a part of the resting vehicle is below the ground."""
     (x, y, z), attitude = pose
     hull = frame.contact.hull if frame.contact else ()
     for part in ((0.0, 0.0, 0.0), *frame.rotors.position, *hull):
@@ -215,14 +215,14 @@ def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
         if under > BURIED:
             place = ", ".join(f"{p:g}" for p in part)
             message = f"buries the start: the vehicle's ({place}) m would be {under:.2f} m below the ground"
-            raise ConfigError("environment.terrain", message, "room for the vehicle where it starts")
+            raise ConfigError("environment.terrain", message, "free ground at the start")
 
 
 def start_place(scene: Scene) -> Vec3:
-    """World position of its centre of mass [m]."""
+    """Return the start position of the centre of mass [m], world frame."""
     return start_pose(scene)[0]
 
 
 def start_height(scene: Scene) -> float:
-    """World z of its centre of mass [m]."""
+    """Return world z of the centre of mass at the start [m]."""
     return start_place(scene)[2]

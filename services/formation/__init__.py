@@ -1,1 +1,1 @@
-"""The control of quadrotors that carry a load together."""
+"""Control of quadrotors that carry a load together."""

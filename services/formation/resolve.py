@@ -1,4 +1,4 @@
-"""From a scene's `[formation]` to the control law."""
+"""Resolution of a scene's `[formation]` into the service's configuration."""
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
@@ -15,14 +15,13 @@ from lapwing.services.formation.schema import Formation
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
-    """The control of the scene's `[formation]`; None where there is none."""
+    """Return the configuration of the formation service. Return None if the scene has no `[formation]`."""
     if not scene.has(Formation):
         return None
-    c, wanted = scene[CooperativeLoad], scene[Formation]
+    c, f = scene[CooperativeLoad], scene[Formation]
     law = FormationControl(
-        wanted.load_position, wanted.load_velocity, wanted.link, wanted.link_rate, wanted.attitude,
-        wanted.attitude_rate, wanted.epsilon, wanted.path,
-        tuple(scale(1.0 / norm(d), d) for d in wanted.link_direction),
+        f.load_position, f.load_velocity, f.link, f.link_rate, f.attitude, f.attitude_rate, f.epsilon, f.path,
+        tuple(scale(1.0 / norm(d), d) for d in f.link_direction),
     )  # fmt: skip
     p = CooperativeLoadParameters(c.quad_mass, c.quad_inertia, c.link_length, c.load_mass, c.gravity, law)
     n = len(c.link_length)

@@ -1,15 +1,34 @@
-"""The formation's control as a service: every body's state in, thrusts and moments out."""
+"""The formation control service and its topic encoder."""
+
+from typing import Any
+
+import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.kernels.cell import Cell
-from lapwing.services.formation.encoders import wires
+from lapwing.messages import LiftCommand, Vector3, header
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.services.common import ports
+from lapwing.services.common.ports import RotorWrenches
 
 NAME = "formation"
 
 
 def create(setup: RunConfig) -> Service:
-    """The control of a run."""
-    given = setup.services[NAME]
-    return Service(NAME, [Block(NAME, given.parameters, Cell(0.0), given.inputs, given.ports)], wires(setup))
+    """Return the formation control of a run."""
+    config = setup.services[NAME]
+    n = len(setup.port(ports.LIFT).like.thrust)
+    message = LiftCommand(header(0, "body"), (0.0,) * n, (Vector3(),) * n)
+    encoder = TopicEncoder(topic.LIFT, ports.LIFT, 1, _lift, lambda: message)
+    return Service(NAME, [Block(NAME, config.parameters, Cell(0.0), config.inputs, config.ports)], [encoder])
+
+
+def _lift(x: RotorWrenches, time_ns: np.ndarray) -> Fields:
+    fields: dict[str, Any] = {**stamp_columns(time_ns), "thrust": x.thrust}
+    for i, moment in enumerate(x.moment_body):
+        fields[f"moment.{i}"] = moment
+    return fields

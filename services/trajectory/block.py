@@ -1,4 +1,4 @@
-"""The trajectory, compiled: the reference at every tick."""
+"""Compiled trajectory block: the reference at every tick."""
 
 from typing import Any, NamedTuple
 
@@ -9,16 +9,16 @@ from lapwing.services.trajectory import polynomial_piece
 
 
 class TrajectoryPath(NamedTuple):
-    """A compiled trajectory."""
+    """Parameters of the block."""
 
     path: polynomial_piece.Parameters
-    final: int  # the first phase after which none ends in the air
-    interval: float  # [s] a tick
+    final: int  # index of the first phase after which none ends in the air
+    interval: float  # [s] length of a tick
 
 
 @always_inline
 def step(p: TrajectoryPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
-    """The reference at `tick`; it has no state."""
+    """Evaluate the reference at `tick`; the state is unused."""
     r = polynomial_piece.evaluate(p.path, tick * p.interval)
     return s, (
         Reference(

@@ -1,4 +1,4 @@
-"""The trajectory of a vehicle that follows another one, compiled: the leader's reference and a way relative to it."""
+"""Compiled trajectory block of a vehicle relative to a leader's trajectory."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,20 +12,23 @@ from lapwing.services.trajectory.block import TrajectoryPath
 
 
 class FollowedPath(NamedTuple):
-    """Two compiled trajectories."""
+    """The leader's trajectory and the displacement from it."""
 
-    leader: TrajectoryPath  # as the leader flies it
-    relative: TrajectoryPath  # from the leader, along its heading; the origin is how far they stand apart
-    heading: bool  # whether the way turns with the leader; otherwise it keeps its direction in the world
+    leader: TrajectoryPath
+    relative: TrajectoryPath  # displacement from the leader; its origin is the initial distance
+    heading: bool  # displacements are in axes along the leader's heading; otherwise in world axes
 
 
 @always_inline
 def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, Vec3]:
-    """(position, velocity, acceleration) in the world of a way in a frame at an angle, with its two rates, about z."""
+    """Return world position, velocity and acceleration of a reference in a frame rotated about z.
+
+    `heading` has angle, rate and acceleration of the frame [rad], [rad/s], [rad/s^2].
+    """
     angle, rate, acceleration = heading
     s, c = math.sin(angle), math.cos(angle)
     (x, y, z), (vx, vy, vz), (ax, ay, az) = way.position_world, way.velocity_world, way.acceleration_world
-    vx, vy, ax, ay = (  # in the frame, by Coriolis' theorem
+    vx, vy, ax, ay = (  # by Coriolis' theorem
         vx - rate * y,
         vy + rate * x,
         ax - 2.0 * rate * vy - rate * rate * x - acceleration * y,
@@ -40,7 +43,7 @@ def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, 
 
 @always_inline
 def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
-    """The reference at `tick`, with the phases of the vehicle's own way (theory.md, eq. (4.1a)); it has no state."""
+    """Evaluate the reference at `tick`, with the vehicle's own phases (theory.md, eq. (4.1a)); the state is unused."""
     t = tick * p.relative.interval
     leader, way = polynomial_piece.evaluate(p.leader.path, t), polynomial_piece.evaluate(p.relative.path, t)
     heading = polynomial_piece.channel_at(p.leader.path.yaw, t) if p.heading else (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Phases of a flight: in each the segments of the channels that move."""
+"""Phases of a trajectory with the segments of each channel."""
 
 from typing import Annotated
 
@@ -25,30 +25,30 @@ Segments = Annotated[tuple[SerializeAsAny[Segment], ...], BeforeValidator(_segme
 
 
 class Phase(BaseModel):
-    """A named stretch of the flight."""
+    """A named part of the trajectory."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: Annotated[str, Field(min_length=1)]  # told in the status, and in reports
-    duration: Positive | None = None  # [s] as long as its longest channel if left out
+    name: Annotated[str, Field(min_length=1)]  # shown in status and reports
+    duration: Positive | None = None  # [s] default: duration of the longest channel
     x: Segments = ()  # [m]
     y: Segments = ()  # [m]
     z: Segments = ()  # [m]
     yaw: Segments = ()  # [rad]
-    release: bool = False  # whether the payload is let go of in this phase, as soon as the vehicle stands
+    release: bool = False  # release the payload in this phase once the vehicle rests on the ground
 
 
 class Phases(BaseModel):
-    """All phases of a flight, in order."""
+    """All phases of a trajectory in order."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]  # in the order in which they are flown
+    phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]  # in the order of flight
 
     @model_validator(mode="after")
     def _names_once(self) -> "Phases":
         names = [phase.name for phase in self.phase]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ConfigError("phase", f"two phases are named {twice[0]!r}; a name is used once")
+            raise ConfigError("phase", f"two phases are named {twice[0]!r}; use unique names")
         return self

@@ -1,4 +1,4 @@
-"""The one primitive that every segment is made of, and its compiled evaluation (theory.md, eq. (4.1))."""
+"""Polynomial pieces, the primitive of all segments, and their compiled evaluation (theory.md, eq. (4.1))."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ WIDTH = 9  # columns of a coefficient row: six of the quintic, then amplitude, f
 
 
 class Piece(NamedTuple):
-    """A quintic plus a swept sine over `duration` seconds; u is the unit of the channel (m or rad)."""
+    """A quintic plus a swept sine; u is the unit of the channel (m or rad)."""
 
     duration: float  # [s]
     polynomial: tuple[float, ...]  # c_i [u/s^i], at most six, lowest power first
@@ -21,13 +21,13 @@ class Piece(NamedTuple):
     sweep: float = 0.0  # half the rate of change of the frequency [rad/s^2]
 
     def row(self) -> tuple[float, ...]:
-        """The nine coefficients as the compiled evaluation reads them."""
+        """Return the coefficient row for the compiled evaluation."""
         padding = (0.0,) * (WIDTH - 3 - len(self.polynomial))
         return (*self.polynomial, *padding, self.amplitude, self.frequency, self.sweep)
 
 
 class Channel(NamedTuple):
-    """The pieces of one channel joined in time; the last one lasts for ever."""
+    """Consecutive pieces of one channel; the last has no end."""
 
     start: np.ndarray  # (n,) start times, ascending [s]
     coefficients: np.ndarray  # (n, 9)
@@ -41,13 +41,13 @@ class Parameters(NamedTuple):
     z: Channel
     yaw: Channel
     phase_start: np.ndarray  # (phases,) [s]
-    phase_release: np.ndarray  # (phases,) 1 where the payload is let go of
+    phase_release: np.ndarray  # (phases,) 1 if the payload is released
     origin_world: Vec3  # [m]
     origin_yaw: float  # [rad]
 
 
 class Reference(NamedTuple):
-    """What is asked at one instant; derivatives are those to the right of a joint."""
+    """Reference at one instant; derivatives are right-sided at joints."""
 
     position_world: Vec3  # [m]
     velocity_world: Vec3  # [m/s]
@@ -59,7 +59,7 @@ class Reference(NamedTuple):
 
 @always_inline
 def last_not_after(times: np.ndarray, t: float) -> int:
-    """Index of the last entry of ascending `times` that is <= t, or 0."""
+    """Return the index of the last entry of ascending `times` that is <= t, or 0."""
     low, high = 0, len(times)
     while high - low > 1:
         middle = (low + high) // 2
@@ -72,7 +72,7 @@ def last_not_after(times: np.ndarray, t: float) -> int:
 
 @always_inline
 def channel_at(channel: Channel, t: float) -> Vec3:
-    """Value, first and second derivative of a channel at time t [s] (theory.md, eq. (4.1))."""
+    """Return value, first and second derivative of a channel at time t [s] (theory.md, eq. (4.1))."""
     k = last_not_after(channel.start, t)
     c = channel.coefficients[k]
     s = t - channel.start[k]
@@ -91,7 +91,7 @@ def channel_at(channel: Channel, t: float) -> Vec3:
 
 @kernel
 def evaluate(p: Parameters, t: float) -> Reference:
-    """The reference at time t [s] of compiled parameters p; before 0 the one at 0, after the end the end, held."""
+    """Return the reference at time t [s]; constant before 0 and after the end."""
     t = max(t, 0.0)
     x, vx, ax = channel_at(p.x, t)
     y, vy, ay = channel_at(p.y, t)

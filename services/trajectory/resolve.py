@@ -1,4 +1,4 @@
-"""From a scene's `[trajectory]` to what is evaluated at every tick."""
+"""Resolution of a scene's `[trajectory]` into the service's configuration."""
 
 from collections.abc import Mapping
 
@@ -20,35 +20,39 @@ from lapwing.services.trajectory.polynomial_piece import Parameters
 from lapwing.services.trajectory.schema import Trajectory, compiled
 from lapwing.services.trajectory.service import TrajectorySetup
 
-LEAD = 0.2  # [s] the references are ahead of the plant at the most
+LEAD = 0.2  # [s] maximum lead of the references over the plant
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
-    """The trajectory of a scene; None where nobody flies along one."""
+    """Return the configuration of the trajectory service. Return None if the vehicle follows no trajectory."""
     if not follows_trajectory(scene):
         return None
     exchange = scene[Communication]
-    trajectory, found = scene[Trajectory], compiled(scene)
-    path = found.parameters._replace(origin_world=start_place(scene))
-    core = TrajectoryPath(path, found.final, exchange.interval)
+    trajectory, result = scene[Trajectory], compiled(scene)
+    path = result.parameters._replace(origin_world=start_place(scene))
+    core = TrajectoryPath(path, result.final, exchange.interval)
     ahead = max(1, round(LEAD * exchange.rate))
     return ServiceConfig(
-        TrajectorySetup(core, found.phases, *_leader(trajectory)),
+        TrajectorySetup(core, result.phases, *_leader(trajectory)),
         (InputPort(ports.TRUTH, ahead),),
         (Port(ports.TRAJECTORY, Reference()),),
     )
 
 
 def _leader(trajectory: Trajectory) -> tuple[str, bool]:
-    """(its name, whether the axes turn with it)."""
+    """Return the leader's name and True if displacements are in its heading axes."""
     return (trajectory.follow, trajectory.frame != "world") if trajectory.follow else ("", False)
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
-    """The trajectories of a run's vehicles, by their names: those that follow another one are given its path.
+    """Return the trajectories by vehicle name, with followers combined with their leaders' paths.
+
+    Args:
+        shares: configuration by vehicle name.
+        keys: prefix of each vehicle's scene keys.
 
     Raises:
-        KeyedError: no such leader; `keys` has what each vehicle's keys begin with.
+        KeyedError: a leader does not exist or follows another vehicle.
     """
     return {name: _following(name, shares, keys[name]) if share.parameters.follow else share
             for name, share in shares.items()}  # fmt: skip
@@ -58,12 +62,12 @@ def _following(name: str, shares: Mapping[str, ServiceConfig], key: str) -> Serv
     own = shares[name].parameters
     others = [other for other, share in shares.items() if other != name and not share.parameters.follow]
     if own.follow not in others:
-        expected = f"one that flies along a trajectory of its own: {', '.join(others) or 'there is none'}"
+        expected = f"a vehicle with a trajectory and no leader: {', '.join(others) or 'there is none'}"
         raise ConfigError(f"{key}trajectory.follow", f"got {own.follow}", expected)
     leader, core = shares[own.follow].parameters.core, own.core
     if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(leader.path), strict=True)):
-        message = f"the phases are those of {own.follow}, which it would fly twice as far"
-        raise ConfigError(f"{key}trajectory.phase", message, "phases of its own, relative to the leader")
+        message = f"repeats the phases of {own.follow}, which doubles the displacement"
+        raise ConfigError(f"{key}trajectory.phase", message, "phases relative to the leader")
     origin = subtract(core.path.origin_world, leader.path.origin_world)
     relative = core._replace(path=core.path._replace(origin_world=origin))
     return shares[name]._replace(parameters=own._replace(core=FollowedPath(leader, relative, own.heading)))

@@ -1,4 +1,4 @@
-"""The `[trajectory]` of a scene: named phases, in each the segments of the channels that move.
+"""The `[trajectory]` table of a scene: named phases with the segments of each channel.
 
 ```toml
 [[trajectory.phase]]
@@ -10,10 +10,9 @@ name = "hover"
 duration = 5.0
 ```
 
-Values are displacements from the vehicle's pose at the start, in world axes: z = 0 stands on the ground again.
-With `follow` they are displacements from where it stands beside another vehicle at the start, as that one flies on.
-A channel that a phase does not name holds. A channel may have a list of segments, joined in time. A phase lasts
-`duration`, or else as long as its longest channel; channels that end earlier hold.
+Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground. With `follow` they are
+displacements relative to the leader's trajectory. Channels without a segment hold. A channel may have a list of
+consecutive segments. A phase lasts `duration`, by default as long as its longest channel; shorter channels hold.
 """
 
 from typing import Any, ClassVar, Literal
@@ -27,36 +26,36 @@ from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTr
 
 
 class Trajectory(Phases, SceneTable):
-    """What the vehicle is asked to fly."""
+    """The trajectory to fly."""
 
     TABLE: ClassVar[str] = "trajectory"
     OPTIONAL: ClassVar[bool] = True
-    follow: str | None = None  # name of the vehicle of the fleet relative to whose trajectory the phases are
-    frame: Literal["heading", "world"] | None = None  # of the phases' axes: turning with the leader [heading], or not
+    follow: str | None = None  # name of the vehicle relative to whose trajectory the phases are defined
+    frame: Literal["heading", "world"] | None = None  # axes of the phases: the leader's heading [heading], or world
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """The CSV file that a segment of kind "table" names becomes its points."""
+        """Read the CSV file of a segment of kind "table" into its points."""
         phases = named(tree, cls.TABLE, "phase")
         for i, phase in enumerate(phases if isinstance(phases, list) else ()):
             for channel in CHANNELS if isinstance(phase, dict) else ():
-                given = phase.get(channel, ())
-                several = isinstance(given, list)
-                for k, segment in enumerate(given if several else [given]):
+                segments = phase.get(channel, ())
+                several = isinstance(segments, list)
+                for k, segment in enumerate(segments if several else [segments]):
                     if isinstance(segment, dict) and isinstance(file := segment.get("file"), str):
                         key = f"trajectory.phase.{i}.{channel}" + (f".{k}" if several else "")
                         path = files.folder / file
                         segment["points"] = parse(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:
-        """The segments join, phases are long enough; a frame is that of a leader."""
+        """Raise KeyedError unless the segments join, phases are long enough, and a frame has a leader."""
         compiled(scene)
         if self.frame and not self.follow:
-            raise ConfigError("trajectory.frame", "there is no leader whose it could be", "trajectory.follow, or none")
+            raise ConfigError("trajectory.frame", "has no leader", "trajectory.follow, or no frame")
 
 
 def compiled(scene: Scene) -> CompiledTrajectory:
-    """The scene's trajectory about the origin; ConfigError as of `compile`."""
+    """Return the scene's trajectory about the origin. See `compile` for errors."""
     return scene.once(_compiled)
 
 

@@ -1,4 +1,4 @@
-"""The trajectory as a service: the reference of every tick, a bounded time ahead of the plant."""
+"""The trajectory service: references up to a bounded time ahead of the plant."""
 
 from typing import Any, NamedTuple
 
@@ -16,12 +16,12 @@ NAME = "trajectory"
 
 
 class TrajectorySetup(NamedTuple):
-    """What the service is given."""
+    """Resolved configuration of the service."""
 
     core: TrajectoryPath | FollowedPath
-    phases: tuple[str, ...]  # names, by number
-    follow: str = ""  # name of the vehicle relative to whose trajectory it is
-    heading: bool = False  # whether its axes turn with that one
+    phases: tuple[str, ...]  # names by index
+    follow: str = ""  # name of the leader; "": none
+    heading: bool = False  # displacements are in axes along the leader's heading
 
 
 def create(setup: RunConfig) -> Service:

@@ -1,4 +1,4 @@
-"""Tables of points in CSV files with the header `time,value`."""
+"""Reader of CSV files with the header `time,value`."""
 
 import csv
 import math
@@ -10,11 +10,10 @@ HEADER = ["time", "value"]
 
 
 def parse(text: str, path: Path) -> list[list[float]]:
-    """The points [time [s], value] of the text of a file.
+    """Return the points [time [s], value] in the text of a file.
 
     Raises:
-        SceneError: with the line of a wrong header, of a row that is not two finite numbers, or of a time that does
-            not ascend from 0.
+        SceneError: with the line of an invalid header or row, or of a time that does not ascend from 0.
     """
     rows = list(csv.reader(text.splitlines()))
     if not rows or [cell.strip() for cell in rows[0]] != HEADER:

@@ -1,4 +1,4 @@
-"""A trajectory of named phases, compiled to pieces that can be evaluated at any time (theory.md, section 4.1)."""
+"""Compiler of phases into polynomial pieces that can be evaluated at any time (theory.md, section 4.1)."""
 
 from typing import NamedTuple
 
@@ -15,10 +15,10 @@ SLACK = 1e-9  # [s] rounding allowed between a phase's duration and the sum of i
 
 
 class CompiledTrajectory(NamedTuple):
-    """What `compile` gives."""
+    """Result of `compile`."""
 
-    parameters: Parameters  # for piece.evaluate
-    phases: tuple[str, ...]  # names, by the index that evaluate returns
+    parameters: Parameters  # for `polynomial_piece.evaluate`
+    phases: tuple[str, ...]  # names by index
     duration: float  # [s]
     final: int  # index of the first phase after which none ends in the air
 
@@ -27,7 +27,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
     """Compile a trajectory about an origin (position in world [m], yaw [rad]).
 
     Raises:
-        KeyedError: a phase is shorter than its segments, or a segment does not join the one before.
+        KeyedError: a phase is shorter than its segments, or a segment does not join its predecessor.
     """
     joined: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
     value = dict.fromkeys(CHANNELS, 0.0)
@@ -57,7 +57,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
 
 
 def _pieces(phase: Phase, key: str, channel: str, value: dict[str, float]) -> list[Piece]:
-    """The pieces of a channel in a phase; moves `value` on to where they end."""
+    """Return the pieces of a channel in a phase and update `value` to their end."""
     pieces = []
     for segment in getattr(phase, channel):
         try:
@@ -73,11 +73,11 @@ def _phase_duration(phase: Phase, key: str, longest: float) -> float:
         return longest
     if longest > phase.duration + SLACK:
         message = f"got {phase.duration:g} s in phase {phase.name!r}"
-        raise ConfigError(f"{key}.duration", message, f"not less than its segments last, {longest:g} s")
+        raise ConfigError(f"{key}.duration", message, f"at least the duration of its segments, {longest:g} s")
     return phase.duration
 
 
 def _channel(joined: list[tuple[float, Piece]]) -> Channel:
-    # Of pieces that start together only the last one counts: holds of no length and the values jumped over.
-    kept = dict(joined)
-    return Channel(np.array(list(kept)), np.array([piece.row() for piece in kept.values()]))
+    # The last of several pieces with the same start wins: the others have no length.
+    pieces = dict(joined)
+    return Channel(np.array(list(pieces)), np.array([piece.row() for piece in pieces.values()]))

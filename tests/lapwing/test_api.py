@@ -98,7 +98,7 @@ class Faulty(NamedTuple):
         (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), 100.0), "expected a rate that divides exchange.rate = 250 Hz"),
         (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), "fast"), "has rate = 'fast'; expected a number of steps a second"),
         (7, "memory:int has no step; expected the method `step`"),
-        ("memory:Gone", "Gone was an object in the memory of the Python session that flew it"),
+        ("memory:Gone", "Gone was an object in the memory of the Python session"),
         ("nowhere", "expected a text of the form \"module:Name\", got 'nowhere'"),
     ],
 )
@@ -112,7 +112,7 @@ def test_a_controller_that_cannot_be_flown_is_a_scene_error_of_one_line(controll
 
 
 def test_options_belong_to_a_class_and_a_controller_to_a_scene_with_an_autopilot():
-    with pytest.raises(lapwing.SceneError, match="controller_options: a Faulty is there already; expected a class"):
+    with pytest.raises(lapwing.SceneError, match="controller_options: a Faulty object takes no options"):
         lapwing.fly("hover", controller=Faulty(None), controller_options={"gain": 1.0})
     with pytest.raises(lapwing.SceneError, match="the model gyrostat knows no such table"):
         lapwing.fly("gyrostat_chaotic", controller=Faulty(None))

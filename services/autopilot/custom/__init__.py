@@ -1,3 +1,1 @@
-"""The user's own code in the autopilot: a controller in the place of the cascaded PID, an estimator in that of the
-filter. `lapwing.services.common.controller_api` and `lapwing.services.common.estimator_api` say what they are
-given and return."""
+"""User-defined controllers and estimators; see `controller_api` and `estimator_api` in `lapwing.services.common`."""

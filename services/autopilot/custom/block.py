@@ -1,5 +1,4 @@
-"""The autopilot's step with a controller of the user's: the stages of the flight, then that controller, then control
-allocation, motor model, motor failure detection and status as of the cascaded PID."""
+"""Controller block with a user-defined controller between land detector and control allocation."""
 
 import sys
 from collections.abc import Callable
@@ -21,36 +20,36 @@ from lapwing.services.common.ports import Reference, StateEstimate
 
 
 class PythonControllerProxy(NamedTuple):
-    """Stands for the parameters of a controller in Python, whose demand comes by a port."""
+    """Parameters of a Python controller, whose output arrives at a port."""
 
     rate: float
 
 
 class CustomController(NamedTuple):
-    """A controller of the user's on its vehicle."""
+    """Parameters of the block."""
 
     common: Controller
     own: Any  # parameters of a compiled controller, or `PythonControllerProxy`
     own_start: Any  # its state at take-off
-    every: int  # ticks between two of its steps
-    lift: float  # force along body z [N] of a collective demand of 1 N
-    moments: Vec3  # torques about body x, y, z [N m] of demands of 1 N
+    every: int  # [ticks] between its steps
+    lift: float  # force along body z [N] of a collective of 1 N
+    moments: Vec3  # torques about body x, y, z [N m] of virtual controls of 1 N
     voltage_max: float  # [V]
 
 
 class CustomState(NamedTuple):
-    """Memory of the part."""
+    """State of the block."""
 
     stage: LandedState
     own: Any
-    held: ControllerOutput  # of the user's last step
+    held: ControllerOutput  # last output of the user's controller
     watch: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # of the battery, fraction; NaN: not known
+    charge: float  # of the battery, fraction; NaN: unknown
 
 
 def start(p: CustomController) -> CustomState:
-    """Before the first tick."""
+    """Return the initial state."""
     watch = p.common.watch
     held = off(len(watch.roll_arm))
     return CustomState(INITIAL_STAGE, p.own_start, held, python_function(motor_failure.start)(watch), 0, float("nan"))
@@ -65,13 +64,13 @@ def _ask(
     by_port: tuple[InputSample, ...],
     none: PerRotor,
 ) -> tuple[Any, ControllerOutput]:
-    """`step` of the user's module; or what has come by the port."""
+    """Call `step` of the user's module, or read the port."""
     raise NotImplementedError("compiled code only")
 
 
 @always_inline
 def _demanded(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
-    """State and output of the user's step, the output as a demand."""
+    """Return state and parsed output of the user's step."""
     return given[0], demand(given[1], none)
 
 
@@ -95,7 +94,7 @@ def _ask_of(
 def step(
     p: CustomController, s: CustomState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CustomState, tuple, int]:
-    """The command at `tick`."""
+    """Compute the motor command at `tick`."""
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     wanted = inputs[3].value if order.follow else order.reference

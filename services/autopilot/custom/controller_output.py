@@ -1,4 +1,4 @@
-"""What a controller of the user's asks for, and its way to the motors."""
+"""Output of user-defined controllers and its conversion into motor commands."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -23,28 +23,28 @@ NO_WRENCH = (0.0, 0.0, 0.0, 0.0)
 
 
 class ControllerOutput(NamedTuple):
-    """Either voltages, or thrust and moments, as numbers."""
+    """Numbers of `MotorVoltages` or `ThrustAndMoments`."""
 
     to_motors: bool
-    volts: PerRotor  # [V] of each motor; or
+    volts: PerRotor  # [V] of each motor
     wrench: Wrench  # thrust [N] and moments about body x, y, z [N m]
-    roll_pitch: tuple[float, float]  # [rad] that the controller steers to
+    roll_pitch: tuple[float, float]  # [rad] references, for the log
 
 
 def off(rotors: int) -> ControllerOutput:
-    """What stops the motors."""
+    """Return the output that stops the motors."""
     return ControllerOutput(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
 
 
 def demand(output: Any, none: PerRotor) -> ControllerOutput:
-    """The demand of a `MotorVoltages` or `ThrustAndMoments`.
+    """Return the numbers of a `MotorVoltages` or `ThrustAndMoments`.
 
     Args:
-        output: one of both.
-        none: 0 V for each motor of the vehicle.
+        output: return value of a controller's step.
+        none: 0 V for each motor.
 
     Raises:
-        TypeError: anything else, or other than numbers in it.
+        TypeError: the output has another type or contains no numbers.
         ValueError: a number is not finite.
     """
     if isinstance(output, MotorVoltages):
@@ -98,17 +98,17 @@ def command(
     stage: int,
     failed: int,
 ) -> Command:
-    """The motors' command.
+    """Return the motor command.
 
     Args:
-        law: control.Parameters, of which the control allocation and the motor model are used.
-        lift: force along body z [N] of a collective demand of 1 N.
-        moments: torques about body x, y, z [N m] of demands of 1 N.
+        law: controller parameters with control allocation and motor model.
+        lift: force along body z [N] of a collective of 1 N.
+        moments: torques about body x, y, z [N m] of virtual controls of 1 N.
         voltage_max: [V].
-        asked: Demand.
-        yaw: of the setpoint [rad].
+        asked: output of the user's controller.
+        yaw: setpoint [rad].
         stage: ON_GROUND, FLYING or LANDED.
-        failed: number of the rotor that is known to have failed, from 1; 0: none.
+        failed: number of the failed rotor, from 1; 0: none.
     """
     if stage != FLYING:
         none = at_rest(law.shares[0])

@@ -1,4 +1,4 @@
-"""The parts of the graph that a controller or an estimator of the user's takes."""
+"""Blocks of user-defined controllers and estimators."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,15 +27,15 @@ def controller_parts(
     inputs: tuple[InputPort, ...],
     outputs: tuple[Port, ...],
 ) -> list[Any]:
-    """The controller itself where it stays in Python, and the part from its demand to the motors.
+    """Return the Python block of the controller, if it is not compiled, and the block that outputs the motor command.
 
     Args:
-        name: of the latter.
-        texts: of the modules that the set-up carries.
-        given: the autopilot's set-up.
-        common: what the cascaded PID has too.
-        inputs: estimate, order, battery and reference.
-        outputs: of the latter.
+        name: name of the latter.
+        texts: module texts of the run configuration.
+        given: configuration of the autopilot.
+        common: parameters in common with the cascaded PID.
+        inputs: estimate, commander output, battery and reference.
+        outputs: outputs of the latter.
     """
     code, vehicle = given.controller, given.vehicle
     assert code is not None
@@ -61,14 +61,14 @@ def estimator_parts(
     inputs: tuple[InputPort, ...],
     estimate: Port,
 ) -> list[Any]:
-    """The estimator, and the part that gives its estimate at every tick.
+    """Return the Python block of the estimator and the block that outputs its estimate at every tick.
 
     Args:
-        name: of the latter.
-        texts: of the modules that the set-up carries.
-        given: the autopilot's set-up.
-        attention: what calls the commander.
-        sensors: ticks between two readings, by the sensor's port.
+        name: name of the latter.
+        texts: module texts of the run configuration.
+        given: configuration of the autopilot.
+        attention: wake-up parameters of the commander.
+        sensors: ticks between two readings, by port.
         inputs: battery and flight.
         estimate: port of the estimate.
     """

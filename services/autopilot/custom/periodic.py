@@ -1,4 +1,4 @@
-"""A part of the user's in Python that is asked at a rate of its own."""
+"""Python block with user code that runs periodically."""
 
 from abc import ABC, abstractmethod
 
@@ -7,16 +7,16 @@ from lapwing.services.autopilot.service_config import CustomCode
 
 
 class PeriodicPart(ABC):
-    """Asked at every tick of its period."""
+    """Block that calls user code at multiples of its period."""
 
     _code: CustomCode
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Read and write the rows of `graph`."""
+        """Store the diagram."""
         self._graph = graph
 
     def act(self, tick: int) -> int:
-        """Ask the user's code at `tick`, if it is one of its own."""
+        """Call the user code if it is due at `tick`. Return the tick of the next wake-up."""
         every = self._code.every
         if tick % every == 0:
             self._ask(tick)
@@ -24,4 +24,4 @@ class PeriodicPart(ABC):
 
     @abstractmethod
     def _ask(self, tick: int) -> None:
-        """Hand the user's code what it is given at `tick`, and put down what it returns."""
+        """Call the user code with the inputs at `tick` and write its output."""

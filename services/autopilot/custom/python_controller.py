@@ -1,4 +1,4 @@
-"""A controller of the user's in Python, as a part of the graph: asked at its rate while the motors run."""
+"""Python block of a user-defined controller, called at its rate while the motors run."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -21,7 +21,7 @@ _setpoint_of = python_function(setpoint_of)
 
 
 class PythonControllerBlock(PeriodicPart):
-    """Shows the controller estimate and setpoint, and puts what it asks for into the port `demand`."""
+    """Calls the controller and writes its output to the port `demand`."""
 
     name = "autopilot.controller"
 
@@ -33,14 +33,14 @@ class PythonControllerBlock(PeriodicPart):
         reference: str,
         vehicle: VehicleModel,
     ):
-        """A controller that is constructed anew at every take-off.
+        """Create the block; the controller is constructed at every take-off.
 
         Args:
-            code: what it is called, and its rate.
-            module: in which its class is.
-            construct: gives a new one.
+            code: name and period.
+            module: module of the class.
+            construct: constructor without arguments.
             reference: port of the trajectory, or `NO_TRAJECTORY`.
-            vehicle: what it is told.
+            vehicle: vehicle parameters.
         """
         self.outputs = (Port(DEMAND, off(len(vehicle.rotor_positions_body)), LATCHED),)
         self._none = self.outputs[0].like.volts

@@ -1,4 +1,4 @@
-"""An estimator of the user's, as parts of the graph: in Python at its rate, then its estimate at every tick."""
+"""Blocks of a user-defined estimator: Python code at its rate, then its latest estimate at every tick."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -19,7 +19,7 @@ HELD = "held_estimate"  # port within the autopilot
 
 
 class PythonEstimatorBlock(PeriodicPart):
-    """Shows the estimator the readings that have come, and puts what it says into the port `held_estimate`."""
+    """Calls the estimator with new readings and writes its estimate to the port `held_estimate`."""
 
     name = "autopilot.estimator"
     outputs = (Port(HELD, StateEstimate(), LATCHED),)
@@ -27,7 +27,7 @@ class PythonEstimatorBlock(PeriodicPart):
     def __init__(
         self, code: CustomCode, module: ModuleType, construct: Callable[[], Any], sensors: dict[str, int]
     ) -> None:
-        """An estimator on these sensors, each with the ticks between its readings."""
+        """Create the block; `sensors` has the ticks between two readings by port."""
         self._code, self._module, self._construct, self._sensors = code, module, construct, sensors
         self.inputs = tuple(InputPort(name) for name in sensors)
         self._estimator: Any = None
@@ -46,14 +46,14 @@ class PythonEstimatorBlock(PeriodicPart):
 
 
 class HeldEstimate(NamedTuple):
-    """What calls the commander."""
+    """Parameters of the block."""
 
     attention: WakeupParameters
 
 
 @always_inline
 def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
-    """The estimate that holds at `tick`; it has no state of its own."""
+    """Output the latest estimate; the state is unused."""
     held, battery, flight = inputs
     due = attention_due(p.attention, tick, held.value.health, battery, flight)
     return s, (held.value,), WAKE_PYTHON if due else CONTINUE

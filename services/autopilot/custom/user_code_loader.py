@@ -1,4 +1,4 @@
-"""The user's controller or estimator, from its name to something that can be asked, with all that can be wrong."""
+"""Loading and checking of user-defined controllers and estimators."""
 
 import copy
 import inspect
@@ -26,7 +26,7 @@ OUTPUTS = (MotorVoltages, ThrustAndMoments)
 
 
 def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
-    """What a controller is told of the vehicle whose airframe the autopilot knows."""
+    """Return the vehicle parameters for user code."""
     return VehicleModel(
         a.mass,
         a.inertia_body,
@@ -44,16 +44,16 @@ def vehicle_model(a: Airframe, interval: float) -> VehicleModel:
 
 
 def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
-    """The rate [Hz] of a controller, which is asked once on the ground to see whether it answers.
+    """Return the rate [Hz] of a controller after a trial step on the ground.
 
     Args:
         name: "module:Name".
-        texts: of the modules that the set-up carries.
-        vehicle: what it is told.
-        options: of its constructor.
+        texts: module texts of the run configuration.
+        vehicle: vehicle parameters.
+        options: options of the constructor.
 
     Raises:
-        KeyedError: it cannot be constructed, has no rate, or its step fails or returns something else.
+        KeyedError: the controller cannot be constructed, has no rate, or its step fails or returns another type.
     """
     module, found = named(CONTROLLER, name, texts)
     start = (0.0, 0.0, vehicle.resting_height)
@@ -67,17 +67,17 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
     def trial() -> None:
         output = module.step(p, s, *given)
         if not (type(output) is tuple and len(output) == 2 and isinstance(output[1], OUTPUTS)):
-            raise TypeError("step is to return (state, MotorVoltages or ThrustAndMoments)")
+            raise TypeError("step must return (state, MotorVoltages or ThrustAndMoments)")
         if numba.typeof(output[0]) != numba.typeof(s):
             raise TypeError("step returns a state of another type than build; write every number as a float")
-        Cell((p, s))  # which they are flown in
+        Cell((p, s))  # raises if a cell cannot store them
 
     _try(CONTROLLER, name, module, module, trial)
     return _rate(CONTROLLER, name, p)
 
 
 def estimator_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
-    """The same of an estimator, which is asked once without a reading."""
+    """Return the rate [Hz] of an estimator after a trial step without readings. See `controller_rate`."""
     module, found = named(ESTIMATOR, name, texts)
     p = constructor(ESTIMATOR, module, found, vehicle, options)()
     _try(ESTIMATOR, name, module, p, lambda: checked_estimate(p.step(0.0, {})))
@@ -108,16 +108,20 @@ def _told(error: BaseException, module: ModuleType) -> str:
 
 
 def is_compiled(found: Any) -> bool:
-    """Whether a name of the user's module stands for a compiled controller: a function, not a class."""
+    """Return True for a compiled controller, which is a function, not a class."""
     return inspect.isfunction(found)
 
 
 def constructor(
     key: str, module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]
 ) -> Callable[[], Any]:
-    """Makes a new one of what `key` names: of a class, or as a copy of an object; KeyedError where that is refused."""
+    """Return a function that constructs the user's class, or copies the user's object, that `key` names.
+
+    Raises:
+        KeyedError: an object has options, or the constructor fails.
+    """
     if options and not inspect.isclass(found):
-        raise ConfigError(f"{key}_options", f"a {type(found).__name__} is there already", "a class that takes them")
+        raise ConfigError(f"{key}_options", f"a {type(found).__name__} object takes no options", "a class")
 
     cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
 
@@ -131,18 +135,18 @@ def constructor(
 
 
 def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Parameters and first state of a compiled controller; KeyedError where they cannot be made."""
+    """Return parameters and initial state of a compiled controller. Raise KeyedError if they are invalid."""
     try:
         p, s = found(vehicle, **options)
     except FAULTS as error:
         raise _refused(CONTROLLER, error, module) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
-        expected = "a NamedTuple of its own module, which has `step` too"
-        raise ConfigError(CONTROLLER, f"{found.__name__} gives a {type(p).__name__} for the parameters", expected)
+        expected = "a NamedTuple of the same module, which also defines `step`"
+        raise ConfigError(CONTROLLER, f"{found.__name__} returned {type(p).__name__} parameters", expected)
     return p, s
 
 
 def _refused(key: str, error: BaseException, module: ModuleType) -> ConfigError:
-    """Options that do not fit, or whatever else a constructor complains of."""
+    """Return the error of a constructor, under the options' key if an argument is wrong."""
     options = isinstance(error, TypeError) and "argument" in str(error)
     return ConfigError(f"{key}_options" if options else key, blame(error, module))

@@ -1,7 +1,4 @@
-"""Estimator: where the vehicle is and how it moves, from its sensors (theory.md, section 3.3).
-
-An error-state Kalman filter. Pure: every function takes the parameters and a state and returns the next state.
-"""
+"""State estimator: an error-state Kalman filter of pure functions (theory.md, section 3.3)."""
 
 from lapwing.services.autopilot.estimator.filter_parameters import PRESETS, Estimator
 from lapwing.services.autopilot.estimator.filter_state import NAMES, SOURCES, State, estimate, initial, new_memory

@@ -1,7 +1,6 @@
-"""What to stop believing when a source is refused again and again (theory.md, section 3.4).
+"""Covariance inflation after repeated rejections of a source (theory.md, section 3.4).
 
-A reading is refused because it contradicts the estimate; when that lasts, the estimate may be what is wrong. Doubt
-widens the covariance of what the source speaks about, until its readings are taken again.
+When readings are rejected for long, the estimate may be wrong. Its covariance grows until they are accepted again.
 """
 
 import numpy as np
@@ -24,9 +23,9 @@ from lapwing.services.autopilot.estimator.filter_state import (
     Memory,
 )
 
-_MOTION = 0.3  # [s] position and velocity refused together for so long: the inertial unit is doubted
-_LONE = 3.0  # [s] the same for the position of a receiver that gives no velocity
-_LONG = 10.0  # [s] any other source
+_MOTION = 0.3  # [s] of rejected position and velocity, after which the IMU states are inflated
+_LONE = 3.0  # [s] of rejected position of a receiver without velocity
+_LONG = 10.0  # [s] of rejection of any other source
 
 
 @always_inline
@@ -37,7 +36,7 @@ def _widen(c: np.ndarray, start: int, deviation: float) -> None:
 
 @kernel
 def doubt(p: Estimator, m: Memory, source: int) -> None:
-    """Widen the covariance after a reading of `source` was refused by the gate."""
+    """Inflate the covariance after the gate rejected a reading of `source`."""
     c = m.covariance
     for_long = m.since[source] * p.interval > _LONG
     if source == GPS_VELOCITY:

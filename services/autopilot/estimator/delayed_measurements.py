@@ -1,4 +1,4 @@
-"""Rows and innovations of a measurement of the past (theory.md, eqs. (3.30) and (3.35))."""
+"""Rows and innovation variances of delayed measurements (theory.md, eqs. (3.30) and (3.35))."""
 
 from typing import NamedTuple
 
@@ -9,20 +9,20 @@ from lapwing.services.autopilot.estimator.fuse import FLOOR, acceleration_row, c
 
 
 class Noise(NamedTuple):
-    """Process noise of a stretch of time, the same in each axis and independent between them."""
+    """Process noise of a time span, equal and independent in all axes."""
 
     velocity: float  # [(m/s)^2]
     velocity_position: float  # [m^2/s]
     position: float  # [m^2]
-    attitude_velocity: float  # [rad^2 s^2] of the attitude, by what it has left to do to the row of a late velocity
-    attitude_position: float  # [rad^2 s^4] the same of a late position
+    attitude_velocity: float  # [rad^2 s^2] attitude noise weighted for the row of a delayed velocity
+    attitude_position: float  # [rad^2 s^4] attitude noise weighted for the row of a delayed position
 
 
 @always_inline
 def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
-    """Row of the position `delay` seconds ago, with the receiver's wander (theory.md, eq. (3.30)).
+    """Fill the row of the position `delay` seconds ago, with the receiver's correlated error (theory.md, eq. (3.30)).
 
-    `force_world` is the specific force of the delay, weighted by how long it has moved the position.
+    `force_world` is the specific force during the delay, weighted by its effect on the position.
     """
     clear(m)
     m.row[POSITION + axis] = 1.0
@@ -33,7 +33,7 @@ def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
 
 @always_inline
 def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
-    """Row of the velocity `delay` seconds ago; `force_world` is the mean specific force since."""
+    """Fill the row of the velocity `delay` seconds ago; `force_world` is the mean specific force since."""
     clear(m)
     m.row[VELOCITY + axis] = 1.0
     acceleration_row(m, force_world, r, axis, -delay)
@@ -43,17 +43,17 @@ def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
 def late_innovation_variances(
     m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
 ) -> tuple[float, float]:
-    """Variances of the innovation of a late row: of the gain, and of the gate (theory.md, eqs. (3.35) and (3.36)).
+    """Return the innovation variances for gain and gate of a delayed row (theory.md, eqs. (3.35) and (3.36)).
 
-    Leaves the covariance of the innovation with the error now in `m.product`. What came in since, an impact above all,
-    was not measured and stays unknown; the gate allows for other sources having told of it already.
+    Writes the covariance of innovation and present error to `m.product`. The noise since the measurement, such as an
+    impact, was not measured; the gate allows for its correction by other sources.
 
     Args:
-        m: `Memory`; its row is filled.
-        axis: of the row.
-        since: noise that the covariance has got since the moment that was measured.
-        variance: of the measurement.
-        force_world: of the row [m/s^2].
+        m: `Memory` with a filled row.
+        axis: axis of the row.
+        since: process noise since the measurement.
+        variance: variance of the measurement.
+        force_world: specific force of the row [m/s^2].
     """
     v, p = m.row[VELOCITY + axis], m.row[POSITION + axis]
     noise = v * v * since.velocity + 2.0 * v * p * since.velocity_position + p * p * since.position

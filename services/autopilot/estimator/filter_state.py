@@ -1,7 +1,6 @@
-"""State of the estimator, its beginning, and what it tells (theory.md, section 3.3).
+"""Filter state, initialisation and output (theory.md, section 3.3).
 
-The error state has 24 components. Its attitude part is a rotation vector in the world frame:
-R = exp(theta) R_estimated.
+The error state has 24 components. Its attitude part is a world rotation vector: R = exp(theta) R_estimated.
 """
 
 import math
@@ -21,11 +20,11 @@ HEADING, BAROMETER, SCALE = 21, 22, 23
 
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
 IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
-FLOW = len(SOURCES)  # kept books on as well, but it only stands in for GPS: its lack is no fault
-NAMES = (*SOURCES, "optical_flow")  # of all that books are kept on
+FLOW = len(SOURCES)  # also monitored; it only replaces GPS, so its absence is no fault
+NAMES = (*SOURCES, "optical_flow")  # all monitored sources
 WATCHED = len(NAMES)
 
-HISTORY = 128  # IMU readings that are remembered for late measurements
+HISTORY = 128  # IMU readings stored for delayed measurements
 NEVER = -1
 
 
@@ -45,28 +44,28 @@ class Nominal(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """The last IMU reading and what it was integrated to."""
+    """The last IMU reading and its integrals."""
 
-    tick: int  # readings so far
+    tick: int  # number of readings
     omega: Vec3  # [rad/s] as read
     force: Vec3  # [m/s^2] as read
-    force_world: Vec3  # [m/s^2] specific force, bias taken off
+    force_world: Vec3  # [m/s^2] specific force, bias removed
     velocity_gain: Vec3  # [m/s] acceleration integrated since the start, never corrected
     distance_gain: Vec3  # [m] velocity_gain integrated
-    held: bool  # the last reading was refused and the one before it used again
+    held: bool  # the last reading was rejected and its predecessor reused
 
 
 class Memory(NamedTuple):
-    """Arrays that one state owns; steps change them in place, so a state must not be used again after its successor."""
+    """Arrays that steps change in place; a state must not be used after its successor is computed."""
 
     covariance: np.ndarray  # (24, 24)
-    correction: np.ndarray  # (24,) not yet added to the estimate
+    correction: np.ndarray  # (24,) pending correction of the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, what the tick added to velocity and attitude
+    history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
-    refused: np.ndarray  # (WATCHED,) 1 where the last reading of a source was refused
-    repeats: np.ndarray  # (WATCHED,) equal readings in a row
+    refused: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
+    repeats: np.ndarray  # (WATCHED,) number of consecutive equal readings
     last: np.ndarray  # (WATCHED, 6) last reading of each source
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
 
@@ -81,7 +80,7 @@ class State(NamedTuple):
 
 @always_inline
 def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
-    """Attitude at rest from gravity and the magnetic field (theory.md, eq. (3.20))."""
+    """Return the attitude at rest from gravity and magnetic field (theory.md, eq. (3.20))."""
     up = scale(1.0 / norm(specific_force_body), specific_force_body)
     across = subtract(field_body, scale(dot(field_body, up), up))
     forth = scale(1.0 / norm(across), across)
@@ -94,7 +93,7 @@ def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaterni
 
 
 def new_memory() -> Memory:
-    """Memory for a state."""
+    """Return the arrays of a state."""
     return Memory(
         np.zeros((SIZE, SIZE)),
         np.zeros(SIZE),
@@ -111,14 +110,14 @@ def new_memory() -> Memory:
 
 @kernel
 def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
-    """State of a vehicle that stands still.
+    """Return the state of a vehicle at rest.
 
     Args:
         p: `Estimator`.
-        m: memory of the state, as `new_memory` makes it or of a state that is no longer used; it is written over.
-        position_world: [m] where it is thought to stand, good to `p.start_std`.
-        specific_force_body: [m/s^2] a reading of the accelerometers, or a mean of several.
-        field_body: [T] the same of the magnetometer.
+        m: arrays of the state, overwritten.
+        position_world: [m] start position with standard deviation `p.start_std`.
+        specific_force_body: [m/s^2] accelerometer reading or mean.
+        field_body: [T] magnetometer reading or mean.
     """
     covariance = m.covariance
     covariance[:] = 0.0
@@ -147,13 +146,13 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
 
 @always_inline
 def three(array: np.ndarray, start: int) -> Vec3:
-    """Three neighbouring elements of an array as a vector."""
+    """Return three neighbouring elements of an array."""
     return (array[start], array[start + 1], array[start + 2])
 
 
 @kernel
 def corrected(s: State) -> State:
-    """The state with the gathered correction added to the estimate (theory.md, eq. (3.25))."""
+    """Return the state with the pending correction applied (theory.md, eq. (3.25))."""
     n, d = s.nominal, s.memory.correction
     nominal = Nominal(
         normalise(multiply(exp(three(d, THETA)), n.attitude)),
@@ -182,7 +181,7 @@ def _deviations(covariance: np.ndarray, start: int) -> Vec3:
 
 @always_inline
 def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
-    """Standard deviation of the attitude error about an axis."""
+    """Return the standard deviation of the attitude error about an axis."""
     total = 0.0
     for i in range(3):
         for j in range(3):
@@ -212,7 +211,7 @@ def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> 
 
 @kernel
 def estimate(p: Estimator, s: State) -> StateEstimate:
-    """`StateEstimate` now."""
+    """Return the present estimate."""
     n, i, c = s.nominal, s.inertial, s.memory.covariance
     r = rotation_matrix(n.attitude)
     position_std = _deviations(c, POSITION)

@@ -1,4 +1,4 @@
-"""Velocity over the ground by optical flow, while the satellite receiver gives none (theory.md, eq. (3.45))."""
+"""Fusion of optical flow as a replacement of GPS velocity (theory.md, eq. (3.45))."""
 
 import math
 
@@ -19,14 +19,14 @@ from lapwing.services.autopilot.estimator.filter_state import (
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
 
-_ALIKE = 100.0  # readings, 2 s of them, after which an error of scale counts as a new one
+_ALIKE = 100.0  # readings, 2 s, over which the scale error is correlated
 
 
 @always_inline
 def flow_row(m: Memory, r: Mat3, velocity_world: Vec3, axis: int, distance: float) -> float:
-    """Fill the row of the flow about the body's x (axis 0) or y (1); returns the flow that is expected [rad/s]."""
+    """Fill the row of the flow about body x (axis 0) or y (1). Return the expected flow [rad/s]."""
     k = 1.0 / distance if axis == 0 else -1.0 / distance
-    across = (r[1], r[4], r[7]) if axis == 0 else (r[0], r[3], r[6])  # body y, body x: along these the ground passes
+    across = (r[1], r[4], r[7]) if axis == 0 else (r[0], r[3], r[6])  # body y, body x: direction of the ground's motion
     turned = cross(across, velocity_world)
     clear(m)
     for j in range(3):
@@ -45,16 +45,16 @@ def update_flow(
     variance: float,
     valid: bool,
 ) -> State:
-    """State after a reading of the optical flow; as it was while velocities of the satellite receiver are taken.
+    """Return the state after an optical flow reading, unchanged while GPS velocities are accepted.
 
     Args:
         p: `Estimator`.
         s: `State`; its arrays are changed in place.
-        flow: [rad/s] about the body's x and y.
-        rate: [rad/s] of the camera itself about them.
-        distance: [m] to the ground along the body's -z.
+        flow: [rad/s] about body x and y.
+        rate: [rad/s] of the camera about body x and y.
+        distance: [m] to the ground along body -z.
         variance: [(rad/s)^2] per axis.
-        valid: whether there is a reading.
+        valid: False without a reading.
     """
     m = s.memory
     seen, turned = (flow[0], flow[1], distance), (rate[0], rate[1], 0.0)
@@ -68,7 +68,7 @@ def update_flow(
     r, velocity = rotation_matrix(s.nominal.attitude), s.nominal.velocity_world
     passing = (flow[0] - rate[0], flow[1] - rate[1])
     expected = math.hypot(flow_row(m, r, velocity, 0, distance), flow_row(m, r, velocity, 1, distance))
-    noise = variance + _ALIKE * (p.flow_scale_std * expected) ** 2  # of what is read, the gate would let all through
+    noise = variance + _ALIKE * (p.flow_scale_std * expected) ** 2  # of the expected flow, to keep the gate effective
     nis, accepted = 0.0, True
     for axis in range(2):
         innovation = passing[axis] - flow_row(m, r, velocity, axis, distance)

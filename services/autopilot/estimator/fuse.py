@@ -1,7 +1,7 @@
-"""Kalman update by one scalar measurement at a time (theory.md, eqs. (3.26) to (3.28)).
+"""Sequential Kalman update by scalar measurements (theory.md, eqs. (3.26) to (3.28)).
 
-The caller fills `memory.row` with one row of the measurement matrix. Corrections gather in `memory.correction`, so that
-the rows of one reading are all taken about the same estimate.
+The caller fills `memory.row` with a row of the measurement matrix. Corrections accumulate in `memory.correction`, so
+that all rows of a reading are linearised about the same estimate.
 """
 
 from lapwing.dynamics.vector import Mat3, Vec3
@@ -9,23 +9,23 @@ from lapwing.kernels import always_inline, kernel, noinline
 from lapwing.kernels.simd import load, splat, store
 from lapwing.services.autopilot.estimator.filter_state import ACCELEROMETER, SIZE, THETA, Memory
 
-FLOOR = 1e-12  # variance that no measurement is taken to be below, so that S stays positive with ideal instruments
+FLOOR = 1e-12  # minimum measurement variance, which keeps S positive with ideal instruments
 
 
 @always_inline
 def clear(m: Memory) -> None:
-    """Empty the row."""
+    """Clear the row."""
     m.row[:] = 0.0
 
 
 @noinline
 def innovation_variance(m: Memory, variance: float) -> float:
-    """Variance of the innovation of the row's measurement; leaves covariance times row in `m.product`."""
+    """Return the innovation variance of the row; store covariance times row in `m.product`."""
     for i in range(0, SIZE, 4):
         store(m.product, i, splat(0.0))
     for j in range(SIZE):
         h = m.row[j]
-        if h != 0.0:  # of most rows only a few are not
+        if h != 0.0:  # rows are sparse
             for i in range(0, SIZE, 4):
                 store(m.product, i, load(m.product, i) + h * load(m.covariance, SIZE * j + i))
     total = variance + FLOOR
@@ -37,13 +37,13 @@ def innovation_variance(m: Memory, variance: float) -> float:
 
 @kernel
 def fuse(m: Memory, innovation: float, variance: float) -> float:
-    """Take in the row's measurement; returns its normalised innovation squared."""
+    """Fuse the measurement of the row. Return its normalised innovation squared."""
     return absorb(m, innovation, innovation_variance(m, variance))
 
 
 @noinline
 def absorb(m: Memory, innovation: float, s: float) -> float:
-    """`fuse` with the innovation's variance s, and its covariance with the error in `m.product`."""
+    """Fuse an innovation with variance s and its covariance with the error in `m.product`. See `fuse`."""
     y = innovation
     for i in range(SIZE):
         if m.row[i] != 0.0:

@@ -1,4 +1,4 @@
-"""Late position and velocity of a satellite receiver (theory.md, eqs. (3.29) and (3.30))."""
+"""Fusion of delayed position and velocity of a satellite receiver (theory.md, eqs. (3.29) and (3.30))."""
 
 from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
@@ -19,9 +19,9 @@ from lapwing.services.autopilot.estimator.measurement_checks import judge, repea
 
 @always_inline
 def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float, Vec3, Vec3]:
-    """Position and velocity `age` ticks ago, from the estimate now and the IMU readings since.
+    """Return position and velocity `age` ticks ago, the delay [s], and the specific force since [m/s^2].
 
-    With the delay [s], and the specific force since, weighted for the row of a position and of a velocity [m/s^2].
+    The specific force is weighted for the row of a position and of a velocity.
     """
     i, m = s.inertial, s.memory
     age = min(age, i.tick, HISTORY - 1)
@@ -43,7 +43,7 @@ def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float, Vec3, Ve
 
 @always_inline
 def _noise_since(p: Estimator, s: State, age: int) -> Noise:
-    """What the last `age` ticks added to the covariance of velocity, position and attitude."""
+    """Return the process noise of the last `age` ticks."""
     tick, history = s.inertial.tick, s.memory.history
     age = min(age, tick, HISTORY - 1)
     v = vp = pp = av = ap = 0.0
@@ -74,7 +74,7 @@ def update_gps(
     age: int,
     valid: bool,
 ) -> State:
-    """State after a position fix.
+    """Return the state after a position fix.
 
     Args:
         p: `Estimator`.
@@ -82,9 +82,9 @@ def update_gps(
         latitude_deg: [deg].
         longitude_deg: [deg].
         height: [m] over the ellipsoid.
-        variance: [m^2] east, north, up, as the receiver states it.
-        age: [ticks] how long ago it was true.
-        valid: whether there is a fix.
+        variance: [m^2] east, north, up, from the receiver.
+        age: delay of the fix [ticks].
+        valid: False without a fix.
     """
     m = s.memory
     if not valid or repeated(m, GPS, (latitude_deg, longitude_deg, height), ZERO, variance[0] > 0.0, 1):
@@ -119,15 +119,15 @@ def update_gps(
 
 @kernel
 def update_gps_velocity(p: Estimator, s: State, velocity_world: Vec3, variance: float, age: int, valid: bool) -> State:
-    """State after a velocity fix.
+    """Return the state after a velocity fix.
 
     Args:
         p: `Estimator`.
         s: `State`; its arrays are changed in place.
         velocity_world: [m/s].
         variance: [(m/s)^2] per axis.
-        age: [ticks] how long ago it was true.
-        valid: whether there is a fix.
+        age: delay of the fix [ticks].
+        valid: False without a fix.
     """
     m = s.memory
     if not valid or repeated(m, GPS_VELOCITY, velocity_world, ZERO, variance > 0.0, 1):

@@ -1,4 +1,4 @@
-"""Heading by the magnetometer (theory.md, eq. (3.33))."""
+"""Fusion of the magnetometer's heading (theory.md, eq. (3.33))."""
 
 import math
 
@@ -14,14 +14,14 @@ from lapwing.services.autopilot.estimator.measurement_checks import judge, repea
 
 @kernel
 def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: float, valid: bool) -> State:
-    """State after a reading of the magnetic field; only its direction in the horizontal plane is used.
+    """Return the state after a magnetometer reading; only its horizontal direction is used.
 
     Args:
         p: `Estimator`.
         s: `State`; its arrays are changed in place.
         field_body: [T].
         variance: [T^2] per axis.
-        valid: whether there is a reading.
+        valid: False without a reading.
     """
     m = s.memory
     if not valid or repeated(m, MAG, field_body, ZERO, variance > 0.0, p.frozen):
@@ -31,7 +31,7 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
     horizontal = bx * bx + by * by
     r = rotation_matrix(s.nominal.attitude)
     fx, fy, _ = apply(r, subtract(field_body, s.nominal.magnetometer_bias))
-    turn = math.atan2(fx * by - fy * bx, fx * bx + fy * by)  # from the field as it seems to the field as it is
+    turn = math.atan2(fx * by - fy * bx, fx * bx + fy * by)  # from the measured to the true field
     clear(m)
     m.row[THETA] = -bz * bx / horizontal
     m.row[THETA + 1] = -bz * by / horizontal

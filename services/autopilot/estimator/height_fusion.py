@@ -1,4 +1,4 @@
-"""Height by the sonar near the ground and by the barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
+"""Fusion of sonar near the ground and barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
 
 import math
 
@@ -12,12 +12,12 @@ from lapwing.services.autopilot.estimator.filter_state import BARO, BAROMETER, P
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
 
-_GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] by which the ground under the vehicle may rise and fall
+_GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] variation of the ground under the vehicle
 
 
 @kernel
 def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: float) -> State:
-    """Gate and take in the row."""
+    """Gate and fuse the row."""
     m = s.memory
     nis = innovation**2 / innovation_variance(m, variance)
     accepted = nis < p.gate**2
@@ -31,14 +31,14 @@ def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: fl
 
 @kernel
 def update_barometer(p: Estimator, s: State, pressure: float, variance: float, valid: bool) -> State:
-    """State after a pressure reading.
+    """Return the state after a pressure reading.
 
     Args:
         p: `Estimator`.
         s: `State`; its arrays are changed in place.
         pressure: [Pa].
         variance: [Pa^2].
-        valid: whether there is a reading.
+        valid: False without a reading.
     """
     m = s.memory
     if not valid or not pressure > 0.0 or repeated(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
@@ -55,14 +55,14 @@ def update_barometer(p: Estimator, s: State, pressure: float, variance: float, v
 
 @kernel
 def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid: bool) -> State:
-    """State after an echo.
+    """Return the state after a sonar reading.
 
     Args:
         p: `Estimator`.
         s: `State`; its arrays are changed in place.
-        distance: [m]; infinite where there is none, which is no fault.
+        distance: [m]; infinite without an echo, which is no fault.
         variance: [m^2].
-        valid: whether there is a reading.
+        valid: False without a reading.
     """
     m = s.memory
     if not valid:
@@ -85,9 +85,9 @@ def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid
 
 @kernel
 def follow_ground(p: Estimator, s: State) -> None:
-    """Let the height count from the ground, which is not level: that under the vehicle since the last echo is unknown.
+    """Add the ground's variation since the last echo to the covariance of the height above ground.
 
-    The barometer keeps its own level, so that what the height loses its bias gains (theory.md, eq. (3.39)).
+    The barometer's bias gets the opposite change, so that its level is unaffected (theory.md, eq. (3.39)).
 
     Args:
         p: `Estimator`.

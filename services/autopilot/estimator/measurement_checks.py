@@ -1,4 +1,4 @@
-"""Watching the sources: readings that repeat, readings that are refused."""
+"""Detection of stuck readings and bookkeeping of gate results."""
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import kernel
@@ -7,15 +7,15 @@ from lapwing.services.autopilot.estimator.filter_state import Memory
 
 @kernel
 def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
-    """Whether a noisy instrument has repeated the same numbers `often` times in a row: it is frozen.
+    """Return True if a noisy instrument has repeated the same numbers `often` times: it is stuck.
 
     Args:
         m: `Memory`, changed in place.
         source: index into SOURCES.
         first: three numbers of the reading.
         second: three more.
-        noisy: whether the reading claims to have noise; without noise a vehicle at rest repeats rightly.
-        often: repetitions that an instrument with noise cannot give; coarse rounding needs more.
+        noisy: the reading has a positive variance; ideal instruments may repeat at rest.
+        often: number of repetitions that noise excludes; coarse rounding needs more.
     """
     same = noisy
     for i in range(3):
@@ -28,7 +28,7 @@ def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, oft
 
 @kernel
 def judge(m: Memory, source: int, accepted: bool, nis: float) -> None:
-    """Keep the books on a reading that came."""
+    """Record the gate result of a reading."""
     m.refused[source] = 0 if accepted else 1
     m.nis[source] = nis
     if accepted:

@@ -1,4 +1,4 @@
-"""Prediction by the inertial measurement unit (theory.md, eqs. (3.21) to (3.24))."""
+"""Prediction by IMU readings (theory.md, eqs. (3.21) to (3.24))."""
 
 import math
 from typing import Any
@@ -30,7 +30,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
 )
 from lapwing.services.autopilot.estimator.measurement_checks import repeated
 
-_STRAIGHT = 0.1  # of a jolt: up to it two readings are taken to lie on a straight line
+_STRAIGHT = 0.1  # fraction of a jolt up to which the change between two readings counts as linear
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 
 
@@ -38,7 +38,7 @@ _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
 def _transformed(
     theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
 ) -> tuple[Any, Any, Any]:
-    """The changed part of F c, with F = I + A dt, of a column c or of several in lanes: (theta, velocity, position)."""
+    """Return the changed rows (theta, velocity, position) of F c with F = I + A dt; c is a column or SIMD columns."""
     return (
         subtract(theta, scale(dt, apply(r, gyro))),
         add(velocity, scale(dt, subtract(cross(theta, f), apply(r, accelerometer)))),
@@ -48,7 +48,7 @@ def _transformed(
 
 @always_inline
 def _loaded(c: np.ndarray, i: int, j: int) -> Any:
-    """The rows i to i + 2 of c, in lanes the columns j to j + 3."""
+    """Return rows i to i + 2 and columns j to j + 3 of c as SIMD vectors."""
     return load(c, SIZE * i + j), load(c, SIZE * (i + 1) + j), load(c, SIZE * (i + 2) + j)
 
 
@@ -60,7 +60,7 @@ def _stored(c: np.ndarray, i: int, j: int, rows: Any) -> None:
 
 @always_inline
 def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
-    """c <- F c F^T for a symmetric c."""
+    """Compute c <- F c F^T for a symmetric c."""
     for j in range(0, SIZE, 4):
         theta, velocity, position = _transformed(
             _loaded(c, THETA, j), _loaded(c, VELOCITY, j), _loaded(c, POSITION, j),
@@ -84,7 +84,7 @@ def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
 
 @always_inline
 def _fade(c: np.ndarray, keep: float) -> None:
-    """First-order decay of the receiver's wander."""
+    """Apply the first-order decay of the receiver's correlated error."""
     for i in range(WANDER, WANDER + 3):
         for j in range(SIZE):
             c[i, j] *= keep
@@ -93,7 +93,7 @@ def _fade(c: np.ndarray, keep: float) -> None:
 
 @always_inline
 def _held(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
-    """Whether a reading is a spike: it jumps away from a reading that was itself trusted."""
+    """Return True for a spike: a jump from a reading that was trusted."""
     return not i.held and (
         norm(subtract(omega, i.omega)) > p.jolt_rate or norm(subtract(force, i.force)) > p.jolt_force
     )
@@ -109,7 +109,7 @@ def predict(
     specific_force_variance: float,
     valid: bool,
 ) -> State:
-    """State one interval later.
+    """Return the state one interval later.
 
     Args:
         p: `Estimator`.
@@ -118,7 +118,7 @@ def predict(
         specific_force_body: [m/s^2] reading of the accelerometers now.
         omega_variance: [(rad/s)^2] per axis.
         specific_force_variance: [(m/s^2)^2] per axis.
-        valid: whether there is a reading; without one the last is used again.
+        valid: False without a reading; the last one is reused.
     """
     n, i, m = s.nominal, s.inertial, s.memory
     dt = p.interval
@@ -130,7 +130,7 @@ def predict(
     force = specific_force_body if usable else i.force
     omega_before = omega if first else i.omega
 
-    # Trapezoidal in the world frame: the readings are of the instants at both ends of the interval.
+    # Trapezoidal rule in the world frame: the readings belong to both ends of the interval.
     omega_mean = subtract(scale(0.5, add(omega_before, omega)), n.gyro_bias)
     attitude = normalise(multiply(n.attitude, exp(scale(dt, omega_mean))))
     r0, r = rotation_matrix(n.attitude), rotation_matrix(attitude)
@@ -158,14 +158,14 @@ def predict(
     twist = norm(subtract(omega_body, i.omega))
     q_theta = dt * dt * omega_variance + dt * rate * p.gyro_scale_std**2
     q_velocity = dt * dt * specific_force_variance
-    if not first:  # what the trapezoidal rule may miss between readings that are far apart
+    if not first:  # error of the trapezoidal rule between distant readings
         q_theta += (dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0) ** 2
         q_velocity += (dt * max(jolt - _STRAIGHT * p.jolt_force, 0.0) / 6.0) ** 2
     if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
         q_velocity += max(0.5 * dt * jolt, _IMPACT) ** 2
     if not first and (twist > p.jolt_rate or spike):
         q_theta += (0.5 * dt * twist) ** 2
-    if not valid or frozen:  # flying on old readings: they may be wrong by as much as a manoeuvre changes them
+    if not valid or frozen:  # old readings are wrong by as much as a manoeuvre changes them
         q_velocity += dt * 1.0
         q_theta += dt * 0.1
     m.history[tick % HISTORY, 6] = q_velocity

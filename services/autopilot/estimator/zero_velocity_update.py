@@ -1,4 +1,4 @@
-"""What is known of a vehicle that stands on the ground with its motors off (theory.md, eq. (3.34))."""
+"""Zero-velocity update on the ground with motors off (theory.md, eq. (3.34))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.kernels import kernel
@@ -6,14 +6,14 @@ from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import GYRO, VELOCITY, State, corrected
 from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, fuse
 
-_VELOCITY_VARIANCE = 0.01**2  # [(m/s)^2] the feet may give a little
+_VELOCITY_VARIANCE = 0.01**2  # [(m/s)^2] compliance of the feet
 _OMEGA_VARIANCE = 1e-3**2  # [(rad/s)^2]
 _ACCELERATION_VARIANCE = 0.02**2  # [(m/s^2)^2]
 
 
 @kernel
 def update_standstill(p: Estimator, s: State, omega_variance: float, specific_force_variance: float) -> State:
-    """State after a look at a vehicle that does not move: no velocity, no rate, no acceleration.
+    """Return the state after measurements of zero velocity, rate and acceleration.
 
     Args:
         p: `Estimator`.

@@ -1,4 +1,4 @@
-"""Failures of the battery's gauge, as PX4's: off, it reports an empty pack, wrong, a low charge."""
+"""Failures of the battery monitor, as in PX4: off reports an empty pack, wrong a low charge."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from lapwing.services.common.ports import BatteryReading
 
 
 class BatteryInjection(NamedTuple):
-    """What is wrong."""
+    """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
 
@@ -18,7 +18,7 @@ class BatteryInjection(NamedTuple):
 def step(
     p: BatteryInjection, s: BatteryReading, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[BatteryReading, tuple, int]:
-    """What arrives of the gauge; the state is what arrived of it before it stuck."""
+    """Output the received reading; the state is the last one before the monitor was stuck."""
     r, kind = inputs[0].value, p.faults.value.battery
     last = s if kind == STUCK else r
     x = last

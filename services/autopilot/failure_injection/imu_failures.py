@@ -1,4 +1,4 @@
-"""Failures of gyroscope and accelerometer, which come in one reading: without one of them it counts for nothing."""
+"""Failures of gyroscope and accelerometer; a reading is invalid without one of them."""
 
 from typing import Any, NamedTuple
 
@@ -10,13 +10,13 @@ from lapwing.services.autopilot.failure_injection.failure_state import Memory, g
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 from lapwing.services.common.ports import ImuReading
 
-TURN, PUSH = 0.2, 2.0  # [rad/s] about x, [m/s^2] along z by which a wrong one is off
-FULL_TURN, FULL_PUSH = 35.0, 160.0  # [rad/s], [m/s^2] full scale, which garbage fills
+TURN, PUSH = 0.2, 2.0  # [rad/s] about x, [m/s^2] along z: errors of a wrong instrument
+FULL_TURN, FULL_PUSH = 35.0, 160.0  # [rad/s], [m/s^2] full scale, range of garbage
 _GYRO, _ACCELEROMETER = 0, 1  # lanes of their random numbers
 
 
 class ImuInjection(NamedTuple):
-    """What is wrong."""
+    """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
     key: Key  # of random numbers
@@ -35,7 +35,7 @@ def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: 
 
 @always_inline
 def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
-    """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
+    """Output the received reading; the second input is the reading `DELAY` ago."""
     r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer
     late, turn, push = before.value, r.omega_body, r.specific_force_body
     omega = _chosen(

@@ -1,4 +1,4 @@
-"""The parts that make failures or pass on motor commands from outside, and the ports that carry what arrives."""
+"""Failure injection blocks, direct motor control, and their ports."""
 
 from collections.abc import Callable, Collection
 from typing import Any
@@ -39,10 +39,10 @@ _UNITS = {
 
 
 class Injection:
-    """Where failures are injected in a run; without a cell of `Faults`, nowhere."""
+    """Failure injection of a run; inactive without a cell of `Faults`."""
 
     def __init__(self, faults: Cell | None, setup: RunConfig, read: Collection[str], motor: Motor):
-        """`setup`: the run; `read`: ports of the sensors that the autopilot reads; `motor`: of every rotor."""
+        """Create the injection; `read` has the sensor ports that the autopilot reads."""
         self.faults, self._motor = faults, motor
         rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
         self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors
@@ -52,22 +52,22 @@ class Injection:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """What can fail."""
+        """Units that can fail."""
         if self.faults is None:
             return ()
         return (*[unit for name in self._sensors for unit in _UNITS[name]], "battery", "motor")
 
     def received(self, port: str) -> str:
-        """Name of the port on which the autopilot gets what is sent on another."""
+        """Return the port on which the autopilot receives samples of `port`."""
         through = self.faults is not None and (port in self._sensors or port == ports.BATTERY)
         return f"{port}.received" if through else port
 
     def commanded(self, actuators: Port) -> Port:
-        """The port that the controller writes, in place of that of the motors."""
+        """Return the port that the controller writes."""
         return actuators if self.faults is None else actuators._replace(name=f"{actuators.name}.commanded")
 
     def before(self, name: str) -> list[Block]:
-        """The parts between sensors and estimator, and behind the battery."""
+        """Return the blocks between sensors and estimator and after the battery."""
         found = []
         for port in self._sensors:
             known = self._known[port]
@@ -87,7 +87,7 @@ class Injection:
         return found
 
     def after(self, name: str, actuators: Port) -> list[Block]:
-        """The part between the controller and the motors."""
+        """Return the block between the controller and the motors."""
         if self.faults is None:
             return []
         inputs = (InputPort(self.commanded(actuators).name),)

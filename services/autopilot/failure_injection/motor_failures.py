@@ -1,4 +1,4 @@
-"""Between the controller and the motors: voltages from outside in the place of its own, and failures."""
+"""Direct motor control and motor failures between controller and motors."""
 
 from typing import Any, NamedTuple
 
@@ -10,18 +10,18 @@ from lapwing.services.autopilot.motor import Motor, thrust_at
 from lapwing.services.common.failure_types import OFF, SLOW, STUCK, WRONG
 from lapwing.services.common.ports import MotorCommand, PerRotor
 
-WEAKENED = 0.7  # of its voltage that a wrong motor gets: about half of the thrust
+WEAKENED = 0.7  # voltage factor of a wrong motor: about half of the thrust
 
 
 class DirectMotorControl(NamedTuple):
-    """Voltages from outside."""
+    """Voltages from the operator."""
 
-    on: bool  # whether they hold
+    on: bool  # they replace the controller's
     motor_voltage: PerRotor  # [V]
 
 
 class MotorInjection(NamedTuple):
-    """Where the voltages come from, and what is wrong."""
+    """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
     direct: Any  # cell of `DirectMotorControl`
@@ -30,7 +30,7 @@ class MotorInjection(NamedTuple):
 
 @always_inline
 def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int, k: int) -> float:
-    """The command that motor k follows: a stuck one its last, a slow one hears one of `SLOWED`."""
+    """Return the voltage command of motor k: the last one if stuck, one in `SLOWED` if slow."""
     if kinds[k] == STUCK or (kinds[k] == SLOW and count % SLOWED != 0):
         return before[k]
     return volts[k]
@@ -38,7 +38,7 @@ def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int
 
 @always_inline
 def _supplied(_: float, kind: int, volts: float) -> float:
-    """The voltage [V] that a motor gets."""
+    """Return the voltage [V] of a motor."""
     if kind == OFF:
         return 0.0
     return WEAKENED * volts if kind == WRONG else volts
@@ -51,7 +51,7 @@ def _thrust_at(motor: Motor, volts: float, _: float) -> float:
 
 @always_inline
 def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
-    """The command that reaches the motors; the controller is told nothing of it."""
+    """Output the command that reaches the motors; the controller does not see it."""
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     asked = d.motor_voltage if d.on else c.motor_voltage
     thrust = map_tuple(_thrust_at, p.motor, asked, asked) if d.on else c.thrust

@@ -1,4 +1,4 @@
-"""What is wrong, and what nonsense is, for a sensor of each kind, by the class of its reading."""
+"""Failures of sensor readings by reading class."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -16,22 +16,22 @@ from lapwing.services.common.ports import (
     OpticalFlowReading,
 )
 
-EXCESS_PRESSURE = 500.0  # [Pa] of a wrong barometer, which reads some 40 m too low
-EXCESS_RANGE = 1.5  # [m] of a wrong distance sensor
-EXCESS_FLOW = 0.5  # [rad/s] about x of a wrong camera, 2 m/s at 4 m
-EXCESS_DYNAMIC = 100.0  # [Pa] of a wrong airspeed sensor, 13 m/s at rest
-NORTH = 1e-3  # [deg] of a wrong receiver, some 110 m
-PRESSURES, RANGES = 2e5, 100.0  # [Pa], [m] that garbage fills from 0 on
-FIELDS, HEIGHTS, SPEEDS = 1e-3, 1e4, 100.0  # [T], [m], [m/s] that it fills to both sides
-FLOWS, DYNAMICS = 10.0, 1500.0  # [rad/s], [Pa] that it fills to both sides
+EXCESS_PRESSURE = 500.0  # [Pa] error of a wrong barometer, about 40 m
+EXCESS_RANGE = 1.5  # [m] error of a wrong distance sensor
+EXCESS_FLOW = 0.5  # [rad/s] error of a wrong camera about x, 2 m/s at 4 m
+EXCESS_DYNAMIC = 100.0  # [Pa] error of a wrong airspeed sensor, 13 m/s at rest
+NORTH = 1e-3  # [deg] error of a wrong receiver, about 110 m
+PRESSURES, RANGES = 2e5, 100.0  # [Pa], [m] upper ends of garbage from 0
+FIELDS, HEIGHTS, SPEEDS = 1e-3, 1e4, 100.0  # [T], [m], [m/s] ranges of garbage, both signs
+FLOWS, DYNAMICS = 10.0, 1500.0  # [rad/s], [Pa] ranges of garbage, both signs
 
 
 class Failure(NamedTuple):
-    """Of one kind of sensor."""
+    """Failures of one kind of sensor."""
 
-    kind: Callable[[Faults], int]  # what is wrong with it
-    wrong: Callable[[Any], Any]  # the reading of one that is wrong
-    garbage: Callable[[Any, Key, int], Any]  # the reading with random numbers at a tick
+    kind: Callable[[Faults], int]  # failure type
+    wrong: Callable[[Any], Any]  # wrong reading
+    garbage: Callable[[Any, Key, int], Any]  # random reading at a tick
 
 
 @always_inline
@@ -133,7 +133,7 @@ def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
 
 
 FAILURES = DispatchTable()
-"""The failures by the class of a reading."""
+"""Failures by reading class."""
 FAILURES[BarometerReading] = Failure(_barometer_kind, _wrong_barometer, _garbage_barometer)
 FAILURES[DistanceReading] = Failure(_distance_kind, _wrong_distance, _garbage_distance)
 FAILURES[MagnetometerReading] = Failure(_magnetometer_kind, _wrong_magnetometer, _garbage_magnetometer)

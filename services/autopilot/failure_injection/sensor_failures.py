@@ -1,4 +1,4 @@
-"""Failures of every sensor but the inertial ones, told apart by the class of the reading."""
+"""Failures of all sensors except the IMU, dispatched by reading class."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -15,14 +15,14 @@ from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 
 
 class SensorInjection(NamedTuple):
-    """What is wrong."""
+    """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
     key: Key  # of random numbers
 
 
 def kind_of(faults: Faults, r: Any) -> int:
-    """What is wrong with the sensor that gives `r`."""
+    """Return the failure type of the sensor of `r`."""
     raise NotImplementedError("compiled code only")
 
 
@@ -33,7 +33,7 @@ def _kind_by(faults: types.Type, r: types.Type) -> Callable:
 
 
 def wrong(r: Any) -> Any:
-    """The reading of a sensor that is wrong."""
+    """Return the reading of a wrong sensor."""
     raise NotImplementedError("compiled code only")
 
 
@@ -43,7 +43,7 @@ def _wrong_by(r: types.Type) -> Any:
 
 
 def nonsense(r: Any, key: Key, tick: int) -> Any:
-    """The reading with random numbers at a tick."""
+    """Return a random reading at a tick."""
     raise NotImplementedError("compiled code only")
 
 
@@ -53,7 +53,7 @@ def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
 
 
 def lost(r: Any) -> Any:
-    """The reading, as one that does not arrive."""
+    """Return the reading marked as invalid."""
     raise NotImplementedError("compiled code only")
 
 
@@ -65,7 +65,7 @@ def _lost_by(r: types.Type) -> Callable:
 
 @always_inline
 def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
-    """What arrives of the reading of the tick; the second input is the same `DELAY` ago."""
+    """Output the received reading; the second input is the reading `DELAY` ago."""
     r, late = inputs[0].value, inputs[1]
     kind = kind_of(p.faults.value, r)
     last = s.last if kind == STUCK else r

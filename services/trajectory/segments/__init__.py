@@ -1,6 +1,6 @@
-"""The kinds of segment a channel can be built of: one file each, found by its name.
+"""Trajectory segments, one file per kind.
 
-To add a kind, add a file with one subclass of `Segment` and a test of it; a scene names it by its `kind`.
+To add a kind, add a file with one subclass of `Segment` and a test; scenes refer to it by its `kind`.
 """
 
 import importlib
@@ -24,9 +24,10 @@ KINDS = _discover()
 
 
 def choose(table: object) -> Segment:
-    """The validated segment that a table of a scene describes.
+    """Return the validated segment of a scene table.
 
-    Raises ConfigError for anything but a table with a known `kind` and sound keys; names the choices.
+    Raises:
+        ConfigError: the table has an unknown `kind` or invalid keys.
     """
     if isinstance(table, Segment):
         return table

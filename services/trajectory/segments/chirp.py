@@ -1,4 +1,4 @@
-"""A sine whose frequency sweeps linearly: to identify a loop's response from a recorded flight."""
+"""Linear chirp, for identifying a loop's response from a recorded flight."""
 
 import math
 from typing import Literal
@@ -8,7 +8,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class Chirp(Segment):
-    """start + amplitude sin(phase), phase of linearly rising frequency (theory.md, eq. (4.4))."""
+    """start + amplitude sin(phase) with a linear frequency sweep (theory.md, eq. (4.4))."""
 
     kind: Literal["chirp"] = "chirp"
     amplitude: Finite  # [u]
@@ -17,11 +17,11 @@ class Chirp(Segment):
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
-        """One swept piece."""
+        """Return one swept piece."""
         sweep = math.pi * (self.last_frequency - self.first_frequency) / self.duration
         return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.first_frequency, sweep)]
 
     def end(self, start: float) -> float:
-        """The value of the chirp where it is cut."""
+        """Return the value at the end of the chirp."""
         cycles = 0.5 * (self.first_frequency + self.last_frequency) * self.duration
         return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

@@ -1,4 +1,4 @@
-"""Stay at the value reached."""
+"""Constant segment."""
 
 from typing import Literal
 
@@ -7,11 +7,11 @@ from lapwing.services.trajectory.segments.segment import Positive, Segment
 
 
 class Hold(Segment):
-    """Constant for `duration`."""
+    """Constant at the value reached for `duration`."""
 
     kind: Literal["hold"] = "hold"
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
-        """One constant piece."""
+        """Return one constant piece."""
         return [Piece(self.duration, (start,))]

@@ -1,4 +1,4 @@
-"""The quintic of least squared jerk between two points of rest."""
+"""Minimum-jerk quintic between two points of rest."""
 
 from typing import Literal
 
@@ -14,10 +14,6 @@ class MinimumJerk(Segment):
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
-        """One quintic piece."""
+        """Return one quintic piece."""
         change, T = self.to - start, self.duration
         return [Piece(T, (start, 0.0, 0.0, 10.0 * change / T**3, -15.0 * change / T**4, 6.0 * change / T**5))]
-
-    def end(self, start: float) -> float:
-        """`to`."""
-        return self.to

@@ -1,4 +1,4 @@
-"""A straight line to a value."""
+"""Linear segment."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class Ramp(Segment):
-    """Constant rate to the value `to`, either at `rate` or over `duration`."""
+    """Constant rate to the value `to`, at `rate` or over `duration`."""
 
     kind: Literal["ramp"] = "ramp"
     to: Finite  # [u]
@@ -19,14 +19,10 @@ class Ramp(Segment):
     @model_validator(mode="after")
     def _one_of_two(self) -> "Ramp":
         if (self.rate is None) == (self.duration is None):
-            raise ValueError("a ramp needs either rate or duration, not both and not neither")
+            raise ValueError("a ramp needs exactly one of rate and duration")
         return self
 
     def pieces(self, start: float) -> list[Piece]:
-        """One linear piece; none where a ramp at a rate has nowhere to go."""
+        """Return one linear piece, none if a ramp at a rate starts at `to`."""
         duration = self.duration or abs(self.to - start) / (self.rate or 1.0)
         return [Piece(duration, (start, (self.to - start) / duration))] if duration > 0.0 else []
-
-    def end(self, start: float) -> float:
-        """`to`."""
-        return self.to

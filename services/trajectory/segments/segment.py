@@ -1,4 +1,4 @@
-"""What every kind of segment gives."""
+"""Base class of trajectory segments."""
 
 from typing import Annotated
 
@@ -12,19 +12,19 @@ Positive = Annotated[Finite, Gt(0.0)]
 
 
 class Segment(BaseModel):
-    """A stretch of one channel; values are displacements from the origin, u stands for m (x, y, z) or rad (yaw)."""
+    """A part of one channel; values are displacements from the origin in u = m (x, y, z) or rad (yaw)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     @classmethod
     def kind_name(cls) -> str:
-        """The name that scenes use: the default of the field `kind`."""
+        """Return the name that scenes use, the default of the field `kind`."""
         return cls.model_fields["kind"].default
 
     def pieces(self, start: float) -> list[Piece]:
-        """The pieces from value `start` [u]. Raises KeyedError where they do not join it."""
+        """Return the pieces from value `start` [u]. Raise KeyedError if they do not join it."""
         raise NotImplementedError
 
     def end(self, start: float) -> float:
-        """The value [u] where the next segment starts: by itself, where this one started."""
-        return start
+        """Return the start value [u] of the next segment: `to` if the kind has this key, otherwise the present one."""
+        return getattr(self, "to", start)

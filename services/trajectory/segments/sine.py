@@ -1,4 +1,4 @@
-"""A sine about the value reached."""
+"""Sine about the value reached."""
 
 import math
 from typing import Literal
@@ -16,11 +16,11 @@ class Sine(Segment):
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
-        """One sinusoidal piece."""
+        """Return one sinusoidal piece."""
         return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.frequency)]
 
     def end(self, start: float) -> float:
-        """The value of the sine where it is cut."""
+        """Return the value at the end of the sine."""
         cycles = self.frequency * self.duration
-        # Whole cycles end where they began: 2 pi n is not representable and would leave a step of rounding.
+        # Whole cycles must end at the start value; 2 pi n is not representable and would leave a rounding error.
         return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

@@ -1,4 +1,4 @@
-"""A cubic that starts and ends at rest."""
+"""Cubic between two points of rest."""
 
 from typing import Literal
 
@@ -14,10 +14,6 @@ class Smoothstep(Segment):
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
-        """One cubic piece."""
+        """Return one cubic piece."""
         change, T = self.to - start, self.duration
         return [Piece(T, (start, 0.0, 3.0 * change / T**2, -2.0 * change / T**3))]
-
-    def end(self, start: float) -> float:
-        """`to`."""
-        return self.to

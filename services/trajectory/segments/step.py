@@ -1,4 +1,4 @@
-"""A jump: the only segment that may break the continuity of a channel."""
+"""Discontinuous step, the only segment that may break the continuity of a channel."""
 
 from typing import Literal
 
@@ -7,15 +7,11 @@ from lapwing.services.trajectory.segments.segment import Finite, Segment
 
 
 class Step(Segment):
-    """Jump to the value `to` at once; it takes no time."""
+    """Jump to the value `to` in no time."""
 
     kind: Literal["step"] = "step"
     to: Finite  # [u]
 
     def pieces(self, start: float) -> list[Piece]:
-        """None: what follows starts at the new value."""
+        """Return no pieces; the next segment starts at the new value."""
         return []
-
-    def end(self, start: float) -> float:
-        """`to`."""
-        return self.to

@@ -1,4 +1,4 @@
-"""Values from a table, joined by straight lines."""
+"""Linear interpolation of a table."""
 
 import itertools
 from typing import Annotated, Literal
@@ -9,14 +9,14 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.trajectory.polynomial_piece import Piece
 from lapwing.services.trajectory.segments.segment import Finite, Segment
 
-TOLERANCE = 1e-9  # [u] how far a table's first value may lie from where the channel is
+TOLERANCE = 1e-9  # [u] between a table's first value and the channel's value
 
 
 class Table(Segment):
-    """Points (time, value); the first time is 0, times ascend. A scene may name a CSV file of them instead."""
+    """Points (time, value) with times ascending from 0; a scene may name a CSV file of them instead."""
 
     kind: Literal["table"] = "table"
-    file: str = ""  # that the points were read from
+    file: str = ""  # CSV file of the points
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2)]  # [s], [u]
 
     @model_validator(mode="after")
@@ -30,12 +30,12 @@ class Table(Segment):
         return self
 
     def pieces(self, start: float) -> list[Piece]:
-        """One linear piece between neighbouring points; raises KeyedError where the table does not join."""
+        """Return one linear piece between neighbouring points. Raise KeyedError if the table does not join."""
         if abs(self.points[0][1] - start) > TOLERANCE:
             message = f"the table starts at {self.points[0][1]}, but the channel is at {start}"
             raise ConfigError("points.0.1", f"{message}: put a ramp or a step before it")
         return [Piece(b[0] - a[0], (a[1], (b[1] - a[1]) / (b[0] - a[0]))) for a, b in itertools.pairwise(self.points)]
 
     def end(self, start: float) -> float:
-        """The last value."""
+        """Return the last value."""
         return self.points[-1][1]

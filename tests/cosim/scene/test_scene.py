@@ -310,7 +310,7 @@ def test_choices_are_listed():
         ("autopilot.parameters=none.params", "--set autopilot.parameters: lapwing/scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),
         ("autopilot.estimator=sensors", '--set autopilot.estimator: "sensors" needs [sensors.imu], [sensors.magneto'),
-        ("autopilot.trajectory=false", "--set autopilot.trajectory: false leaves nobody to say what to fly"),
+        ("autopilot.trajectory=false", "--set autopilot.trajectory: false leaves no source of setpoints"),
     ],
 )
 def test_a_bad_override_is_named(override, expected):

@@ -78,7 +78,7 @@ def test_which_of_two_rotors_over_one_another_has_failed_is_not_guessed():
 def test_a_vehicle_that_only_the_lost_thrust_would_carry_is_refused():
     heavy = {**X8, "airframe.mass.total": 30.0}
     assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_wash"}))
-    with pytest.raises(ValueError, match=r"the rotors give at most .* less than the .* that hovering needs"):
+    with pytest.raises(ValueError, match=r"per rotor is below the .* N needed to hover"):
         resolve(load("hover", heavy))
 
 

@@ -14,17 +14,17 @@ SENSORS = {"autopilot.estimator": "sensors", "sensors": {"imu": {}, "magnetomete
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "message"),
     [
-        ({"airframe.mass.total": 25.0}, "the rotors give at most 48.3 N each, less than the 61.3 N"),
-        ({"airframe.motor.peak_current": 3.0, **ELECTRIC}, "A of a motor, which gets 3.0 A at the most"),
-        ({"airframe.battery.c_rating": 1.0, **ELECTRIC}, "A of a motor, which gets 2.5 A at the most"),
-        ({"airframe.motor.peak_power": 20.0, **ELECTRIC}, "W of a motor, which gets 20.0 W at the most"),
-        ({"airframe.motor.max_voltage": 32.0, **ELECTRIC}, "V of a motor, which gets 32.0 V at the most"),
+        ({"airframe.mass.total": 25.0}, "thrust of 48.3 N per rotor is below the 61.3 N"),
+        ({"airframe.motor.peak_current": 3.0, **ELECTRIC}, "A per motor, the limit is 3.0 A"),
+        ({"airframe.battery.c_rating": 1.0, **ELECTRIC}, "A per motor, the limit is 2.5 A"),
+        ({"airframe.motor.peak_power": 20.0, **ELECTRIC}, "W per motor, the limit is 20.0 W"),
+        ({"airframe.motor.max_voltage": 32.0, **ELECTRIC}, "V per motor, the limit is 32.0 V"),
     ],
 )
-def test_a_vehicle_that_cannot_hover(overrides, said):
-    with pytest.raises(SceneError, match=f"airframe.*{said}"):
+def test_a_vehicle_that_cannot_hover(overrides, message):
+    with pytest.raises(SceneError, match=f"airframe.*{message}"):
         load("hover", overrides)
 
 
@@ -33,7 +33,7 @@ def test_the_limit_is_that_of_the_performance_card():
     heaviest = performance.maximum_thrust(DRONE, 1.225) / performance.GRAVITY
     scene = {**ELECTRIC, "environment.home.height": 0.0}
     load("hover", {**scene, "vehicle.mass": 0.999 * heaviest})
-    with pytest.raises(SceneError, match="hovering takes"):
+    with pytest.raises(SceneError, match="hovering needs"):
         load("hover", {**scene, "vehicle.mass": 1.001 * heaviest})
 
 
@@ -43,6 +43,8 @@ def test_a_slung_load_that_the_rotors_cannot_lift():
 
 
 def test_a_field_without_a_heading():
-    with pytest.raises(SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T across"):
+    with pytest.raises(
+        SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T horizontally"
+    ):
         load("hover", {**SENSORS, "environment.magnetic_field": [0.0, 0.0, -4e-5]})
     load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # flown by the truth

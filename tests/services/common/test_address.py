@@ -1,4 +1,4 @@
-"""Addresses HOST:PORT, and which of them only this machine reaches."""
+"""Parsing of HOST:PORT addresses."""
 
 import pytest
 
@@ -20,15 +20,15 @@ from lapwing.services.common.address import host_and_port, is_loopback
         ("host:x", None),
     ],
 )
-def test_an_address_is_taken_apart(text, expected):
+def test_address_is_split_into_host_and_port(text, expected):
     assert host_and_port(text) == expected
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.0.1", "::1", "localhost"])
-def test_this_machine_alone(host):
+def test_loopback_host_is_recognised(host):
     assert is_loopback(host)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.1", "robot", "localhost.org", "127.0.0.1.org", ""])
-def test_others_too(host):
+def test_remote_host_is_not_loopback(host):
     assert not is_loopback(host)

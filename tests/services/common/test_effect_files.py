@@ -1,4 +1,4 @@
-"""Files that effects name are read once, when the scene is loaded."""
+"""Effect files, read when the scene is loaded."""
 
 import math
 from pathlib import Path
@@ -19,7 +19,7 @@ def path(tmp_path):
     return found
 
 
-def test_the_autopilot_knows_the_static_thrust_of_a_table(path):
+def test_rotor_constants_come_from_the_table(path):
     path.with_name("prop.txt").write_text("J CT CP\n0.0 0.10 0.04\n0.2 0.08 0.04\n")
     scene = load(path)
     path.with_name("prop.txt").unlink()
@@ -28,7 +28,7 @@ def test_the_autopilot_knows_the_static_thrust_of_a_table(path):
     assert found.with_density
 
 
-def test_a_file_that_is_not_there_or_has_a_hole(path):
+def test_missing_or_incomplete_table_is_rejected(path):
     with pytest.raises(SceneError, match=r"effects.rotor_table.file: .*prop.txt: no such file"):
         load(path)
     path.with_name("prop.txt").write_text("J CT CP\n0.0 0.10 0.04\n0.2 0.08\n")

@@ -1,4 +1,4 @@
-"""The `[environment]` of a scene: one value for all services, and what is refused."""
+"""Environment table: one value for all services, rejection of invalid values."""
 
 import re
 
@@ -26,11 +26,11 @@ PLACE = {
 }
 
 
-def test_a_scene_that_says_nothing_has_the_standard():
+def test_environment_has_standard_defaults():
     assert environment(load("hover")) == STANDARD
 
 
-def test_every_service_is_given_the_same():
+def test_all_services_share_the_environment():
     setup = resolve(scene := load("delivery_mission", PLACE))
     around = environment(scene)
     assert gravity(scene) == around.gravity == normal_gravity(47.3)
@@ -46,7 +46,7 @@ def test_every_service_is_given_the_same():
     assert setup.beside["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
 
 
-def test_the_barometer_stands_in_the_air_that_the_rotors_turn_in():
+def test_barometer_and_rotors_share_the_atmosphere():
     scene = load("delivery_mission", {**PLACE, "sensors.barometer.preset": "ideal", "sensors.gps.preset": "standard"})
     sensors, plant = Alone(scene, "sensors"), resolve(scene).services["plant"].parameters
     sensors.step(truth=sensors.setup.port("truth").like)
@@ -56,7 +56,7 @@ def test_the_barometer_stands_in_the_air_that_the_rotors_turn_in():
     assert plant.start.vehicle.motion.position_world[2] == pytest.approx(start_pose(scene)[0][2], abs=1e-4)
 
 
-def test_a_recorded_scene_has_the_same_environment_without_its_files(tmp_path):
+def test_recorded_scene_needs_no_terrain_file(tmp_path):
     heights = np.add.outer(0.1 * np.arange(5.0), 0.05 * np.arange(7.0) ** 2)
     np.save(tmp_path / "hill.npy", heights)
     grid = {"file": str(tmp_path / "hill.npy"), "corner": [-3.0, -2.0], "spacing": 1.5}
@@ -72,14 +72,14 @@ def test_a_recorded_scene_has_the_same_environment_without_its_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "message"),
     [
         (
             {"home": {"latitude_deg": 95.0}},
             "home.latitude_deg: expected a number at least -90 and at most 90 [deg], got 95",
         ),
-        ({"date": "2040-01-01"}, "date: expected a day of 2010 to 2029, or magnetic_field, got 2040-01-01, of which"),
-        ({"date": "2025-02-30"}, "date: expected a day, as 2025-07-01, got 2025-02-30"),
+        ({"date": "2040-01-01"}, "date: expected a date from 2010 to 2029, or magnetic_field, got 2040-01-01"),
+        ({"date": "2025-02-30"}, "date: expected a date such as 2025-07-01, got 2025-02-30"),
         ({"gravity": -1.0}, "gravity: expected a number at least 0 and at most 30"),
         (
             {"magnetic_field": [1.0, 0.0, 0.0]},
@@ -93,23 +93,23 @@ def test_a_recorded_scene_has_the_same_environment_without_its_files(tmp_path):
             "heights: expected rows of equal length, got rows of 1",
         ),
         ({"terrain": {"grid": {"heights": [[0.0, float("nan")]]}}}, "heights.0.1: expected a finite number, got nan"),
-        ({"terrain": {"grid": {"spacing": 1.0}}}, "terrain.grid: expected heights, or a file of them, got neither"),
+        ({"terrain": {"grid": {"spacing": 1.0}}}, "terrain.grid: has neither file nor heights"),
         ({"terrain": {"grid": {"file": "no.npy"}}}, "no.npy: no such file or directory"),
         (
             {"terrain": {"grid": {"heights": [[0.0, 1.0], [0.0, 1.0]], "reach": 5.0}}},
-            "grid.reach: of heights all are taken; expected none, or a GeoTIFF",
+            "grid.reach: needs a GeoTIFF",
         ),
         ({"terrain": {"steps": {"distance": [1.0], "rise": []}}}, "steps.rise: expected one for each of the 1, got 0"),
     ],
 )
-def test_refused(table, said):
-    with pytest.raises(SceneError, match=re.escape(said)) as error:
+def test_invalid_environment_is_rejected(table, message):
+    with pytest.raises(SceneError, match=re.escape(message)) as error:
         load("hover", {"environment": table})
     assert "environment." in str(error.value)
     assert "\n" not in str(error.value)
 
 
-def test_a_body_that_buries_the_start_is_refused():
+def test_start_inside_obstacle_is_rejected():
     pillar = {"environment.terrain.cylinder": [{"position": [0.0, 0.0], "radius": 0.1, "top": 0.6}]}
     with pytest.raises(
         SceneError, match=r"environment.terrain: buries the start: the vehicle's \(0, 0, 0\) m would be"
@@ -124,12 +124,12 @@ def test_a_body_that_buries_the_start_is_refused():
         {"box": [{"position": [0.3, 0.0], "size": [0.2, 4.0], "top": 5.0}]},
     ],
 )
-def test_a_wall_under_a_foot_leaves_no_place_to_start(terrain):
-    with pytest.raises(SceneError, match=r"environment.terrain: no place .* it would lean by 8\d degrees"):
+def test_start_on_a_wall_is_rejected(terrain):
+    with pytest.raises(SceneError, match=r"environment.terrain: no room .* it would lean by 8\d degrees"):
         resolve(load("hover", {"environment.terrain": terrain}))
 
 
-def test_on_a_roof_it_stands_on_the_roof():
+def test_start_pose_is_on_top_of_a_box():
     roof = {"environment.terrain.box": [{"position": [0.0, 0.0], "size": [3.0, 3.0], "top": 2.0}]}
     assert start_pose(load("hover", roof))[0] == pytest.approx((0.0, 0.0, 2.35))
     assert isinstance(environment(load("hover", {"environment.terrain.slope": [0.0, 0.0]})).terrain, Level)

@@ -1,4 +1,4 @@
-"""Plans: read as they are written, refused in one line, and flown to the end of the run."""
+"""Import of flight plans."""
 
 import math
 from pathlib import Path
@@ -14,7 +14,7 @@ def items(path):
     return read(path)[0].items
 
 
-def test_the_delivery_mission_as_a_plan():
+def test_delivery_plan_has_the_mission_items():
     found = items(DELIVERY)
     assert [i.action for i in found] == ["speed", "takeoff", *["waypoint"] * 4, "land"]
     assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
@@ -23,12 +23,12 @@ def test_the_delivery_mission_as_a_plan():
     assert found[5].hold == 5.0
 
 
-def test_altitudes_above_home_count_from_where_the_vehicle_stands():
+def test_plan_altitudes_start_at_the_resting_height():
     found = read(DELIVERY, 0.35)[0].items
     assert [i.position.z for i in found[1:6]] == pytest.approx([10.35] * 5, abs=1e-3)
 
 
-def test_waypoints_skip_home_and_keep_jumps(tmp_path):
+def test_waypoints_skip_home_and_renumber_jumps(tmp_path):
     path = tmp_path / "a.waypoints"
     rows = [
         "QGC WPL 110",
@@ -46,7 +46,7 @@ def test_waypoints_skip_home_and_keep_jumps(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("nothing", "neither JSON"),
         ("{}", "fileType"),
@@ -55,9 +55,9 @@ def test_waypoints_skip_home_and_keep_jumps(tmp_path):
         ("QGC WPL 110\n0 1 3 999 0 0 0 0 1 1 1 1", "unknown command 999"),
     ],
 )
-def test_what_is_no_plan_is_refused_in_a_line(tmp_path, text, said):
+def test_invalid_plan_is_rejected_in_one_line(tmp_path, text, message):
     path = tmp_path / "bad.plan"
     path.write_text(text)
-    with pytest.raises(ValueError, match=said) as caught:
+    with pytest.raises(ValueError, match=message) as caught:
         read(path)
     assert "\n" not in str(caught.value)

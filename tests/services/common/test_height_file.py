@@ -1,4 +1,4 @@
-"""Terrain from a GeoTIFF, beside conversions by other packages, and what is refused."""
+"""GeoTIFF terrain against conversions by other packages."""
 
 import math
 import re
@@ -21,7 +21,7 @@ STEP = 1.0 / 3600.0  # [deg] an arc second
 
 
 def write(path, heights, crs="EPSG:4326", transform=None, **tags):
-    """A file whose first row is the northernmost."""
+    """Write a file whose first row is the northernmost."""
     rows, columns = heights.shape[-2:]
     west, north = LONGITUDE - 0.5 * columns * STEP, LATITUDE + 0.5 * rows * STEP
     transform = transform or rasterio.transform.from_origin(west, north, STEP, STEP)
@@ -39,8 +39,8 @@ def ground(path, **grid):
     return environment(load("hover", {"environment.home": HOME, "environment.terrain.grid": table})).terrain
 
 
-def test_heights_over_latitude_and_longitude_are_where_they_belong(tmp_path):
-    """A plane in degrees, against pymap3d: rows run from north to south in the file, the other way in the world."""
+def test_geographic_heights_match_pymap3d(tmp_path):
+    """Compare a plane in degrees with pymap3d; file rows run from north to south."""
     row, column = np.mgrid[0:40, 0:60]
     north, east = (20 - row - 0.5) * STEP, (column + 0.5 - 30) * STEP
     found = ground(write(tmp_path / "hill.tif", 700.0 + 5e3 * north + 2e3 * east))
@@ -50,8 +50,8 @@ def test_heights_over_latitude_and_longitude_are_where_they_belong(tmp_path):
         assert surface(found, x, y)[0] == pytest.approx(expected, abs=2e-3)
 
 
-def test_a_projected_file_is_turned_by_the_convergence_of_its_meridians(tmp_path):
-    """A slope along the easting of UTM zone 32, half a degree west of its central meridian."""
+def test_projected_heights_turn_by_meridian_convergence(tmp_path):
+    """Check a slope along the easting of UTM zone 32, half a degree west of its central meridian."""
     column = np.mgrid[0:80, 0:80][1]
     easting, northing = 462_200.0, 5_238_700.0  # near home, within the file
     transform = rasterio.transform.from_origin(easting - 400.0, northing + 400.0, 10.0, 10.0)
@@ -64,7 +64,7 @@ def test_a_projected_file_is_turned_by_the_convergence_of_its_meridians(tmp_path
     assert math.hypot(east, north) == pytest.approx(0.3 * scale, rel=1e-4)
 
 
-def test_scaled_heights_are_scaled_back(tmp_path):
+def test_scaled_heights_are_unscaled(tmp_path):
     column = np.mgrid[0:40, 0:60][1].astype("int16")
     plain = ground(write(tmp_path / "plain.tif", column.astype(float)))
     scaled = ground(write(tmp_path / "scaled.tif", 4 * column, scales=(0.25,), offsets=(100.0,)))
@@ -77,28 +77,28 @@ HOLE = np.where(np.arange(60) == 30, -9999.0, FLAT)
 
 
 @pytest.mark.parametrize(
-    ("written", "grid", "said"),
+    ("written", "grid", "message"),
     [
-        ({}, {"reach": None}, "grid.reach: missing; expected [m] from home to each side"),
+        ({}, {"reach": None}, "grid.reach: missing; expected distance [m]"),
         ({}, {"reach": 5.0}, "grid.reach: expected at least the spacing of 10 m, got 5"),
         ({}, {"spacing": 0.1}, "grid.spacing: expected at most 1000000 points"),
-        ({}, {"corner": [0.0, 0.0]}, "grid.corner: follows from reach; expected none beside a GeoTIFF"),
+        ({}, {"corner": [0.0, 0.0]}, "grid.corner: cannot be set with a GeoTIFF"),
         ({}, {"reach": 3000.0}, "expected a file that covers grid.reach about home"),
         ({"heights": HOLE, "nodata": -9999.0}, {}, "has no height at (0, "),
         ({"heights": np.zeros((3, 40, 60))}, {}, "expected one band of heights"),
-        ({"crs": None}, {}, "states no coordinate system"),
+        ({"crs": None}, {}, "has no coordinate system"),
         ({"units": ("ft",)}, {}, "has heights in 'ft'; expected metres"),
     ],
 )
-def test_refused(tmp_path, written, grid, said):
+def test_invalid_geotiff_is_rejected(tmp_path, written, grid, message):
     path = write(tmp_path / "hill.tif", written.pop("heights", FLAT), **written)
-    with pytest.raises(SceneError, match=re.escape(said)) as error:
+    with pytest.raises(SceneError, match=re.escape(message)) as error:
         ground(path, **grid)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("content", [None, b"no image"])
-def test_what_is_no_geotiff_is_refused(tmp_path, content):
+def test_file_without_geotiff_is_rejected(tmp_path, content):
     path = tmp_path / "hill.tif"
     if content:
         path.write_bytes(content)
@@ -107,7 +107,7 @@ def test_what_is_no_geotiff_is_refused(tmp_path, content):
     assert "\n" not in str(error.value)
 
 
-def test_an_array_has_no_reach(tmp_path):
+def test_reach_of_an_array_is_rejected(tmp_path):
     np.save(tmp_path / "hill.npy", FLAT)
-    with pytest.raises(SceneError, match=r"grid.reach: of an array all is taken; expected none, or a GeoTIFF"):
+    with pytest.raises(SceneError, match=r"grid.reach: needs a GeoTIFF"):
         ground(tmp_path / "hill.npy", corner=[-20.0, -20.0])

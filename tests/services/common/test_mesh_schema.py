@@ -1,4 +1,4 @@
-"""The mesh of an airframe: the same solid in every form of file, and from its file to the page of a log."""
+"""Airframe mesh: file formats, and the way from file to report."""
 
 import re
 import struct
@@ -43,7 +43,7 @@ def obj():
 
 
 def volume(mesh):
-    """Of a closed surface whose faces are seen counter-clockwise from outside [m^3]."""
+    """Return the volume [m^3] of a closed surface with counter-clockwise faces."""
     a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(float) for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
@@ -57,7 +57,7 @@ def volume(mesh):
         ("c.obj", obj()),
     ],
 )
-def test_a_solid_is_the_same_from_every_form_of_file(tmp_path, name, content):
+def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     mesh = read(tmp_path / name)
     assert len(mesh.vertices) == len(CORNERS)  # corners at the same place are one
@@ -68,26 +68,26 @@ def test_a_solid_is_the_same_from_every_form_of_file(tmp_path, name, content):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "message"),
     [
         ("no.stl", None, "no such file"),
         ("a.step", b"", "expected the path of an .stl or .obj file, got '../a.step'"),
-        ("a.stl", b"", "no STL file"),
-        ("a.stl", binary()[:-7], "no STL file"),
+        ("a.stl", b"", "not an STL file"),
+        ("a.stl", binary()[:-7], "not an STL file"),
         ("a.stl", b"solid x\nvertex 1 2 3\nvertex 1 2 3\n", "fewer than three corners"),
         ("a.stl", b"solid x\nvertex 1 two 3\n", "not three numbers"),
-        ("a.stl", ascii_stl().replace(b"endsolid", 3 * b"vertex nan 0 0\n" + b"endsolid"), "no finite number"),
+        ("a.stl", ascii_stl().replace(b"endsolid", 3 * b"vertex nan 0 0\n" + b"endsolid"), "not finite"),
         ("a.stl", b"solid x\nendsolid x\n", "no triangles"),
         ("a.stl", bytes(80) + struct.pack("<I", MOST + 1) + bytes(50 * (MOST + 1)), f"expected at most {MOST}"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: "),
         ("a.obj", b"v 0 0 0\nf a b c\n", "line 2: "),
-        ("a.obj", obj().replace(b"0.4", b"400").replace(b"0.3", b"300"), "metres along the airframe's axes"),
+        ("a.obj", obj().replace(b"0.4", b"400").replace(b"0.3", b"300"), "a mesh in metres"),
     ],
 )
-def test_what_is_no_mesh_is_refused_with_key_file_and_what_would_be_right(tmp_path, name, content, said):
+def test_invalid_mesh_is_rejected(tmp_path, name, content, message):
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    with pytest.raises(SceneError, match=re.escape(said)) as refused:
+    with pytest.raises(SceneError, match=re.escape(message)) as refused:
         load(scene(tmp_path, name))
     text = str(refused.value)
     assert "airframe.mesh" in text
@@ -96,7 +96,7 @@ def test_what_is_no_mesh_is_refused_with_key_file_and_what_would_be_right(tmp_pa
 
 
 def scene(folder, mesh):
-    """`hover` with an airframe in vehicles/ beside it that names a mesh."""
+    """Write `hover` with an airframe in vehicles/ that names a mesh."""
     (folder / "vehicles").mkdir()
     text = (SHIPPED / "vehicles" / "delivery_drone.toml").read_text()
     (folder / "vehicles" / "own.toml").write_text(f'mesh = "../{mesh}"\n{text}')
@@ -105,7 +105,7 @@ def scene(folder, mesh):
     return path
 
 
-def test_the_set_up_has_the_triangles_and_the_page_shows_them_without_the_file(tmp_path):
+def test_run_configuration_stores_the_mesh(tmp_path):
     (tmp_path / "own.stl").write_bytes(binary())
     loaded = load(scene(tmp_path, "own.stl"), ["airframe.mass.centre=[0.1, 0.0, 0.0]"])
     setup = resolve(loaded)
@@ -120,7 +120,7 @@ def test_the_set_up_has_the_triangles_and_the_page_shows_them_without_the_file(t
     assert (len(body.strokes), len(body.rotors)) == (0, 4)  # instead of arms and feet
 
 
-def test_a_mesh_may_stand_in_the_scene_and_not_in_an_override(tmp_path):
+def test_mesh_is_rejected_as_override(tmp_path):
     (tmp_path / "own.stl").write_bytes(binary())
     path = tmp_path / "own.toml"
     path.write_text((SHIPPED / "hover.toml").read_text() + '\n[airframe]\nmesh = "own.stl"\n')
@@ -129,7 +129,7 @@ def test_a_mesh_may_stand_in_the_scene_and_not_in_an_override(tmp_path):
         load("hover", ["airframe.mesh=own.stl"])
 
 
-def test_a_scene_without_a_mesh_has_nothing_of_it():
+def test_scene_without_mesh_has_no_mesh_tables():
     resolved = load("hover").resolved
     assert "meshes" not in resolved
     assert "mesh" not in resolved["airframe"]

@@ -1,4 +1,4 @@
-"""Parameters in files: saved from a scene or a run, read back, refused in a line."""
+"""Parameter files: saved from a scene or a run, read back, rejected in one line."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ def lapwing(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
-def test_what_is_written_is_read_back_and_flown(tmp_path):
+def test_parameter_file_round_trip(tmp_path):
     path = tmp_path / "mine.params"
     known = table(load(HOVER))
     values = {name: p.default for name, p in known.items()} | {"PID_ROLL_P": known["PID_ROLL_P"].default * 0.5}
@@ -33,14 +33,14 @@ def test_what_is_written_is_read_back_and_flown(tmp_path):
     assert len(path.read_text().splitlines()[3].split("\t")) == 5  # as QGroundControl reads it
 
 
-def test_mavproxys_rows_are_read_too(tmp_path):
+def test_mavproxy_rows_are_read(tmp_path):
     path = tmp_path / "mine.parm"
     path.write_text("# saved\nMPC_XY_CRUISE    3.000000\nNAV_DLL_ACT 2\n")
     assert read(path) == {"MPC_XY_CRUISE": 3.0, "NAV_DLL_ACT": 2.0}
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("MPC_XY_CRUISE fast", "bad.params:1: MPC_XY_CRUISE: expected a number, got 'fast'"),
         ("one two three", "bad.params:1: expected name and value"),
@@ -49,15 +49,15 @@ def test_mavproxys_rows_are_read_too(tmp_path):
         ("NO_SUCH 1", "bad.params: autopilot.parameters.NO_SUCH: unknown parameter"),
     ],
 )
-def test_a_scene_with_a_bad_file_is_refused_in_a_line(tmp_path, text, said):
+def test_invalid_parameter_file_is_rejected_in_one_line(tmp_path, text, message):
     path = tmp_path / "bad.params"
     path.write_text(text)
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(SceneError, match=message) as caught:
         load(HOVER, [f"autopilot.parameters={path}"])
     assert "\n" not in str(caught.value)
 
 
-def test_what_a_run_ended_with_is_saved_and_named_by_a_scene(tmp_path):
+def test_final_parameters_of_a_run_are_saved(tmp_path):
     def set_(name, value):
         return OperatorCommand("parameter", "test", 1, (value,), name)
 
@@ -75,7 +75,7 @@ def test_what_a_run_ended_with_is_saved_and_named_by_a_scene(tmp_path):
     assert table(load(HOVER, [f"autopilot.parameters={saved}"]))["MPC_XY_CRUISE"].default == 3.5
 
 
-def test_a_file_that_is_neither_is_refused(tmp_path):
+def test_scene_without_autopilot_has_no_parameters(tmp_path):
     result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "nobody steers there" in result.stderr

@@ -1,4 +1,4 @@
-"""What services agree on: gravity at home, and how the vehicle stands there."""
+"""Vehicle tables: gravity at home, start pose, mass."""
 
 import math
 import re
@@ -19,7 +19,7 @@ def without_gravity(*overrides):
     return load("hover", {"effects": {"rotor_thrust": {}, "ground_contact": {}}, **dict(overrides)})
 
 
-def test_gravity_is_that_of_whichever_effect_gives_one():
+def test_gravity_comes_from_the_gravity_effect():
     assert gravity(load("hover")) == 9.80665
     assert gravity(load("hover", ["environment.gravity=3.7"])) == 3.7
     assert gravity(without_gravity()) == 0.0
@@ -28,7 +28,7 @@ def test_gravity_is_that_of_whichever_effect_gives_one():
     assert gravity(altitude) == active(altitude)[0].initial_memory()[0]
 
 
-def test_the_imu_reads_gravity_whichever_effect_gives_it():
+def test_imu_reads_gravity_of_any_gravity_effect():
     effects = {"gravity_altitude": {}, "rotor_thrust": {}, "ground_contact": {}}
     sea = {"effects": effects, "environment.home.height": 0.0}
     scene = load("delivery_mission", {**sea, "sensors.imu.preset": "ideal"})
@@ -37,14 +37,14 @@ def test_the_imu_reads_gravity_whichever_effect_gives_it():
     assert sensors.message(IMU).linear_acceleration.z == pytest.approx(9.80665)
 
 
-def test_on_level_ground_the_vehicle_starts_where_it_did():
+def test_start_pose_on_level_ground():
     for overrides in ([], ["environment.terrain.slope=[0.0, 0.0]"]):
         assert start_pose(load("hover", overrides)) == ((0.0, 0.0, 0.35), NO_ROTATION)
     assert start_height(load("hover")) == 0.35
 
 
 @pytest.mark.long
-def test_on_a_slope_the_vehicle_starts_at_rest_and_stays():
+def test_vehicle_rests_on_a_slope():
     scene = load("hover", ["environment.terrain.slope=[0.1, 0.0]"])
     position, attitude = start_pose(scene)
     up = rotation_matrix(attitude)
@@ -60,14 +60,14 @@ def test_on_a_slope_the_vehicle_starts_at_rest_and_stays():
     assert truth.pose.orientation.w > 0.99
 
 
-def test_a_rate_that_does_not_divide_the_exchange_rate_is_refused():
+def test_rate_must_divide_the_communication_rate():
     scene = load("hover")
     assert ticks(scene, 50, "rates.pose") == 5
     with pytest.raises(ConfigError, match=r"^rates.pose: expected a rate that divides exchange.rate = 250 Hz"):
         ticks(scene, 33, "rates.pose")
 
 
-def test_a_scene_without_an_airframe_says_so():
+def test_missing_airframe_is_rejected():
     scene = load("os4_motors")
     assert not scene.has("airframe")
     with pytest.raises(ConfigError, match=r"^vehicle.airframe: missing; expected the name of an airframe"):
@@ -75,23 +75,23 @@ def test_a_scene_without_an_airframe_says_so():
 
 
 @pytest.mark.parametrize("overrides", [["vehicle.mass=9.5"], {"vehicle.mass": 9.5}, ["airframe.mass.total=9.5"]])
-def test_the_mass_of_the_vehicle_is_that_of_its_airframe(overrides):
+def test_vehicle_mass_sets_the_airframe_mass(overrides):
     assert airframe(load("hover", overrides)).mass.total == 9.5
 
 
 @pytest.mark.parametrize(
-    ("scene", "overrides", "said"),
+    ("scene", "overrides", "message"),
     [
         ("hover", ["vehicle.mas=9.5"], "--set vehicle.mas: unknown key 'mas'; did you mean mass?"),
         ("hover", ["vehicle.mass=0"], "--set vehicle.mass: expected a number above 0 [kg], got 0"),
         (
             "hover",
             ["vehicle.mass=9", "airframe.mass.total=8"],
-            "--set vehicle.mass: 9 kg, and airframe.mass.total = 8 kg; expected one of them",
+            "--set vehicle.mass: 9 kg, but airframe.mass.total = 8 kg; expected one of them",
         ),
-        ("gyrostat_chaotic", ["vehicle.mass=9"], "--set vehicle.mass: there is no airframe whose mass it could be"),
+        ("gyrostat_chaotic", ["vehicle.mass=9"], "--set vehicle.mass: the vehicle has no airframe"),
     ],
 )
-def test_a_mass_that_cannot_be_is_one_line(scene, overrides, said):
-    with pytest.raises(SceneError, match=re.escape(said)):
+def test_invalid_vehicle_mass_is_rejected(scene, overrides, message):
+    with pytest.raises(SceneError, match=re.escape(message)):
         load(scene, overrides)

@@ -1,4 +1,4 @@
-"""Formations: a vehicle's way relative to another one's, against its definition and against itself by differences."""
+"""Leader-follower trajectories against their definition and finite differences."""
 
 import math
 
@@ -66,7 +66,7 @@ def leading(core, tick):
     return own.step(core.leader, 0.0, tick, ())[1][0]
 
 
-def test_it_begins_where_the_vehicle_stands_and_lands_there_beside_the_leader(tmp_path):
+def test_follower_keeps_its_place_relative_to_the_leader(tmp_path):
     core = path(tmp_path)
     start, end = at(core, 0), at(core, 2500)
     assert start.position_world[:2] == pytest.approx((-2.0, 1.5))
@@ -79,7 +79,7 @@ def test_it_begins_where_the_vehicle_stands_and_lands_there_beside_the_leader(tm
     assert [at(core, tick).phase for tick in (0, 800)] == [0, 1]
 
 
-def test_in_the_frame_of_the_world_the_way_does_not_turn(tmp_path):
+def test_world_frame_displacement_does_not_rotate(tmp_path):
     core = path(tmp_path, "wing", "vehicle.1.trajectory.frame=world")
     for tick in (0, 900, 1300, 2500):
         apart = np.subtract(at(core, tick).position_world, leading(core, tick).position_world)
@@ -88,7 +88,7 @@ def test_in_the_frame_of_the_world_the_way_does_not_turn(tmp_path):
 
 
 @pytest.mark.parametrize("tick", [700, 900, 1100, 1300])
-def test_velocity_and_acceleration_are_the_derivatives_of_what_comes_before(tmp_path, tick):
+def test_follower_derivatives_match_finite_differences(tmp_path, tick):
     core, h = path(tmp_path), 0.004
     before, now, after = (at(core, tick + k) for k in (-1, 0, 1))
     for value, slope in (("position_world", "velocity_world"), ("velocity_world", "acceleration_world")):
@@ -97,7 +97,7 @@ def test_velocity_and_acceleration_are_the_derivatives_of_what_comes_before(tmp_
     assert now.yaw_rate == pytest.approx((after.yaw - before.yaw) / (2.0 * h), abs=1e-4)
 
 
-def test_the_vehicle_is_asked_for_it(tmp_path):
+def test_follower_setpoint_follows_the_leader(tmp_path):
     scene = parse(tmp_path / "two.toml", SCENE)
     flown = fly(resolve(scene))
     told, core = flown.view("wing/setpoint"), path(tmp_path)
@@ -109,20 +109,20 @@ def test_the_vehicle_is_asked_for_it(tmp_path):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("vehicle.1.trajectory.follow=lead", "vehicle.1.trajectory.follow: expected one .* its own: leader, got lead"),
-        ("vehicle.0.trajectory.follow=wing", "vehicle.0.trajectory.follow: expected one .* its own: there is none"),
-        ("vehicle.1.trajectory.follow=wing", "vehicle.1.trajectory.follow: expected one that flies"),
-        ("vehicle.0.trajectory.frame=world", "trajectory.frame: there is no leader"),
+        ("vehicle.1.trajectory.follow=lead", "vehicle.1.trajectory.follow: expected .* no leader: leader, got lead"),
+        ("vehicle.0.trajectory.follow=wing", "vehicle.0.trajectory.follow: expected .* there is none"),
+        ("vehicle.1.trajectory.follow=wing", "vehicle.1.trajectory.follow: expected a vehicle with a trajectory"),
+        ("vehicle.0.trajectory.frame=world", "trajectory.frame: has no leader"),
     ],
 )  # fmt: skip
-def test_refuses_a_leader_that_is_none(tmp_path, override, message):
+def test_invalid_leader_is_rejected(tmp_path, override, message):
     with pytest.raises(SceneError, match=message):
         resolve(parse(tmp_path / "two.toml", SCENE, [override]))
 
 
-def test_refuses_phases_that_are_the_leaders_own(tmp_path):
+def test_phases_equal_to_the_leaders_are_rejected(tmp_path):
     text = SCENE.split('[[vehicle.trajectory.phase]]\nname = "beside"')[0]
     climb = SCENE.split("[[vehicle]]")[1].split("start = [1.0, 0.5]\n")[1]
     text = text.replace("[[vehicle]]", climb.replace("vehicle.", "") + "[[vehicle]]", 1).replace(climb, "", 1)
-    with pytest.raises(SceneError, match=r"vehicle.1.trajectory.phase: .*the phases are those of leader"):
+    with pytest.raises(SceneError, match=r"vehicle.1.trajectory.phase: .*repeats the phases of leader"):
         resolve(parse(tmp_path / "two.toml", text))

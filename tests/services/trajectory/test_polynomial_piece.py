@@ -22,7 +22,7 @@ def channel(*pieces):
 
 @given(st.tuples(*[NUMBER] * 6), NUMBER, NUMBER, NUMBER, st.floats(0.1, 1.9))
 @settings(deadline=None)
-def test_derivatives_are_those_of_the_value(polynomial, amplitude, frequency, sweep, t):
+def test_channel_derivatives_match_finite_differences(polynomial, amplitude, frequency, sweep, t):
     c = channel(Piece(2.0, polynomial, amplitude, frequency, sweep))
     h = 1e-4
     (before, rate_before, _), (_, rate, acceleration), (after, rate_after, _) = (
@@ -34,12 +34,12 @@ def test_derivatives_are_those_of_the_value(polynomial, amplitude, frequency, sw
 
 @given(st.lists(st.floats(0.01, 5.0), min_size=1, max_size=20), st.floats(-1.0, 60.0))
 @settings(deadline=None)
-def test_search_agrees_with_numpy(durations, t):
+def test_search_matches_numpy(durations, t):
     times = np.cumsum([0.0, *durations])
     assert last_not_after(times, t) == max(np.searchsorted(times, t, side="right") - 1, 0)
 
 
-def test_a_joint_belongs_to_the_piece_that_begins():
+def test_joint_belongs_to_the_later_piece():
     c = channel(Piece(1.0, (0.0, 1.0)), Piece(1.0, (5.0, -2.0)), Piece(0.0, (3.0,)))
     assert channel_at(c, 1.0) == (5.0, -2.0, 0.0)
     assert channel_at(c, np.nextafter(1.0, 0.0))[1] == 1.0
@@ -47,7 +47,7 @@ def test_a_joint_belongs_to_the_piece_that_begins():
     assert channel_at(c, 99.0) == (3.0, 0.0, 0.0)
 
 
-def test_reference_is_displaced_by_the_origin():
+def test_reference_is_offset_by_the_origin():
     ramp, still = channel(Piece(9.0, (0.0, 1.0))), channel(Piece(0.0, (0.0,)))
     p = Parameters(ramp, still, still, ramp, np.array([0.0, 2.0]), np.zeros(2), (1.0, 2.0, 3.0), 0.5)
     r = evaluate(p, 4.0)

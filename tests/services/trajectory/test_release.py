@@ -1,4 +1,4 @@
-"""A phase lets the payload go while the vehicle stands, not before."""
+"""Payload release by trajectory phases."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def height(to):
     return {"kind": "minimum_jerk", "to": to, "duration": 3.0}
 
 
-def test_a_payload_is_kept_in_the_air_and_let_go_on_the_ground():
+def test_payload_is_released_only_on_the_ground():
     phases = [
         {"name": "climb", "z": height(1.0)},
         {"name": "hover", "duration": 3.0, "release": True},

@@ -1,4 +1,4 @@
-"""CSV files of points: read, or refused with their line."""
+"""CSV files of points."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from lapwing.services.trajectory.table_file import parse
 FILE = Path("points.csv")
 
 
-def test_points_are_read():
+def test_csv_points_are_read():
     assert parse("time , value\n0,1\n2,5e-1\n", FILE) == [[0.0, 1.0], [2.0, 0.5]]
 
 
@@ -27,7 +27,7 @@ def test_points_are_read():
         ("time,value\n0,1\n0,2\n", "points.csv:3: expected times that start at 0 and ascend"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(text, message):
+def test_invalid_csv_is_rejected_with_its_line(text, message):
     with pytest.raises(SceneError) as error:
         parse(text, FILE)
     assert str(error.value).startswith(message)

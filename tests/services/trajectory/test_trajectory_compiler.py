@@ -29,11 +29,11 @@ TURN = math.pi / 2 / 0.3
 
 
 def compile(tables: dict, *origin) -> CompiledTrajectory:
-    """A trajectory from the tables of a scene."""
+    """Compile the trajectory of scene tables."""
     return trajectory_compiler.compile(Phases.model_validate(tables), *origin)
 
 
-def test_delivery_mission_is_at_each_corner_when_it_should_be():
+def test_delivery_mission_reaches_corners_on_time():
     parameters, phases, duration, _ = compile({"phase": DELIVERY}, (0.0, 0.0, 0.35))
     assert phases == tuple(phase["name"] for phase in DELIVERY)
     assert duration == pytest.approx(60.0 + TURN, abs=1e-12)
@@ -50,7 +50,7 @@ def test_delivery_mission_is_at_each_corner_when_it_should_be():
     assert (end.position_world, end.yaw, end.velocity_world) == ((10.0, 10.0, 0.35), math.pi / 2, (0.0, 0.0, 0.0))
 
 
-def test_a_phase_lasts_as_long_as_its_longest_channel_and_the_others_hold():
+def test_phase_lasts_as_long_as_its_longest_channel():
     phase = {
         "name": "both",
         "x": {"kind": "ramp", "to": 1.0, "duration": 2.0},
@@ -62,7 +62,7 @@ def test_a_phase_lasts_as_long_as_its_longest_channel_and_the_others_hold():
     assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
 
 
-def test_a_step_is_a_jump_that_takes_no_time():
+def test_step_jumps_in_no_time():
     parameters, _, duration, _ = compile(
         {"phase": [{"name": "a", "duration": 1.0}, {"name": "b", "x": {"kind": "step", "to": 2.0}}]}
     )
@@ -88,7 +88,7 @@ SEGMENTS = st.one_of(
 
 @given(st.lists(st.tuples(SEGMENTS, SEGMENTS), min_size=1, max_size=6))
 @settings(deadline=None, max_examples=60)
-def test_everything_but_a_step_joins_continuously(pairs):
+def test_segments_except_step_are_continuous(pairs):
     phases = [{"name": str(k), "x": list(pair), "duration": 7.0} for k, pair in enumerate(pairs)]
     parameters, *_ = compile({"phase": phases})
     assert all(np.diff(parameters.x.start) > 0.0)
@@ -101,7 +101,7 @@ def test_everything_but_a_step_joins_continuously(pairs):
     [
         (
             {"phase": [{"name": "a", "duration": 1.0, "z": RAMP}]},
-            "trajectory.phase.0.duration: expected not less than its segments last, 10 s, got 1 s in phase 'a'",
+            "trajectory.phase.0.duration: expected at least the duration of its segments, 10 s, got 1 s in phase 'a'",
         ),
         (
             {"phase": [{"name": "a", "x": [RAMP, {"kind": "table", "points": [[0.0, 3.0], [1.0, 4.0]]}]}]},
@@ -109,7 +109,7 @@ def test_everything_but_a_step_joins_continuously(pairs):
         ),
     ],
 )
-def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
+def test_inconsistent_phases_are_rejected(spec, message):
     with pytest.raises(ConfigError, match=r"\A[^\n]+\Z") as error:
         compile(spec)
     assert message in str(error.value)
@@ -137,20 +137,23 @@ def test_what_does_not_fit_together_is_said_in_one_line(spec, message):
             "trajectory.phase.0.z=[{kind='hold', duration=-1}]",
             "phase.0.z.0.duration: expected a number above 0 [s], got -1",
         ),
-        ("trajectory.phase.0.z={kind='ramp', to=1.0}", "either rate or duration"),
+        ("trajectory.phase.0.z={kind='ramp', to=1.0}", "exactly one of rate and duration"),
         ("trajectory.phase.0.q=1.0", "trajectory.phase.0.q"),
         ("trajectory.phase.0.name=hover", "two phases are named 'hover'"),
-        ("trajectory.phase.0.duration=1.0", "expected not less than its segments last, 3 s, got 1 s in phase 'climb'"),
+        (
+            "trajectory.phase.0.duration=1.0",
+            "expected at least the duration of its segments, 3 s, got 1 s in phase 'climb'",
+        ),
         ("trajectory.phase.0.z={kind='ramp', to=inf, rate=1.0}", "finite"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(override, message):
+def test_invalid_trajectory_key_is_rejected_in_one_line(override, message):
     with pytest.raises(SceneError, match=r"\A--set trajectory[^\n]+\Z") as error:
         load("hover", [override])
     assert message in str(error.value)
 
 
-def test_the_last_landing_is_known():
+def test_final_phase_follows_the_last_flight():
     up = {"name": "up", "z": {"kind": "ramp", "to": 2.0, "rate": 1.0}}
     down = {"name": "down", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}}
     again = [{**up, "name": "up again"}, {**down, "name": "down again"}, {"name": "stand", "duration": 1.0}]

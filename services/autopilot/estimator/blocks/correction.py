@@ -1,4 +1,4 @@
-"""The readings of a barometer, a magnetometer, a distance or optical flow: each kind has its update of the filter."""
+"""Fusion of barometer, magnetometer, distance and optical flow readings."""
 
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ Reading = BarometerReading | DistanceReading | MagnetometerReading | OpticalFlow
 
 
 class Correction(NamedTuple):
-    """The filter."""
+    """Parameters of the block."""
 
     filter: Estimator
 
@@ -42,7 +42,7 @@ def _flow(p: Estimator, x: State, r: OpticalFlowReading) -> State:
 
 
 UPDATES = DispatchTable()
-"""The compiled update of the filter by the class of a reading."""
+"""Filter update by reading class."""
 UPDATES[BarometerReading] = _barometer
 UPDATES[MagnetometerReading] = _magnetometer
 UPDATES[DistanceReading] = _distance
@@ -50,7 +50,7 @@ UPDATES[OpticalFlowReading] = _flow
 
 
 def update(p: Estimator, x: State, r: Reading) -> State:
-    """The filter's state after a reading; in compiled code only."""
+    """Return the filter's state after a reading; compiled code only."""
     raise NotImplementedError("compiled code only")
 
 
@@ -63,7 +63,7 @@ def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
 def step(
     p: Correction, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
-    """Correct by the reading of the tick."""
+    """Correct the filter by the reading of the tick."""
     x = s.filter
     if s.begun:
         x = update(p.filter, x, inputs[0].value)

@@ -1,4 +1,4 @@
-"""The estimate of the tick, and whether the commander has to look at it."""
+"""Output of the estimate and wake-up of the commander."""
 
 from typing import NamedTuple
 
@@ -12,18 +12,18 @@ from lapwing.services.common.ports import StateEstimate
 
 
 class FilterEstimate(NamedTuple):
-    """The filter, and what calls the commander."""
+    """Parameters of the block."""
 
     filter: Estimator
     attention: WakeupParameters
-    before: StateEstimate  # the filter has begun
+    before: StateEstimate  # output until the filter has started
 
 
 @always_inline
 def step(
     p: FilterEstimate, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[StateEstimate], int]:
-    """What the filter says at `tick`."""
+    """Output the estimate at `tick`."""
     battery, flight = inputs
     e = estimator.estimate(p.filter, s.filter) if s.begun else p.before
     due = attention_due(p.attention, tick, e.health, battery, flight)

@@ -1,4 +1,4 @@
-"""The readings of the satellite receiver: position, then velocity."""
+"""Fusion of satellite receiver readings: position, then velocity."""
 
 from typing import NamedTuple
 
@@ -10,18 +10,18 @@ from lapwing.services.autopilot.estimator.blocks.navigation_state import Navigat
 
 
 class GpsFusion(NamedTuple):
-    """The filter, and how late the receiver is."""
+    """Parameters of the block."""
 
     filter: Estimator
-    age: int  # of a reading when it arrives, in IMU readings
-    height_variance: float  # [m^2] by which its height is doubted: 0 where it is the reference
+    age: int  # delay of a reading, in IMU readings
+    height_variance: float  # [m^2] added to its height; 0 if it is the height reference
 
 
 @always_inline
 def step(
     p: GpsFusion, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
-    """Correct by the reading of the tick."""
+    """Correct the filter by the reading of the tick."""
     r, x = inputs[0].value, s.filter
     if s.begun:
         east, north, up = r.position_variance

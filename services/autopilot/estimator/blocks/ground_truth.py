@@ -1,4 +1,4 @@
-"""The truth as an estimate without error and without bias."""
+"""Ground truth as an estimate without error."""
 
 from typing import Any, NamedTuple
 
@@ -10,14 +10,14 @@ from lapwing.services.common.ports import StateEstimate
 
 
 class TrueEstimate(NamedTuple):
-    """What calls the commander."""
+    """Parameters of the block."""
 
     attention: WakeupParameters
 
 
 @always_inline
 def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
-    """The true state at `tick`; it has no state of its own."""
+    """Output the true state at `tick`; the block's state is unused."""
     truth, battery, flight = inputs
     x = truth.value
     e = StateEstimate(

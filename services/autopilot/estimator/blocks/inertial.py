@@ -1,4 +1,4 @@
-"""The IMU's readings: the filter begins with them where the vehicle stands still, and is carried on by them."""
+"""Start of the filter at rest and prediction by IMU readings."""
 
 import math
 from typing import NamedTuple
@@ -11,23 +11,23 @@ from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
 from lapwing.services.autopilot.land_detector import ON_GROUND
 
-STANDSTILL_RATIO = 0.02  # ratio by which the specific force of a vehicle at rest may differ from gravity
-STANDSTILL_EVERY = 10  # readings between two corrections by a vehicle that is known to stand
+STANDSTILL_RATIO = 0.02  # relative difference of specific force and gravity at rest
+STANDSTILL_EVERY = 10  # IMU readings between two zero-velocity updates
 
 
 class InertialNavigation(NamedTuple):
-    """The filter, and where it begins."""
+    """Parameters of the block."""
 
     filter: Estimator
     start_world: Vec3  # [m]
-    standstill_every: int  # ticks between two corrections by a vehicle that is known to stand
+    standstill_every: int  # [ticks] between two zero-velocity updates
 
 
 @always_inline
 def step(
     p: InertialNavigation, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
-    """Begin once the vehicle is level and the compass has been read; then predict to `tick`."""
+    """Start once the vehicle is at rest with a magnetometer reading; then predict to `tick`."""
     imu, magnetometer, flight = inputs
     r, begun, x = imu.value, s.begun, s.filter
     if not begun:

@@ -1,4 +1,4 @@
-"""The state that the parts of the navigation share."""
+"""State that the estimator blocks share."""
 
 from typing import NamedTuple
 
@@ -8,14 +8,14 @@ from lapwing.services.autopilot.estimator.filter_state import Inertial, Nominal,
 
 
 class NavigationState(NamedTuple):
-    """The filter, once it has begun."""
+    """The filter and a flag for its start."""
 
     begun: bool
-    filter: State  # means nothing before
+    filter: State  # undefined before the start
 
 
 def blank() -> NavigationState:
-    """Before the first reading."""
+    """Return the state before the first reading."""
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False)
     return NavigationState(False, State(nominal, inertial, new_memory()))

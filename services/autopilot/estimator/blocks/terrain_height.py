@@ -1,4 +1,4 @@
-"""The readings of the sonar where it is the reference of the height, which then is that above the ground."""
+"""Fusion of the sonar as height reference, which makes the height one above ground."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from lapwing.services.autopilot.estimator.blocks.navigation_state import Navigat
 
 
 class GroundReference(NamedTuple):
-    """The filter; it takes the sonar at any height."""
+    """Parameters of the block; the filter accepts the sonar at any height."""
 
     filter: Estimator
 
@@ -20,7 +20,7 @@ class GroundReference(NamedTuple):
 def step(
     p: GroundReference, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[NavigationState, tuple[()], int]:
-    """Correct by the reading of the tick."""
+    """Correct the filter by the reading of the tick."""
     r, x = inputs[0].value, s.filter
     if s.begun:
         if r.valid and not math.isinf(r.range):

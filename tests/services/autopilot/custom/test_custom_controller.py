@@ -207,5 +207,5 @@ def test_a_module_that_is_not_there_is_reported_with_the_line_of_the_scene(tmp_p
         load(path)
     with pytest.raises(ConfigError, match='"module:Name"'):
         load(HOVER, ["autopilot.controller=my_module"])
-    with pytest.raises(ConfigError, match="nobody to take them"):
+    with pytest.raises(ConfigError, match="controller_options"):
         load(HOVER, ["autopilot.controller_options.a=1.0"])

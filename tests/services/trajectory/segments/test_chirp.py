@@ -7,7 +7,7 @@ from lapwing.services.trajectory.polynomial_piece import Channel, channel_at
 from lapwing.services.trajectory.segments import KINDS
 
 
-def test_frequency_rises_linearly_from_first_to_last():
+def test_chirp_frequency_sweeps_linearly():
     chirp = KINDS["chirp"](amplitude=0.5, first_frequency=0.2, last_frequency=3.0, duration=10.0)
     (piece,) = chirp.pieces(1.0)
     t = np.linspace(0.0, 10.0, 2001)

@@ -5,7 +5,7 @@ from lapwing.services.trajectory.polynomial_piece import Channel, channel_at
 from lapwing.services.trajectory.segments import KINDS
 
 
-def test_it_starts_and_ends_at_rest_and_peaks_halfway():
+def test_segment_starts_and_ends_at_rest():
     segment = KINDS["smoothstep"](to=-1.0, duration=2.0)
     (piece,) = segment.pieces(3.0)
     channel = Channel(np.array([0.0]), np.array([piece.row()]))
