@@ -16,7 +16,7 @@ class FormationLaw(NamedTuple):
     """Parameters of the control law."""
 
     formation: CooperativeLoadParameters
-    interval: float  # [s] a tick
+    interval: float  # [s] length of a tick
 
 
 @always_inline
