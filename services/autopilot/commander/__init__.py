@@ -1,6 +1,5 @@
-"""What the vehicle is to do now: flight modes, missions, failsafes, and the operator's commands.
+"""The commander: flight modes, missions, failsafes and operator commands.
 
-`Commander.step` turns a frozen `View` of a tick into a frozen `Request`; what it remembers is a `State` of plain data.
-Imports go one way: view, guidance, modes, state and request, then transitions, checks, failsafes and command handlers,
-then the commander.
+`Commander.step` turns a `CommanderInput` into a `CommanderOutput`; its `State` is plain data. Imports go one way:
+input, guidance, modes, state and output, then transitions, checks, failsafes and command handlers, then the commander.
 """

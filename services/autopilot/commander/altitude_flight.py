@@ -1,4 +1,4 @@
-"""Flight without a position: an altitude, a heading, and tilts; what leans against the wind stays."""
+"""Setpoints of altitude, heading and tilts, for flight without a position."""
 
 import math
 
@@ -9,7 +9,7 @@ from lapwing.services.autopilot.interface import Setpoint
 
 
 class AltitudeFlight:
-    """Moves altitude and heading; horizontally, the controller is told that it is where it wants to be."""
+    """Moves altitude and heading; the horizontal setpoint is the estimate, so the wind integral is kept."""
 
     def __init__(self, guidance: Guidance):
         s = guidance.smoothing
@@ -17,7 +17,7 @@ class AltitudeFlight:
 
     @property
     def altitude(self) -> float:
-        """World z of the setpoint [m]."""
+        """Setpoint of world z [m]."""
         return self._smoothing.position[2]
 
     def step(
@@ -29,12 +29,12 @@ class AltitudeFlight:
         yaw_rate: float,
         tilts: tuple[float, float],
     ) -> Setpoint:
-        """One tick.
+        """Return the setpoint of a tick and move `guidance` to it.
 
         Args:
-            constants: of the vehicle.
-            view: of the tick, with the estimate of the same tick.
-            guidance: goes along, for the mode that follows.
+            constants: constants of the vehicle.
+            view: input with the estimate of this tick.
+            guidance: guidance.
             climb_rate: vertical speed [m/s].
             yaw_rate: [rad/s].
             tilts: forward and to the left [rad].

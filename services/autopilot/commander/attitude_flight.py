@@ -1,4 +1,4 @@
-"""Flight by attitude: tilts and a thrust as what the controller makes them of, accelerations that it feeds forward."""
+"""Setpoints of attitude and thrust, expressed as feed-forward accelerations."""
 
 import math
 
@@ -14,26 +14,26 @@ LEAST_THRUST = 0.08  # over the maximum at the lower end of the stick, PX4's MPC
 
 
 def stick_thrust(constants: Constants, up: float) -> float:
-    """Thrust over the maximum of a throttle stick from -1 to 1; in the middle the vehicle hovers (MPC_THR_CURVE 0)."""
+    """Return thrust over maximum thrust for a throttle stick of -1..1 with hover in the middle (MPC_THR_CURVE 0)."""
     least, hover = min(LEAST_THRUST, constants.hover_thrust), constants.hover_thrust
     return hover + up * ((1.0 - hover) if up > 0.0 else (hover - least))
 
 
 class AttitudeFlight:
-    """Makes setpoints of attitudes, turned on by body rates where those are given; what leans on the wind stays."""
+    """Converts attitudes and body rates into setpoints; the wind integral is kept."""
 
     def __init__(self, view: CommanderInput):
-        """From the attitude [rad] that the vehicle has."""
+        """Start from the estimated attitude."""
         self.roll, self.pitch, self.yaw = to_roll_pitch_yaw(view.estimate.attitude)
         self._altitude = view.estimate.position_world[2]
 
     def turn(self, rates_body: Vec3, guidance: Guidance, dt: float) -> None:
-        """Turn the attitude on at body rates [rad/s] for a tick of dt [s], up to the maximum tilt."""
+        """Rotate the attitude at body rates [rad/s] for dt [s], up to the maximum tilt."""
         q = retract(from_roll_pitch_yaw(self.roll, self.pitch, self.yaw), tuple(dt * rate for rate in rates_body))
         self.take(q, guidance)
 
     def take(self, attitude: Quaternion, guidance: Guidance) -> None:
-        """Another attitude, tilted no further than is allowed."""
+        """Set the attitude, limited to the maximum tilt."""
         limit = math.radians(guidance.parameters["MPC_TILTMAX_AIR"])
         roll, pitch, self.yaw = to_roll_pitch_yaw(attitude)
         self.roll, self.pitch = (max(-limit, min(limit, angle)) for angle in (roll, pitch))
@@ -47,12 +47,12 @@ class AttitudeFlight:
         thrust: float,
         climb_rate: float,
     ) -> Setpoint:
-        """The setpoint of the present attitude.
+        """Return the setpoint of the present attitude and move `guidance` to it.
 
         Args:
-            constants: of the vehicle.
-            view: of the tick, with the estimate of the same tick.
-            guidance: goes along, for the mode that follows.
+            constants: constants of the vehicle.
+            view: input with the estimate of this tick.
+            guidance: guidance.
             yaw_rate: of the attitude [rad/s].
             thrust: over the maximum; NaN: the altitude changes at the climb rate.
             climb_rate: [m/s].
@@ -61,7 +61,7 @@ class AttitudeFlight:
         (x, y, z), (vx, vy, vz) = e.position_world, e.velocity_world
         s, c = math.sin(self.yaw), math.cos(self.yaw)
         forward, left = g * self.pitch, -g * self.roll
-        if thrust > constants.hover_thrust or climb_rate > 0.0:  # what stands is asked to leave the ground
+        if thrust > constants.hover_thrust or climb_rate > 0.0:  # makes a vehicle on the ground take off
             z, vz = max(z, constants.resting_height + CUT_HEIGHT), max(vz, _RISING)
         if math.isnan(thrust):
             self._altitude = max(self._altitude, constants.resting_height) + view.dt * climb_rate

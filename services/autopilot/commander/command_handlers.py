@@ -1,4 +1,4 @@
-"""The operator's commands: what each kind does. A refusal is a ValueError (one line), acknowledged and spoken."""
+"""Handlers of operator commands. A ValueError (one line) rejects a command with an acknowledgement and status text."""
 
 import math
 from collections.abc import Callable
@@ -14,16 +14,16 @@ from lapwing.services.common import status_texts
 
 Handler = Callable[[Context, Any], None]
 HANDLERS: dict[str, Handler] = {}
-"""What is done for each kind of command."""
+"""Handler by kind of command."""
 STREAMS = ("manual", "link", "offboard_position", "offboard_attitude", "offboard_motors")  # not acknowledged
 
 
 class Denied(ValueError):
-    """Refused for good: the command makes no sense, now or later."""
+    """Permanent rejection of an invalid command."""
 
 
 def handles(*kinds: str) -> Callable[[Handler], Handler]:
-    """Declare what commands of these kinds do."""
+    """Register the handler of these kinds of commands."""
 
     def declare(function: Handler) -> Handler:
         HANDLERS.update(dict.fromkeys(kinds, function))
@@ -33,7 +33,7 @@ def handles(*kinds: str) -> Callable[[Handler], Handler]:
 
 
 def handle(context: Context, command: Any) -> None:
-    """Do what a command asks, and acknowledge it."""
+    """Execute a command and acknowledge it."""
     outbox = context.outbox
     handler = HANDLERS.get(command.kind)
     if handler is None:
@@ -59,7 +59,7 @@ def _present_value(context: Context, command: Any) -> float:
 
 @handles("arm")
 def arm(context: Context, command: Any) -> None:
-    """Values: 1 to arm whatever the checks say; how long [s] to wait for them."""
+    """Arm. Values: 1 to skip the pre-arm checks; time [s] to wait for them."""
     if context.state.guidance.armed:
         return
     if reasons := prearm_checks.reasons(context.view, context.state):
@@ -75,7 +75,7 @@ def arm(context: Context, command: Any) -> None:
 
 @handles("disarm")
 def disarm(context: Context, command: Any) -> None:
-    """Values: 1 to disarm also in the air."""
+    """Disarm. Values: 1 to allow it in the air."""
     state = context.state
     if not state.guidance.armed:
         return
@@ -111,7 +111,7 @@ def mission_start(context: Context, command: Any) -> None:
 
 @handles("manual")
 def manual(context: Context, command: Any) -> None:
-    """Sticks, which the modes position_control and altitude_control listen to."""
+    """Store the sticks of the manual modes."""
     sticks = [max(-1.0, min(1.0, value(command.values, k))) for k in range(4)]
     inputs = context.state.guidance.inputs
     inputs.sticks, inputs.sticks_age = tuple(0.0 if math.isnan(v) else v for v in sticks), 0.0
@@ -119,7 +119,7 @@ def manual(context: Context, command: Any) -> None:
 
 @handles("offboard_position", "offboard_attitude", "offboard_motors")
 def offboard(context: Context, command: Any) -> None:
-    """A setpoint, or the voltage of each motor [V]; the mode offboard is accepted only while they come."""
+    """Store an offboard setpoint, or the voltage of each motor [V]."""
     inputs, motors = context.state.guidance.inputs, context.constants.rotors
     inputs.offboard_refused = ""
     if any(math.isinf(v) for v in command.values):
@@ -133,14 +133,14 @@ def offboard(context: Context, command: Any) -> None:
 
 @handles("link")
 def link(context: Context, command: Any) -> None:
-    """A ground station is there."""
+    """Record the heartbeat of a ground station."""
     inputs = context.state.guidance.inputs
     inputs.linked, inputs.link_age = True, 0.0
 
 
 @handles("speed")
 def speed(context: Context, command: Any) -> None:
-    """Fly at another speed [m/s] until disarmed; NaN: at the parameter's."""
+    """Change the speed [m/s] until disarmed; NaN: the parameter's."""
     asked = value(command.values, 0)
     if not (0.0 < asked < math.inf or math.isnan(asked)):
         raise Denied(f"speed: expected one above 0 m/s, got {asked:g}")
@@ -149,7 +149,7 @@ def speed(context: Context, command: Any) -> None:
 
 @handles("parameter")
 def parameter(context: Context, command: Any) -> None:
-    """Change a parameter; the flying autopilot follows at once."""
+    """Change a parameter, effective at once."""
     known = context.constants.parameters.get(command.text)
     if known is None:
         raise Denied(f"unknown parameter {command.text}")
@@ -162,12 +162,12 @@ def parameter(context: Context, command: Any) -> None:
 
 @handles("finish")
 def finish(context: Context, command: Any) -> None:
-    """The run is over once the vehicle has flown and is disarmed."""
+    """End the run once the vehicle has flown and is disarmed."""
     context.state.finish_requested = True
 
 
 def denied_if_wrong(function: Callable, argument: Any) -> Any:
-    """The function's value; what it refuses is refused for good."""
+    """Return the function's value. Raise Denied instead of its ValueError."""
     try:
         return function(argument)
     except ValueError as error:

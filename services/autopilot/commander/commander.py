@@ -1,6 +1,6 @@
-"""The state machine between the operator and the controller: armed or not, flying or not, and in which mode.
+"""State machine between operator and controller: arming, take-off and landing, flight modes.
 
-Deterministic: it knows the views of its ticks and nothing else. Every time-out counts simulation time.
+It is deterministic: its output depends on its inputs only, and time-outs use simulation time.
 """
 
 import math
@@ -19,32 +19,32 @@ from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common import status_texts
 
-BLOCKED_TIME = 1.0  # [s] of sinking in vain after which the vehicle is on the ground
-LOW_THRUST = 0.5  # of the hovering thrust, below which the vehicle does not carry itself
+BLOCKED_TIME = 1.0  # [s] without descent at a descending setpoint, after which the vehicle is on the ground
+LOW_THRUST = 0.5  # fraction of the hover thrust below which the vehicle cannot fly
 LANDED_SPEED = 0.15  # [m/s]
 
 
 class Commander:
-    """What the vehicle is asked to do, from tick to tick."""
+    """The commander with its state."""
 
     def __init__(self, constants: Constants, state: State | None = None):
-        """Begin on the ground, disarmed, or go on from a state."""
+        """Start on the ground, disarmed, or from a state."""
         self.constants = constants
         self.state = state if state is not None else initial(constants)
 
     def initial_status(self) -> Status:
-        """What the vehicle is doing before the first tick."""
+        """Return the status before the first tick."""
         view = CommanderInput(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
         return status(self.constants, view, self.state)
 
     def skip(self, ticks: int, dt: float, flying: bool, setpoint: Setpoint | None) -> None:
-        """Take in ticks of a quiet request at which it was not called.
+        """Advance over ticks at which the output stayed valid and `step` was not called.
 
         Args:
-            ticks: how many.
-            dt: length of each [s].
-            flying: whether the vehicle flew at the last of them.
-            setpoint: of the scene's trajectory at the last of them at which it flew, None if it did at none.
+            ticks: number of ticks.
+            dt: length of a tick [s].
+            flying: the vehicle flew at the last of them.
+            setpoint: of the trajectory at the last of them in flight; None without flight.
         """
         guidance = self.state.guidance
         for _ in range(ticks):
@@ -54,8 +54,10 @@ class Commander:
             guidance.follow(setpoint)
 
     def step(self, view: CommanderInput) -> CommanderOutput:
-        """What is asked for at this tick. While a request is quiet it needs to be called only where something may
-        change (`quiet_time`); with an operator, whose commands see what `guidance` was before, `skip` comes first.
+        """Return the output of a tick.
+
+        While an output is valid, calls are only needed at wake-ups (`quiet_time`). With an operator, whose commands
+        read `guidance`, call `skip` first.
         """
         constants, state = self.constants, self.state
         context = Context(constants, view, state, OperatorMessages())
@@ -82,7 +84,7 @@ class Commander:
 
 
 def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
-    """What is to be followed, None for the scene's trajectory; whether it was made from the estimate."""
+    """Return the setpoint, None for the scene's trajectory, and True if it was computed from the estimate."""
     constants, view, state, _ = context
     guidance = state.guidance
     if state.on_trajectory:
@@ -113,7 +115,7 @@ def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
 
 
 def _detect_landing(context: Context) -> None:
-    """Notice the ground: the controller did, or the vehicle does not sink although nothing carries it."""
+    """Detect the ground: motors cut by the controller, or no descent at low thrust."""
     view, state, guidance = context.view, context.state, context.state.guidance
     still = abs(view.estimate.velocity_world[2]) < LANDED_SPEED
     blocked = guidance.smoothing.velocity[2] < -0.2 and still and view.thrust < LOW_THRUST
@@ -124,10 +126,10 @@ def _detect_landing(context: Context) -> None:
 
 
 def _disarm_when_idle(context: Context) -> None:
-    """Disarm what has been armed on the ground for long."""
+    """Disarm after a time-out on the ground."""
     view, state, guidance = context.view, context.state, context.state.guidance
     amid_mission = guidance.has_flown and state.mode_name == "mission" and guidance.route.item is not None
-    waits = guidance.armed and not guidance.flying and not amid_mission  # PX4's too: the next item may take off
+    waits = guidance.armed and not guidance.flying and not amid_mission  # as in PX4: the next item may take off
     state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
@@ -135,7 +137,7 @@ def _disarm_when_idle(context: Context) -> None:
 
 
 def _retry_arming(context: Context) -> None:
-    """Arm once the checks allow it, as long as the command is to wait for them."""
+    """Arm when the checks pass, within the waiting time of the command."""
     view, state, outbox = context.view, context.state, context.outbox
     if state.pending_arm is None:
         return

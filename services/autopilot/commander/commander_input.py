@@ -1,4 +1,4 @@
-"""What the commander is told: the constants of a vehicle, once, and a view of each tick."""
+"""Inputs of the commander: constants of a vehicle and inputs of a tick."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,32 +12,32 @@ POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
 
 
 class Constants(NamedTuple):
-    """What does not change during a run."""
+    """Constants of a run."""
 
     parameters: Mapping[str, Parameter]  # by name
     resting_height: float  # world z of the vehicle on the ground [m]
     gravity: float  # [m/s^2]
-    hover_thrust: float  # thrust of hovering over the maximum thrust
-    has_trajectory: bool  # the run begins along the scene's own trajectory
-    has_operator: bool  # somebody may give commands
+    hover_thrust: float  # over the maximum thrust
+    has_trajectory: bool  # the run starts along the scene's trajectory
+    has_operator: bool  # commands are accepted
     failing: tuple[str, ...] = ()  # units whose failures may be injected
     rotors: int = 4
 
 
 class CommanderInput(NamedTuple):
-    """All that the commander is told at one tick."""
+    """Inputs of a tick."""
 
     dt: float  # length of the tick [s]
-    estimate: StateEstimate  # the newest that the commander was shown
-    estimate_interval: float  # from the one shown before to this one, where it is new at this tick, else 0 [s]
-    battery_charge: float  # fraction; NaN: not known
+    estimate: StateEstimate  # the newest one passed to the commander
+    estimate_interval: float  # [s] since the previous one, 0 if it is not new at this tick
+    battery_charge: float  # fraction; NaN: unknown
     failed_motor: int  # its number, from 1; 0: none
     setpoint: Setpoint | None  # of the scene's trajectory; None without one
-    thrust: float  # asked for by the controller at the last tick, over that of hovering
-    motors_cut: bool  # the controller has cut the motors off after a landing
-    commands: tuple[Any, ...] = ()  # the operator's, as `OperatorCommand` messages, in their order
+    thrust: float  # commanded at the last tick, over the hover thrust
+    motors_cut: bool  # by the controller after a landing
+    commands: tuple[Any, ...] = ()  # `OperatorCommand` messages in order
 
     @property
     def position_lost(self) -> bool:
-        """Whether the estimate is not to be trusted as to where the vehicle is."""
+        """True if the estimated position is not reliable."""
         return bool(self.estimate.health & POSITION_LOST)

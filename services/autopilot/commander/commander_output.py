@@ -1,4 +1,4 @@
-"""What the commander asks for in return."""
+"""Outputs of the commander."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,44 +10,42 @@ from lapwing.services.common.failure_types import Faults
 
 
 class Status(NamedTuple):
-    """What the vehicle is doing, as far as the commander decides it."""
+    """Status of the vehicle from the commander."""
 
     mode: str
-    phase: str  # part of the mode; "" while the scene's trajectory is followed, which has phases of its own
-    armed: bool  # once the trajectory was left; while it is followed, the controller's stage says it
-    finished: bool  # the run is over; on the trajectory the controller says it
-    failsafe: str  # reason of the failsafe in force; "": none
-    mission_current: int  # item that is flown
+    phase: str  # part of the mode; "" along the scene's trajectory, which has its own phases
+    armed: bool  # False along the trajectory, where the land detector decides
+    finished: bool  # the run is over; False along the trajectory, where the controller decides
+    failsafe: str  # reason of the active failsafe; "": none
+    mission_current: int  # index of the current item
     mission_count: int
-    mission_reached: int  # the last item that was reached
-    mission_state: int  # as MAVLink's MISSION_STATE numbers it
-    offboard_fresh: bool  # setpoints from outside are coming
-    prearm: tuple[str, ...]  # why it cannot be armed; to be left out while the motors run on the trajectory
+    mission_reached: int  # index of the last reached item
+    mission_state: int  # MISSION_STATE of MAVLink
+    offboard_fresh: bool  # offboard setpoints are available
+    prearm: tuple[str, ...]  # arming blockers; ignored while the motors run along the trajectory
     home: tuple[float, float, float]  # world x, y, and height of the ground [m]
-    released: bool  # the gripper is to be open
+    released: bool  # open the gripper
     battery_warning: int  # 0 none, 1 low, 2 critical, 3 nearly empty
 
 
 class CommanderOutput(NamedTuple):
-    """All that the commander asks for at one tick."""
+    """Outputs of a tick."""
 
-    setpoint: Setpoint | None  # to be followed; None: the scene's trajectory
-    parameters: Mapping[str, float] | None  # values of all, where one has changed
-    faults: Faults | None  # that are injected, where one has changed
-    acknowledgements: tuple[Any, ...]  # of commands, as `CommandAck` messages
-    texts: tuple[str, ...]  # for the operator
-    reset_controller: bool  # the vehicle is on the ground: the controller must be as before a flight
-    estimate_every_tick: bool  # the setpoint was made from the estimate: show a new one at the next tick
-    motor_voltage: (
-        tuple[float, ...] | None
-    )  # of each motor, in the place of the controller's [V]; None: the controller's
+    setpoint: Setpoint | None  # None: the scene's trajectory
+    parameters: Mapping[str, float] | None  # all values, if one has changed
+    faults: Faults | None  # injected failures, if one has changed
+    acknowledgements: tuple[Any, ...]  # `CommandAck` messages
+    texts: tuple[str, ...]  # status texts for the operator
+    reset_controller: bool  # the vehicle is on the ground
+    estimate_every_tick: bool  # the setpoint depends on the estimate: pass a new one at the next tick
+    motor_voltage: tuple[float, ...] | None  # direct voltages [V]; None: the controller's
     status: Status
-    quiet: float  # [s] from this tick on in which every request would be this one (`attention.quiet_time`)
+    quiet: float  # [s] for which the output stays valid (`wakeup_conditions.quiet_time`)
 
 
 @dataclass
 class OperatorMessages:
-    """What is to be told at one tick, while it is collected."""
+    """Messages of a tick for the operator, and changed parameters and failures."""
 
     acknowledgements: list[Any] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
@@ -55,9 +53,9 @@ class OperatorMessages:
     faults: Faults | None = None
 
     def say(self, text: str) -> None:
-        """Tell the operator."""
+        """Send a status text."""
         self.texts.append(text)
 
     def acknowledge(self, command: Any, result: int, text: str = "", value: float = 0.0) -> None:
-        """Tell whoever gave a command what became of it."""
+        """Send the acknowledgement of a command."""
         self.acknowledgements.append(CommandAck(command.source, command.id, result, float(result == 0), text, value))

@@ -1,4 +1,4 @@
-"""What the commander remembers from tick to tick: plain data, to be copied or pickled."""
+"""State of the commander: plain data that can be copied or pickled."""
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -11,47 +11,47 @@ from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
 from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.common.failure_types import SOUND, Faults
 
-TRAJECTORY_MODE = "mission"  # how the flight along the scene's own trajectory is called
+TRAJECTORY_MODE = "mission"  # mode name along the scene's trajectory
 
 
 class PendingArm(NamedTuple):
-    """A command to arm that waits for the checks."""
+    """An arm command that waits for the pre-arm checks."""
 
     command: Any  # an `OperatorCommand`
     time_left: float  # [s]
 
 
 class FailsafeTimer(NamedTuple):
-    """A failsafe condition that holds."""
+    """Timer of an active failsafe condition."""
 
-    elapsed: float  # since it began [s]
-    acted: bool  # it has taken over
+    elapsed: float  # [s]
+    acted: bool  # the failsafe action was taken
 
 
 @dataclass
 class State:
-    """The commander's memory."""
+    """State of the commander."""
 
     guidance: Guidance
     mode_name: str
-    mode: FlightMode | None  # None: the scene's own trajectory is followed
-    failsafe: str = ""  # reason of the failsafe in force
-    failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # by reason, of the conditions that hold
-    source_outage: list[float] = field(default_factory=lambda: [0.0] * len(SOURCES))  # lost or refused for so long [s]
-    faults: Faults = field(default_factory=Faults)  # that are injected
+    mode: FlightMode | None  # None: the scene's trajectory
+    failsafe: str = ""  # reason of the active failsafe
+    failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # of active conditions, by reason
+    source_outage: list[float] = field(default_factory=lambda: [0.0] * len(SOURCES))  # [s] of lost or rejected sources
+    faults: Faults = field(default_factory=Faults)  # injected
     pending_arm: PendingArm | None = None
-    on_ground_time: float = 0.0  # armed, but not flying [s]
-    blocked_time: float = 0.0  # asked to sink without sinking [s]
-    finish_requested: bool = False  # the run is over with the next disarming
+    on_ground_time: float = 0.0  # [s] armed on the ground
+    blocked_time: float = 0.0  # [s] without descent at a descending setpoint
+    finish_requested: bool = False  # the next disarming ends the run
 
     @property
     def on_trajectory(self) -> bool:
-        """Whether the scene's own trajectory is followed."""
+        """True along the scene's trajectory."""
         return self.mode is None
 
 
 def initial(constants: Constants) -> State:
-    """Before the first tick: on the ground, disarmed."""
+    """Return the initial state: on the ground, disarmed."""
     values = {p.name: p.default for p in constants.parameters.values()}
     guidance = Guidance(values, PositionSmoothing((0.0, 0.0, constants.resting_height), 0.0))
     faults = Faults(motors=(SOUND,) * constants.rotors)

@@ -1,4 +1,4 @@
-"""The status words of the commander's state."""
+"""Status of the commander."""
 
 from lapwing.services.autopilot.commander import prearm_checks
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
@@ -9,7 +9,7 @@ from lapwing.services.autopilot.commander.wakeup_conditions import battery_thres
 
 
 def status(constants: Constants, view: CommanderInput, state: State) -> Status:
-    """What the vehicle is doing after a tick."""
+    """Return the status after a tick."""
     guidance, route = state.guidance, state.guidance.route
     armed = guidance.armed and not state.on_trajectory
     last_flight = not constants.has_operator or state.finish_requested
@@ -32,7 +32,7 @@ def status(constants: Constants, view: CommanderInput, state: State) -> Status:
 
 
 def mission_state(state: State) -> int:
-    """As MAVLink's MISSION_STATE numbers it."""
+    """Return the MISSION_STATE of MAVLink."""
     guidance, route = state.guidance, state.guidance.route
     if not route.items:
         return NO_MISSION

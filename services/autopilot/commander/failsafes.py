@@ -1,4 +1,4 @@
-"""What the vehicle does by itself when something is lost: hold, return, land or descend, as the parameters say."""
+"""Failsafes: hold, return, land or descend after a loss, by parameters."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,12 +10,12 @@ from lapwing.services.common import status_texts
 from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RETURN
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
-_SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never undoes a more severe one
-_WARNING_TIME = 1.0  # [s] a condition lasts before the operator is told what is to come
+_SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never replaces a more severe one
+_WARNING_TIME = 1.0  # [s] of a condition before the operator is warned
 
 
 class Failsafe(NamedTuple):
-    """A condition that has to last for a while, and the parameter that says what then happens."""
+    """A condition, its delay, and the parameter of its action."""
 
     reason: str
     holds: Callable[[CommanderInput, State], bool]
@@ -60,7 +60,7 @@ FAILSAFES = (
 
 
 def update(context: Context) -> None:
-    """Take over where a condition has lasted; each acts once until it is over."""
+    """Act on conditions that have lasted for their delay, once until they end."""
     view, state, parameters = context.view, context.state, context.state.guidance.parameters
     for failsafe in FAILSAFES:
         if not failsafe.holds(view, state):
@@ -78,19 +78,19 @@ def update(context: Context) -> None:
 
 
 def any_holds(context: Context) -> bool:
-    """Whether some condition holds, counted or not, or was counted and is not known to be over."""
+    """Return True if a condition holds or a timer is running."""
     view, state = context.view, context.state
     return bool(state.failsafe_timers) or any(failsafe.holds(view, state) for failsafe in FAILSAFES)
 
 
 def _act(context: Context, reason: str, mode: str | None) -> bool:
-    """Do what is to be done; whether that was possible in the present mode."""
+    """Take the action. Return True if the present mode allows it."""
     state = context.state
     if mode is None:
         context.outbox.say(reason)
         return True
     if mode == "descend" and state.guidance.inputs.sticks_fresh:
-        mode = "altitude_control"  # somebody who sees the vehicle holds the sticks: it is his
+        mode = "altitude_control"  # a pilot holds the sticks
     elif _severity(state) >= _SEVERITY.index(mode):
         return False
     state.failsafe = reason

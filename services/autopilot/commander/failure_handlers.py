@@ -1,4 +1,4 @@
-"""The operator's command to inject a failure."""
+"""Handler of the failure injection command."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,16 +11,16 @@ from lapwing.services.common.failure_types import KINDS, UNITS, Faults, possible
 
 ENABLE = "SYS_FAILURE_EN"
 LEVEL, THRESHOLDS = "SYS_FAIL_BAT_LVL", ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")  # for its values from 1 on
-BELOW = 0.01  # by which a wrong battery reports less than the threshold, as PX4's does
+BELOW = 0.01  # difference of a wrong battery's charge to the threshold, as in PX4
 
 
 @handles("inject_failure")
 def inject_failure(context: Context, command: Any) -> None:
-    """Values: number of the unit in UNITS, what is wrong with it, which of its instances (`_instances`)."""
-    given = [value(command.values, k) for k in range(4)]
-    if not (given[0] in range(len(UNITS)) and given[1] in range(len(KINDS))):
-        raise Denied("inject failure: expected a unit and what is wrong with it")
-    unit, kind = UNITS[int(given[0])], int(given[1])
+    """Inject a failure. Values: index in UNITS, failure type, number or bits of the instances (`_instances`)."""
+    values = [value(command.values, k) for k in range(4)]
+    if not (values[0] in range(len(UNITS)) and values[1] in range(len(KINDS))):
+        raise Denied("inject failure: expected a unit and a failure type")
+    unit, kind = UNITS[int(values[0])], int(values[1])
     constants, state, outbox = context.constants, context.state, context.outbox
     if not state.guidance.parameters[ENABLE]:
         raise Denied(f"inject failure: {ENABLE} is 0; set it to 1 first")
@@ -28,20 +28,20 @@ def inject_failure(context: Context, command: Any) -> None:
         raise Denied(f"inject failure: there is no {unit}")
     if kind not in possible(unit):
         raise Denied(f"inject failure: {refusal(unit)}")
-    numbers = _instances(unit, constants.rotors if unit == "motor" else 1, *given[2:])
+    numbers = _instances(unit, constants.rotors if unit == "motor" else 1, *values[2:])
     named = f" {', '.join(map(str, numbers))}" if len(numbers) < constants.rotors and unit == "motor" else ""
     if unit == "motor":
         state.faults = _with_motors(state.faults, kind, numbers)
     else:
-        found: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
-        state.faults = state.faults._replace(**found)
+        changes: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
+        state.faults = state.faults._replace(**changes)
     outbox.faults = state.faults
     outbox.say(f"injected: {unit}{named} {KINDS[kind]}")
 
 
 def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:
-    """Which of a unit's `count` instances, from 1: one by its number, all for 0; without a number those of the bits."""
-    if math.isnan(number) and bits > 0.0:  # as MAVLink has it; a NaN is not above 0
+    """Return the instance numbers, from 1 to `count`: one by its number, all for 0, or those of the bits."""
+    if math.isnan(number) and bits > 0.0:  # as in MAVLink; False for NaN
         last = math.frexp(bits)[1] if math.isfinite(bits) else math.inf
         asked = [last] if last > count else [k + 1 for k in range(count) if int(bits) >> k & 1]
     else:
@@ -53,11 +53,11 @@ def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:
 
 
 def _with_motors(faults: Faults, kind: int, numbers: Sequence[int]) -> Faults:
-    """The same where something is wrong with some motors."""
+    """Return the failures with a failure type of some motors."""
     motors = (kind if k in numbers else before for k, before in enumerate(faults.motors, start=1))
     return faults._replace(motors=tuple(motors))
 
 
 def _low_charge(parameters: Mapping[str, float]) -> float:
-    """The charge that a wrong battery reports, just below the threshold that LEVEL chooses."""
+    """Return the charge of a wrong battery, just below the threshold that LEVEL selects."""
     return max(0.0, parameters[THRESHOLDS[round(parameters[LEVEL]) - 1]] - BELOW)

@@ -1,4 +1,4 @@
-"""Where the vehicle may be: polygons and circles to stay in or out of; and rally points to return to."""
+"""Geofence of inclusion and exclusion polygons and circles; rally points."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ _POLYGONS, _CIRCLES = ("fence_inclusion", "fence_exclusion"), ("fence_circle_in"
 
 
 def _inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
-    """Whether a point is inside of a polygon: a ray from it crosses the outline an odd number of times."""
+    """Return True if a point is inside a polygon, by the even-odd rule."""
     odd = False
     for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
@@ -17,12 +17,16 @@ def _inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
 
 
 class Fence:
-    """The fence as it was uploaded."""
+    """The uploaded geofence."""
 
     def __init__(self, items: Sequence[Any] = ()):
-        """From items: a circle each, a polygon as many vertices as its first says; ValueError if they make no fence."""
+        """Create the fence from items: one per circle, and one per vertex of a polygon.
+
+        Raises:
+            ValueError: an item is invalid.
+        """
         self.count = len(items)
-        self.shapes: list[tuple[bool, Any]] = []  # whether to stay in, (x, y, radius) or corners
+        self.shapes: list[tuple[bool, Any]] = []  # True for inclusion; (x, y, radius) or corners
         left = list(items)
         while left:
             first = left[0]
@@ -46,7 +50,7 @@ class Fence:
             del left[:count]
 
     def allows(self, x: float, y: float) -> bool:
-        """Whether the vehicle may be at (x, y) [m] of the world."""
+        """Return True if the vehicle may be at world (x, y) [m]."""
         for stay_in, shape in self.shapes:
             if isinstance(shape, tuple):
                 within = math.hypot(x - shape[0], y - shape[1]) <= shape[2]
@@ -58,7 +62,7 @@ class Fence:
 
 
 def rally_points(items: Sequence[Any]) -> tuple[tuple[float, float, float], ...]:
-    """Places [m] to return to, from uploaded items; ValueError if one is none."""
+    """Return the rally points [m] of uploaded items. Raise ValueError if an item is invalid."""
     points = tuple((i.position.x, i.position.y, i.position.z) for i in items)
     if not all(math.isfinite(v) for point in points for v in point) or any(i.action != "rally" for i in items):
         raise ValueError("rally: expected points of the action rally at finite places")

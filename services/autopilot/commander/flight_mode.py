@@ -1,4 +1,4 @@
-"""What all modes have in common."""
+"""Base class of flight modes."""
 
 import math
 
@@ -9,37 +9,37 @@ from lapwing.services.autopilot.interface import Setpoint
 
 
 class FlightMode:
-    """One way to move the setpoint; what it remembers is plain data."""
+    """A flight mode, which moves the setpoint; its state is plain data."""
 
-    needs_flight = False  # whether it can only be entered in the air
-    needs_position = True  # whether it can only be entered while the vehicle knows where it is
-    next_mode: str | None = None  # to go on with, once this one has done its work
-    motor_voltage: tuple[float, ...] | None = None  # [V] for each motor, past the controller; None: the controller's
+    needs_flight = False  # can only be entered in flight
+    needs_position = True  # needs a known position
+    next_mode: str | None = None  # mode to enter when this one is done
+    motor_voltage: tuple[float, ...] | None = None  # direct voltages [V]; None: the controller's
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        """Entered with the values of the operator's command of its name; ValueError says why it cannot be."""
+        """Enter with the values of the operator's command. Raise ValueError if it cannot be entered."""
 
     @property
     def phase(self) -> str:
-        """What it does now, for people."""
+        """Text of the current part of the mode."""
         return ""
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Move the smoothed setpoint for one tick; or return another one, made from the estimate of this tick."""
+        """Move the smoothed setpoint for one tick, or return a setpoint computed from this tick's estimate."""
         return None
 
 
 def fill_in(position: Vec3, asked: Vec3) -> Vec3:
-    """The position asked for; a coordinate that was not given (NaN) is that of `position`."""
+    """Return `asked` with NaN coordinates replaced by those of `position`."""
     x, y, z = (p if math.isnan(a) else a for p, a in zip(position, asked, strict=True))
     return x, y, z
 
 
 def value(values: tuple[float, ...], index: int) -> float:
-    """A value of a command, NaN where it was not given."""
+    """Return a value of a command, NaN if it is missing."""
     return values[index] if index < len(values) else math.nan
 
 
 def vector(values: tuple[float, ...], index: int) -> Vec3:
-    """Three values of a command from `index` on, NaN where they were not given."""
+    """Return three values of a command from `index`, NaN if they are missing."""
     return value(values, index), value(values, index + 1), value(values, index + 2)

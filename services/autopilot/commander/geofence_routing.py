@@ -1,4 +1,4 @@
-"""A way round the fence: the shortest one over the corners of what is to be kept out of, and in."""
+"""Shortest path within the geofence, over the corners of its shapes (A*)."""
 
 import heapq
 import math
@@ -8,13 +8,13 @@ from lapwing.services.autopilot.commander.fence import Fence
 
 MARGIN = 2.0  # [m] kept from the fence
 CIRCLE_CORNERS = 12  # of the polygon around a circle
-MOST_CORNERS = 200  # that are looked at; a fence of more is not gone round
+MOST_CORNERS = 200  # a fence with more is not routed around
 
 Point = tuple[float, float]
 
 
 def way_round(fence: Fence, start: Point, goal: Point) -> list[Point]:
-    """Corners [m] of the way from a place to another, the goal included; the straight way where there is none."""
+    """Return the corners [m] of the path to the goal, including it; the straight path if there is no other."""
     if _free(fence, start, goal) or not fence.allows(*start) or not fence.allows(*goal):
         return [goal]
     corners = [corner for corner in _corners(fence) if fence.allows(*corner)]
@@ -48,7 +48,7 @@ def _unwound(points: Sequence[Point], before: dict[int, int], last: int) -> list
 
 
 def _corners(fence: Fence) -> Iterator[Point]:
-    """Points on either side of every corner of a polygon, and around every circle to be kept out of."""
+    """Yield points on both sides of every polygon corner and around every exclusion circle."""
     for stay_in, shape in fence.shapes:
         if isinstance(shape, list):
             for k, (x, y) in enumerate(shape):
@@ -64,7 +64,7 @@ def _corners(fence: Fence) -> Iterator[Point]:
 
 
 def _bisector(before: Point, corner: Point, after: Point) -> Point:
-    """Unit vector that halves the angle of a corner."""
+    """Return the unit bisector of a corner."""
     (ax, ay), (bx, by) = _unit(before, corner), _unit(after, corner)
     x, y = ax + bx, ay + by
     length = math.hypot(x, y)
@@ -77,7 +77,7 @@ def _unit(start: Point, end: Point) -> Point:
 
 
 def _free(fence: Fence, a: Point, b: Point) -> bool:
-    """Whether the straight way between two places keeps to the fence."""
+    """Return True if the straight path between two points respects the fence."""
     middle = 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])
     if not fence.allows(*middle):
         return False
@@ -99,7 +99,7 @@ def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:
 
 
 def _distance(point: Point, a: Point, b: Point) -> float:
-    """Distance of a point from the way between two others."""
+    """Return the distance of a point from a line segment."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = dx * dx + dy * dy
     share = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / square if square > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Guidance: what the flight modes see and change of what the commander remembers."""
+"""Guidance: the part of the commander's state that flight modes read and change."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,53 +11,53 @@ from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
 from lapwing.services.autopilot.interface import Setpoint
 
-STICK_TIMEOUT = 1.0  # [s] older sticks are in the middle
-STICK_DEADZONE = 0.05  # sticks nearer to the middle ask for nothing
+STICK_TIMEOUT = 1.0  # [s] after which sticks count as centred
+STICK_DEADZONE = 0.05
 
 
 @dataclass
 class OperatorInputs:
-    """The streams of an operator, and how old they are [s]."""
+    """Operator streams and their ages [s]."""
 
     sticks: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # forward, left, up, yaw rate, each from -1 to 1
     sticks_age: float = math.inf
     offboard_kind: str = ""  # offboard_position, offboard_attitude or offboard_motors
-    offboard_refused: str = ""  # why the last setpoint was not taken; "": it was
+    offboard_refused: str = ""  # reason for rejecting the last setpoint; "": accepted
     offboard: tuple[float, ...] = ()
     offboard_age: float = math.inf
     link_age: float = math.inf
-    linked: bool = False  # a ground station has been heard
+    linked: bool = False  # a ground station has connected
 
     def age(self, dt: float) -> None:
-        """Let dt [s] pass; what has never come stays infinitely old."""
+        """Add dt [s] to all ages."""
         self.offboard_age += dt
         self.link_age += dt
         self.sticks_age += dt
 
     @property
     def sticks_fresh(self) -> bool:
-        """Whether somebody holds a joystick."""
+        """True if stick positions are recent."""
         return self.sticks_age < STICK_TIMEOUT
 
     def stick(self, index: int) -> float:
-        """Where a stick is, -1 to 1; in the middle where it is nearly there, or nobody holds it."""
+        """Return a stick position, -1 to 1; 0 within the dead zone or without recent sticks."""
         deflection = self.sticks[index]
         return deflection if self.sticks_fresh and abs(deflection) >= STICK_DEADZONE else 0.0
 
 
 @dataclass
 class Guidance:
-    """Where the setpoint is and what it is to do."""
+    """Setpoint, route, fence and operator inputs."""
 
     parameters: dict[str, float]  # values by name
     smoothing: PositionSmoothing
     armed: bool = False
     flying: bool = False
     has_flown: bool = False  # since it was armed
-    speed: float = math.nan  # asked for in this flight; NaN: the parameter's [m/s]
-    home: Vec3 = (0.0, 0.0, 0.0)  # world x, y and the height of the ground where it was armed, or was told to be [m]
-    roi: Vec3 | None = None  # region of interest: where the nose points on its way [m]
-    released: bool = False  # the gripper is to be open
+    speed: float = math.nan  # [m/s] for this flight; NaN: the parameter's
+    home: Vec3 = (0.0, 0.0, 0.0)  # [m] world x, y and ground height, of the arming position or set by command
+    roi: Vec3 | None = None  # [m] region of interest that the nose points at
+    released: bool = False  # open the gripper
     route: Route = field(default_factory=Route)
     fence: Fence = field(default_factory=Fence)
     rally_points: tuple[Vec3, ...] = ()
@@ -65,7 +65,7 @@ class Guidance:
 
     @property
     def limits(self) -> Limits:
-        """How the setpoint may move now."""
+        """Present limits of the setpoint."""
         p = self.parameters
         wanted = p["MPC_XY_CRUISE"] if math.isnan(self.speed) else self.speed
         return Limits(
@@ -79,30 +79,30 @@ class Guidance:
 
     @property
     def yaw_tolerance(self) -> float:
-        """Error [rad] within which a heading that was asked for is reached."""
+        """Heading error [rad] at which a heading counts as reached."""
         return math.radians(self.parameters["MIS_YAW_ERR"])
 
     @property
     def manual_limits(self) -> Limits:
-        """As `limits`, under the sticks."""
+        """Limits of the setpoint under manual control."""
         return self.limits._replace(yaw_rate=math.radians(self.parameters["MPC_MAN_Y_MAX"]))
 
     @property
     def manual_tilt(self) -> float:
-        """Tilt [rad] that a full stick asks for."""
+        """Tilt [rad] at full stick."""
         return math.radians(min(self.parameters["MPC_MAN_TILT_MAX"], self.parameters["MPC_TILTMAX_AIR"]))
 
     def above_home(self, constants: Constants, parameter: str) -> float:
-        """World z [m] of an altitude above home, which is where the vehicle stands."""
+        """Return world z [m] of an altitude parameter above home."""
         return self.home[2] + constants.resting_height + self.parameters[parameter]
 
     @property
     def offboard_fresh(self) -> bool:
-        """Whether setpoints from outside are coming."""
+        """True if offboard setpoints are recent."""
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
 
     def lift_off(self, constants: Constants, view: CommanderInput) -> None:
-        """Let the setpoint leave the ground, from where the vehicle is by the estimate, if it is armed."""
+        """Start the flight at the estimated position if armed and on the ground."""
         if not self.flying and self.armed:
             x, y, _ = view.estimate.position_world
             yaw = to_roll_pitch_yaw(view.estimate.attitude)[2]
@@ -110,5 +110,5 @@ class Guidance:
             self.flying = self.has_flown = True
 
     def follow(self, setpoint: Setpoint) -> None:
-        """Go on from a setpoint that was not smoothed."""
+        """Continue from a setpoint that was not smoothed."""
         self.smoothing = PositionSmoothing(setpoint.position_world, setpoint.yaw, setpoint.velocity_world)

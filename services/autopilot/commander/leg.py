@@ -1,4 +1,4 @@
-"""Flight along a straight leg: how fast its end may be passed, and where the nose points meanwhile."""
+"""Flight along a straight leg: passing speed and heading."""
 
 import math
 from collections.abc import Sequence
@@ -8,23 +8,23 @@ from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import Limits, braking_speed, stopping_distance, wrap_angle
 
 TOWARDS_TARGET, TOWARDS_HOME, AWAY_FROM_HOME, ALONG_VELOCITY, TURN_FIRST, STAY = range(6)  # MPC_YAW_MODE
-_CLOSE = 0.5  # [m] of the place that is faced, within which its direction is not told
-_SLOW = 0.5  # [m/s] of the setpoint, below which it has no direction
+_CLOSE = 0.5  # [m] distance below which a direction is undefined
+_SLOW = 0.5  # [m/s] speed below which a direction is undefined
 
-Place = tuple[Vec3, float]  # [m], and the radius [m] within which it is reached
+Place = tuple[Vec3, float]  # [m] position, [m] acceptance radius
 
 
 def corner_speed(before: Vec3, corner: Vec3, after: Vec3, radius: float, limits: Limits) -> float:
-    """Speed [m/s] of rounding a corner within a radius [m], on the circle that touches both legs there."""
+    """Return the speed [m/s] for rounding a corner within a radius [m], on the circle tangent to both legs."""
     a, b = subtract(corner, before), subtract(after, corner)
     product = norm(a) * norm(b)
     turn = math.acos(max(-1.0, min(1.0, dot(a, b) / product))) if product > 0.0 else 0.0
-    # The circle's radius is r cot(turn / 2); half of the acceleration turns, the other half is left to brake.
+    # The circle's radius is r cot(turn / 2); half of the acceleration is left for braking.
     return math.sqrt(0.5 * limits.acceleration * radius / math.tan(0.5 * turn)) if turn > 1e-6 else math.inf
 
 
 def passing_speed(start: Vec3, places: Sequence[Place], limits: Limits) -> float:
-    """Speed [m/s] at which the first place may be passed so that the flight can stop at the last."""
+    """Return the speed [m/s] at the first place that allows a stop at the last."""
     speed = 0.0
     points = [start, *(place for place, _ in places)]
     for k in range(len(places) - 1, 0, -1):
@@ -35,15 +35,15 @@ def passing_speed(start: Vec3, places: Sequence[Place], limits: Limits) -> float
 
 
 class Leg:
-    """The way to a place, straight from where the last one was."""
+    """A straight leg."""
 
     def __init__(self, start_world: Vec3, target_world: Vec3, passing_speed: float = 0.0):
-        """To a place [m], from another; passed at a speed [m/s], or stopped at."""
+        """Create a leg from start to target [m] with a speed [m/s] at its end."""
         self.start, self.target, self.passing_speed = start_world, target_world, passing_speed
         self._heading = math.nan
 
     def step(self, guidance: Guidance, yaw: float, dt: float) -> None:
-        """Move the setpoint for a tick of dt [s], and turn it to a yaw [rad]; NaN: as MPC_YAW_MODE says."""
+        """Move the setpoint for a tick of dt [s] and turn it to a yaw [rad]; NaN: by MPC_YAW_MODE."""
         smoothing, limits = guidance.smoothing, guidance.limits
         wanted = self._wanted_yaw(guidance) if math.isnan(yaw) else yaw
         error = abs(wrap_angle(wanted - smoothing.yaw))  # NaN compares as aligned
@@ -61,7 +61,7 @@ class Leg:
 
 
 def heading(guidance: Guidance, target_world: Vec3) -> float:
-    """Yaw [rad] of the nose on the way to a place [m], NaN where there is nothing to point at."""
+    """Return the yaw [rad] on the way to a position [m], NaN if undefined."""
     smoothing = guidance.smoothing
     mode = guidance.parameters["MPC_YAW_MODE"]
     if guidance.roi is not None:
@@ -78,7 +78,7 @@ def heading(guidance: Guidance, target_world: Vec3) -> float:
 
 
 def towards_roi(guidance: Guidance) -> float:
-    """Yaw [rad] towards the region of interest, NaN where there is none."""
+    """Return the yaw [rad] towards the region of interest, NaN without one."""
     return math.nan if guidance.roi is None else _direction(guidance.smoothing.position, guidance.roi)
 
 

@@ -1,8 +1,8 @@
-"""The flight modes by name."""
+"""Flight modes by name."""
 
 from lapwing.dynamics import discovery
 from lapwing.services.autopilot.commander import modes
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 
 MODES: dict[str, type[FlightMode]] = {module.NAME: module.Mode for module in discovery.modules(modes).values()}
-"""Class by the name of the mode."""
+"""Mode class by name."""

@@ -1,4 +1,4 @@
-"""The operator's commands about missions, fences and places: what each kind does."""
+"""Handlers of operator commands for missions, fences and positions."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ from lapwing.services.autopilot.commander.transitions import Context
 
 @handles("mission_upload")
 def mission_upload(context: Context, command: Any) -> None:
-    """A new mission, in place of the one there is."""
+    """Replace the mission."""
     state = context.state
     state.guidance.route = denied_if_wrong(Route, command.items)
     if state.mode_name == "mission" and not state.on_trajectory:
@@ -23,7 +23,7 @@ def mission_upload(context: Context, command: Any) -> None:
 
 @handles("mission_clear")
 def mission_clear(context: Context, command: Any) -> None:
-    """No mission any more."""
+    """Delete the mission."""
     state = context.state
     state.guidance.route = Route()
     if state.mode_name == "mission" and not state.on_trajectory:
@@ -32,26 +32,26 @@ def mission_clear(context: Context, command: Any) -> None:
 
 @handles("mission_current")
 def mission_current(context: Context, command: Any) -> None:
-    """Go on with another item."""
+    """Select the current item."""
     number = value(command.values, 0)
     denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
 
 
 @handles("fence_upload")
 def fence_upload(context: Context, command: Any) -> None:
-    """A new fence; without items, none."""
+    """Replace the fence; without items, remove it."""
     context.state.guidance.fence = denied_if_wrong(Fence, command.items)
 
 
 @handles("rally_upload")
 def rally_upload(context: Context, command: Any) -> None:
-    """New places to return to; without items, home."""
+    """Replace the rally points; without items, remove them."""
     context.state.guidance.rally_points = denied_if_wrong(rally_points, command.items)
 
 
 @handles("set_home")
 def set_home(context: Context, command: Any) -> None:
-    """Return elsewhere. Values: x, y, z of the ground [m]; what is not given is as where the vehicle is."""
+    """Set home. Values: x, y, z of the ground [m]; missing coordinates are the vehicle's."""
     x, y, z = context.view.estimate.position_world
     home = fill_in((x, y, z - context.constants.resting_height), vector(command.values, 0))
     if not all(map(math.isfinite, home)):
@@ -61,12 +61,12 @@ def set_home(context: Context, command: Any) -> None:
 
 @handles("roi")
 def region_of_interest(context: Context, command: Any) -> None:
-    """Point the nose there on the way. Values: x, y, z [m]; without a place, nowhere any more."""
+    """Set the region of interest. Values: x, y, z [m]; without a position, clear it."""
     place = vector(command.values, 0)
     context.state.guidance.roi = place if all(map(math.isfinite, place[:2])) else None
 
 
 @handles("gripper")
 def gripper(context: Context, command: Any) -> None:
-    """Open it (0) or close it (1); what it has let go of does not come back."""
+    """Open (0) or close (1) the gripper; a released payload does not return."""
     context.state.guidance.released = value(command.values, 0) != GRAB

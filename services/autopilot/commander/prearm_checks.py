@@ -1,4 +1,4 @@
-"""What must be in order before the motors may be armed, in words for people."""
+"""Pre-arm checks."""
 
 import math
 
@@ -9,18 +9,18 @@ from lapwing.services.autopilot.initial_estimate import NOT_STARTED
 from lapwing.services.common import status_texts
 
 MAXIMUM_TILT = 0.35  # [rad] from the vertical
-MAXIMUM_OUTAGE = 0.5  # [s] of a source: single readings are refused now and then
+MAXIMUM_OUTAGE = 0.5  # [s] of a source; single readings may be rejected
 _UNCERTAIN = {64: status_texts.POSITION_UNCERTAIN, 128: status_texts.ATTITUDE_UNCERTAIN}
 
 
 def count_outages(view: CommanderInput, state: State) -> None:
-    """Take in the health of an estimate: how long each source has been lost or refused."""
+    """Update the time for which each source has been lost or rejected."""
     health, interval = view.estimate.health, view.estimate_interval
     state.source_outage = [t + interval if health >> bit & 1 else 0.0 for bit, t in enumerate(state.source_outage)]
 
 
 def reasons(view: CommanderInput, state: State) -> list[str]:
-    """Why the vehicle cannot be armed; empty: it can."""
+    """Return the texts of all arming blockers, empty if the vehicle can be armed."""
     estimate, guidance = view.estimate, state.guidance
     if estimate.health == NOT_STARTED:
         return [status_texts.NOT_STARTED]

@@ -1,14 +1,14 @@
-"""The mission's list of items, and which of them is flown."""
+"""Mission items and the current one."""
 
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 NONE_REACHED = 65535
-NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # numbers of Status.mission_state
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5  # values of Status.mission_state
 
-TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions that lead somewhere
-INSTANT = ("speed", "roi", "set_home", "gripper")  # those that take no time
+TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions with a position
+INSTANT = ("speed", "roi", "set_home", "gripper")  # actions that take no time
 GRAB = 1.0  # value of the action gripper; 0: release
 ACTIONS = (*TO_PLACES, *INSTANT, "takeoff", "land", "return", "delay", "condition", "jump", "yaw")
 _PLACED = ("waypoint",)
@@ -16,7 +16,7 @@ MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]
 
 
 def check_items(items: Sequence[Any]) -> None:
-    """ValueError (one line) for the first item that cannot be flown."""
+    """Raise ValueError (one line) for the first invalid item."""
     for number, item in enumerate(items):
         if item.action not in ACTIONS:
             raise ValueError(f"item {number}: unknown action {item.action}; expected one of {', '.join(ACTIONS)}")
@@ -33,10 +33,10 @@ def check_items(items: Sequence[Any]) -> None:
 
 
 class Route:
-    """The items, the one that is flown, and how often each jump was taken."""
+    """Items, current item and counters of jumps."""
 
     def __init__(self, items: Sequence[Any] = ()):
-        """At the beginning of a mission; ValueError if it cannot be flown."""
+        """Start at the first item. Raise ValueError if an item is invalid."""
         check_items(items)
         self.items = tuple(items)
         self.current, self.reached = 0, NONE_REACHED
@@ -44,26 +44,26 @@ class Route:
 
     @property
     def item(self) -> Any:
-        """The item that is flown, None after the last."""
+        """Current item, None after the last."""
         return self.items[self.current] if self.current < len(self.items) else None
 
     @property
     def on_last(self) -> bool:
-        """Whether the last item is flown."""
+        """True if the current item is the last."""
         return self.current == len(self.items) - 1
 
     def select(self, number: int) -> None:
-        """Go on with another item; ValueError if there is none of this number."""
+        """Select the current item. Raise ValueError if it does not exist."""
         if not 0 <= number < len(self.items):
             raise ValueError(f"no item {number}; the mission has {len(self.items)}")
         self.current = number
         self._jumped.clear()
 
     def advance(self) -> None:
-        """The current item is done: on to the next, or to where a jump leads."""
+        """Mark the current item as done and go to the next one, following jumps."""
         self.reached = self.current
         self.current += 1
-        for _ in self.items:  # as many jumps in a row as there are items: a ring of jumps must end
+        for _ in self.items:  # limits consecutive jumps, which may form a loop
             item = self.item
             if item is None or item.action != "jump":
                 return
@@ -75,7 +75,7 @@ class Route:
                 self.current += 1
 
     def following(self) -> Iterator[Any]:
-        """The items after the current one in the order in which they will be flown, without the jumps."""
+        """Yield the items after the current one in order of flight, without jumps."""
         number, jumped = self.current + 1, dict(self._jumped)
         while number < len(self.items):
             item = self.items[number]
@@ -90,6 +90,6 @@ class Route:
                 number += 1
 
     def restart(self) -> None:
-        """From the first item again."""
+        """Select the first item."""
         self.current, self.reached = 0, NONE_REACHED
         self._jumped.clear()

@@ -1,7 +1,4 @@
-"""Position smoothing: a setpoint of limited jerk, acceleration and speed, moved to a position or at a velocity.
-
-It knows nothing of the real vehicle, so the setpoint is as smooth as its limits, and the same whatever the sensors say.
-"""
+"""Position smoothing: a setpoint with limited jerk, acceleration and speed, independent of the estimate."""
 
 import math
 from typing import NamedTuple
@@ -11,11 +8,11 @@ from lapwing.services.autopilot.interface import Setpoint
 
 _POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre
 _VELOCITY_GAIN = 3.0  # [1/s] acceleration over error of the velocity
-_LOOK_AHEAD, _LOOK_AHEAD_TIME = 1.0, 1.0  # [m], [s] by which the point of a line that is aimed at lies ahead
+_LOOK_AHEAD, _LOOK_AHEAD_TIME = 1.0, 1.0  # [m], [s] look-ahead along a line
 
 
 class Limits(NamedTuple):
-    """How the setpoint may move."""
+    """Limits of the setpoint."""
 
     horizontal: float  # [m/s]
     up: float  # [m/s]
@@ -26,13 +23,13 @@ class Limits(NamedTuple):
 
 
 def clamp_norm(v: Vec3, maximum: float) -> Vec3:
-    """The vector, or one of the length `maximum` in its direction."""
+    """Return the vector, shortened to the length `maximum` if it is longer."""
     length = norm(v)
     return scale(maximum / length, v) if length > maximum else v
 
 
 def limit_velocity(velocity_world: Vec3, limits: Limits) -> Vec3:
-    """A velocity [m/s] in the same direction within the limits of speed."""
+    """Return the velocity [m/s] scaled to the speed limits."""
     x, y, z = velocity_world
     vertical = limits.up if z > 0.0 else limits.down
     excess = max(1.0, math.hypot(x, y) / limits.horizontal, abs(z) / vertical)
@@ -40,14 +37,14 @@ def limit_velocity(velocity_world: Vec3, limits: Limits) -> Vec3:
 
 
 def braking_speed(distance: float, acceleration: float) -> float:
-    """Speed [m/s] at a distance [m] from which the setpoint can stop there at half of its acceleration [m/s^2]."""
+    """Return the speed [m/s] from which the setpoint stops in `distance` [m] at half of `acceleration` [m/s^2]."""
     brake = 0.5 * acceleration
     bend = brake / (_POSITION_GAIN * _POSITION_GAIN)
     return _POSITION_GAIN * distance if distance < bend else math.sqrt(2.0 * brake * (distance - 0.5 * bend))
 
 
 def stopping_distance(speed: float, acceleration: float) -> float:
-    """Distance [m] from which `braking_speed` is this speed [m/s]."""
+    """Return the distance [m] at which `braking_speed` is `speed` [m/s]."""
     brake = 0.5 * acceleration
     bend = brake / (_POSITION_GAIN * _POSITION_GAIN)
     within = speed < _POSITION_GAIN * bend
@@ -55,29 +52,29 @@ def stopping_distance(speed: float, acceleration: float) -> float:
 
 
 def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi] [rad]."""
+    """Return the equivalent angle in [-pi, pi] [rad]."""
     return math.remainder(angle, 2.0 * math.pi)
 
 
 class PositionSmoothing:
-    """The setpoint that the controller follows."""
+    """The smoothed setpoint."""
 
     def __init__(self, position_world: Vec3, yaw: float, velocity_world: Vec3 = ZERO):
-        """At a position [m] and yaw [rad], with a velocity [m/s]."""
+        """Start at a position [m], yaw [rad] and velocity [m/s]."""
         self.position, self.velocity, self.acceleration = position_world, velocity_world, ZERO
         self.yaw, self.yaw_rate = yaw, 0.0
 
     @property
     def setpoint(self) -> Setpoint:
-        """As the controller takes it."""
+        """Setpoint for the controller."""
         return Setpoint(self.position, self.velocity, self.acceleration, self.yaw, self.yaw_rate)
 
     def move_to(self, target_world: Vec3, limits: Limits, dt: float) -> None:
-        """Move it straight to a position [m] and stop there, for a tick of dt [s]."""
+        """Move towards a position [m], with a stop there, for a tick of dt [s]."""
         self.move_at(self.velocity_to(target_world, limits), limits, dt)
 
     def velocity_to(self, target_world: Vec3, limits: Limits) -> Vec3:
-        """The velocity [m/s] of the way to a position [m]."""
+        """Return the velocity [m/s] towards a position [m] with a stop there."""
         way = subtract(target_world, self.position)
         distance = norm(way)
         if distance == 0.0:
@@ -85,7 +82,7 @@ class PositionSmoothing:
         return limit_velocity(scale(braking_speed(distance, limits.acceleration) / distance, way), limits)
 
     def velocity_along(self, start_world: Vec3, target_world: Vec3, passing_speed: float, limits: Limits) -> Vec3:
-        """The velocity [m/s] of the way along a line to a position [m], which is passed at a speed [m/s]."""
+        """Return the velocity [m/s] along a line to a position [m] that is passed at a speed [m/s]."""
         way = subtract(target_world, self.position)
         distance, track = norm(way), subtract(target_world, start_world)
         if distance == 0.0:
@@ -98,7 +95,7 @@ class PositionSmoothing:
         return limit_velocity(scale(speed / norm(aim), aim), limits)
 
     def move_at(self, velocity_world: Vec3, limits: Limits, dt: float) -> None:
-        """Move it at a velocity [m/s] for a tick of dt [s]."""
+        """Move at a velocity [m/s] for a tick of dt [s]."""
         error = subtract(limit_velocity(velocity_world, limits), self.velocity)
         wanted = clamp_norm(scale(_VELOCITY_GAIN * self._gain_fraction(error, limits), error), limits.acceleration)
         change = clamp_norm(subtract(wanted, self.acceleration), limits.jerk * dt)
@@ -109,12 +106,12 @@ class PositionSmoothing:
 
     @staticmethod
     def _gain_fraction(error: Vec3, limits: Limits) -> float:
-        # The acceleration must fade to zero, within its jerk, when the velocity is reached: a^2 / 2j is still to come.
+        # The acceleration must reach zero together with the velocity error, which still changes by a^2 / 2j.
         size = norm(error)
         return min(1.0, math.sqrt(limits.jerk * size) / (_VELOCITY_GAIN * size)) if size > 0.0 else 1.0
 
     def turn_to(self, yaw: float, limits: Limits, dt: float) -> None:
-        """Turn towards a yaw [rad] by the shorter way for a tick of dt [s]; NaN: stay."""
+        """Turn towards a yaw [rad] by the shorter way for a tick of dt [s]; NaN: keep the yaw."""
         left = 0.0 if math.isnan(yaw) else wrap_angle(yaw - self.yaw)
         rate = math.copysign(min(limits.yaw_rate, braking_speed(abs(left), limits.yaw_rate)), left)
         self.turn_at(rate, limits, dt)

@@ -1,4 +1,4 @@
-"""Changes of the state that commands, failsafes and time-outs share: another mode, armed, disarmed."""
+"""State transitions: change of mode, arming, disarming."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from lapwing.services.common import status_texts
 
 
 class Context(NamedTuple):
-    """One tick, as command handlers and failsafes work on it."""
+    """Data of one tick for command handlers and failsafes."""
 
     constants: Constants
     view: CommanderInput
@@ -20,22 +20,22 @@ class Context(NamedTuple):
 
 
 def enter(constants: Constants, state: State, name: str, *values: float) -> None:
-    """Go to another mode.
+    """Enter a mode.
 
     Raises:
-        ValueError: why that cannot be.
+        ValueError: the mode cannot be entered.
     """
     kind = MODES[name]
     if kind.needs_flight and not state.guidance.flying:
         raise ValueError(f"{name}: the vehicle does not fly")
     mode = kind(constants, state.guidance, *values)
     if state.mode_name == "mission" != name:
-        state.guidance.speed = math.nan  # what a mission has asked for ends with it
+        state.guidance.speed = math.nan  # a mission's speed ends with it
     state.mode, state.mode_name = mode, name
 
 
 def arm(context: Context) -> None:
-    """Motors ready; home is here."""
+    """Arm and set home."""
     guidance = context.state.guidance
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
     x, y, z = context.view.estimate.position_world
@@ -44,7 +44,7 @@ def arm(context: Context) -> None:
 
 
 def disarm(context: Context, reason: str) -> None:
-    """Motors off, wherever it is."""
+    """Disarm and reset the flight's settings."""
     state = context.state
     state.guidance.armed = state.guidance.flying = False
     state.failsafe, state.guidance.speed, state.guidance.roi = "", math.nan, None

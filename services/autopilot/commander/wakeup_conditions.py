@@ -1,4 +1,4 @@
-"""At which ticks the commander has a say: in between, an executor need not call it."""
+"""Conditions under which the commander must run."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from lapwing.services.autopilot.commander.transitions import Context
 
 
 class BatteryThresholds(NamedTuple):
-    """Charges, as fractions, below which the commander acts or warns."""
+    """Charges (fractions) below which the commander acts or warns."""
 
     low: float
     critical: float
@@ -19,16 +19,19 @@ class BatteryThresholds(NamedTuple):
 
 
 def battery_thresholds(parameters: Mapping[str, float]) -> BatteryThresholds:
-    """The thresholds among the parameters' values."""
+    """Return the thresholds in the parameters' values."""
     return BatteryThresholds(parameters["BAT_LOW_THR"], parameters["BAT_CRIT_THR"], parameters["BAT_EMERGEN_THR"])
 
 
 def quiet_time(context: Context) -> float:
-    """Time [s] after a tick in which nothing changes what the commander asks for, unless one `needs_attention`, a
-    command comes or, with an operator, a new estimate is shown; 0 where something may change at every tick."""
+    """Return the time [s] after a tick for which the commander's output stays valid.
+
+    It ends early if `needs_attention` is True, a command arrives or, with an operator, an estimate is due. It is 0 if
+    the output may change at every tick.
+    """
     state = context.state
     guidance = state.guidance
-    counts = state.pending_arm is not None or bool(guidance.route.items)  # the state of a mission says if one flies
+    counts = state.pending_arm is not None or bool(guidance.route.items)  # mission_state depends on flying
     if not state.on_trajectory or counts or failsafes.any_holds(context):
         return 0.0
     inputs, parameters = guidance.inputs, guidance.parameters
@@ -45,14 +48,14 @@ def needs_attention(
     failed_motor: int,
     estimate_due: bool,
 ) -> bool:
-    """Whether a commander whose last request is still quiet must be called at this tick; it may be called at any.
+    """Return True if the commander must run at this tick although its last output is still valid.
 
     Args:
-        thresholds: of the parameters as they are now.
+        thresholds: present battery thresholds.
         health: of the estimate.
-        battery_charge: fraction; NaN: not known.
+        battery_charge: fraction; NaN: unknown.
         failed_motor: its number, from 1; 0: none.
-        estimate_due: whether the commander is shown a new estimate at this tick; without one, health does not matter.
+        estimate_due: the commander gets a new estimate at this tick; otherwise health is ignored.
     """
     battery_low = (
         battery_charge < thresholds.low or battery_charge < thresholds.critical or battery_charge < thresholds.emergency

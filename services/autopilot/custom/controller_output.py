@@ -78,7 +78,9 @@ def _demand(output: types.Type, none: types.Type) -> Callable:
     else:
         given = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
     return compile_source(
-        "demand(output, none)", {"ControllerOutput": ControllerOutput}, f"return Demand({given}, {roll_pitch})"
+        "demand(output, none)",
+        {"ControllerOutput": ControllerOutput},
+        f"return ControllerOutput({given}, {roll_pitch})",
     )
 
 

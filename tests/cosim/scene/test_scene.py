@@ -293,7 +293,7 @@ def test_choices_are_listed():
         ("run=3", "--set run: expected a table [run], got 3"),
         ("effects.gravity=3", "--set effects.gravity: expected a table [effects.gravity], got 3"),
         ("vehicle.name=1x", "--set vehicle.name: expected a text of the form"),
-        ("exchange.rate=300", "--set exchange.rate: expected a rate whose interval is a whole number of ns"),
+        ("exchange.rate=300", "--set exchange.rate: expected a rate with a whole number of ns"),
         ("rates.pose=33", "--set rates.pose: expected a rate that divides exchange.rate = 250 Hz (250, 125, 50"),
         ("solver.step=0.003", "--set solver.step: expected a step that divides the exchange interval of 0.004 s"),
         ("published.rmse.q=3", "--set published.rmse.q: expected 'x', 'y'"),

@@ -1,1 +1,1 @@
-"""The flight modes, a module each: `NAME`, and a class `Mode` that moves the setpoint."""
+"""Flight modes, one module each with `NAME` and a class `Mode`."""

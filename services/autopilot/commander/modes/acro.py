@@ -1,4 +1,4 @@
-"""By hand: the sticks ask for body rates and a thrust; let go of, it keeps the tilt that it has."""
+"""Manual flight by body rates and thrust; centred sticks keep the tilt."""
 
 import math
 
@@ -11,7 +11,7 @@ NAME = "acro"
 
 
 class Mode(stabilized.Mode):
-    """Sticks: rates of pitch and roll, thrust, yaw rate. It tilts no further than MPC_TILTMAX_AIR: no loops."""
+    """Sticks: pitch and roll rate, thrust, yaw rate. The tilt is limited to MPC_TILTMAX_AIR."""
 
     def _turn(
         self, view: CommanderInput, guidance: Guidance, forward: float, left: float, turn: float, flight: AttitudeFlight

@@ -1,4 +1,4 @@
-"""By hand without knowing where: the sticks ask for tilts, a vertical speed and a yaw rate."""
+"""Manual flight by tilts, vertical speed and yaw rate, without a position."""
 
 from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
@@ -10,7 +10,7 @@ NAME = "altitude_control"
 
 
 class Mode(FlightMode):
-    """Sticks: forward, left, up, yaw rate, each from -1 to 1; let go of, it stays at its altitude and drifts."""
+    """Sticks: forward, left, up, yaw rate, each from -1 to 1; centred sticks keep the altitude."""
 
     needs_position = False
 
@@ -18,7 +18,7 @@ class Mode(FlightMode):
         self._flight = AltitudeFlight(guidance) if guidance.flying else None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Fly as the sticks say; when nobody holds them any more, by itself."""
+        """Follow the sticks; change mode without recent sticks."""
         forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
         if up > 0.0:
             guidance.lift_off(constants, view)

@@ -1,4 +1,4 @@
-"""Down without knowing where: level but for what leans against the wind, as PX4's mode of this name does."""
+"""Level descent without a position, as in PX4."""
 
 from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
@@ -8,11 +8,11 @@ from lapwing.services.autopilot.commander.modes.land import descent_speed
 from lapwing.services.autopilot.interface import Setpoint
 
 NAME = "descend"
-RECOVERY_TIME = 1.0  # [s] for which the position must be known again
+RECOVERY_TIME = 1.0  # [s] of known position before the descent ends
 
 
 class Mode(FlightMode):
-    """Sink until the ground is felt, or the vehicle knows again where it is: then wait for the operator, or land."""
+    """Descend to the ground; if the position is known again, hold for the operator, or land."""
 
     needs_flight, needs_position = True, False
 
@@ -21,7 +21,7 @@ class Mode(FlightMode):
         self._position_known = 0.0  # [s]
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Sink for one tick."""
+        """Descend for one tick."""
         if not guidance.flying:
             return None
         self._position_known = 0.0 if view.position_lost else self._position_known + view.dt

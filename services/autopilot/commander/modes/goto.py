@@ -1,4 +1,4 @@
-"""To a place in the world, and stay there."""
+"""Flight to a position."""
 
 import math
 
@@ -11,7 +11,7 @@ NAME = "goto"
 
 
 class Mode(FlightMode):
-    """Values: x, y, z [m], yaw [rad], speed [m/s]; a place that is not given stays, a yaw is that of MPC_YAW_MODE."""
+    """Values: x, y, z [m], yaw [rad], speed [m/s]; a missing coordinate is kept, a missing yaw is by MPC_YAW_MODE."""
 
     needs_flight = True
 
@@ -27,5 +27,5 @@ class Mode(FlightMode):
             guidance.speed = speed
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Fly there."""
+        """Follow the leg."""
         self._leg.step(guidance, self._yaw, view.dt)

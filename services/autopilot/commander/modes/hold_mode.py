@@ -1,4 +1,4 @@
-"""Stop, and stay there."""
+"""Position hold."""
 
 import math
 
@@ -13,14 +13,14 @@ STOPPED = 0.05  # [m/s]
 
 
 class Mode(FlightMode):
-    """Brake first, then hold the position where the setpoint has come to rest. Value: yaw [rad]; NaN: as it is."""
+    """Brake, then hold the setpoint's position. Value: yaw [rad]; NaN: unchanged."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._position: Vec3 | None = None
         self._yaw = value(values, 0)
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Brake or stay."""
+        """Brake or hold."""
         if not guidance.flying:
             return
         smoothing, limits = guidance.smoothing, guidance.limits

@@ -1,4 +1,4 @@
-"""Down to the ground, where it is."""
+"""Landing at the present position."""
 
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
@@ -7,19 +7,19 @@ from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import braking_speed
 
 NAME = "land"
-SLOW_HEIGHT = 3.0  # [m] above the ground, as estimated; below it the last metres begin
+SLOW_HEIGHT = 3.0  # [m] estimated height below which the descent is slow
 STOPPED = 0.05  # [m/s]
 
 
 def descent_speed(constants: Constants, guidance: Guidance, altitude: float) -> float:
-    """Speed [m/s] of going down at an altitude: world z [m]."""
+    """Return the descent speed [m/s] at an altitude, world z [m]."""
     limits, slow = guidance.limits, guidance.parameters["MPC_LAND_SPEED"]
     above = max(0.0, altitude - constants.resting_height - SLOW_HEIGHT)
     return max(slow, min(limits.down, slow + braking_speed(above, limits.acceleration)))
 
 
 class Mode(FlightMode):
-    """Sink until the ground is felt: how high the vehicle is may be wrong."""
+    """Descend until the ground is detected; the estimated height may be wrong."""
 
     needs_flight = True
 
@@ -27,7 +27,7 @@ class Mode(FlightMode):
         self._place: tuple[float, float] | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Stop where it is, and sink."""
+        """Stop horizontally and descend."""
         if not guidance.flying:
             return
         smoothing, limits = guidance.smoothing, guidance.limits

@@ -1,4 +1,4 @@
-"""The uploaded mission, item by item."""
+"""Flight of the uploaded mission."""
 
 import math
 from itertools import islice
@@ -15,14 +15,14 @@ from lapwing.services.autopilot.commander.smoothing import wrap_angle
 
 NAME = "mission"
 ARRIVED = 0.05  # [m]
-EXACT_RADIUS = 0.2  # [m] to wait or land somewhere the vehicle must be there
-LANDED_TIME = 1.0  # [s] on the ground before the next item is begun
-FORESIGHT = 32  # items that are looked through for the places to come
+EXACT_RADIUS = 0.2  # [m] maximum acceptance radius for waiting or landing
+LANDED_TIME = 1.0  # [s] on the ground before the next item
+FORESIGHT = 32  # items searched for the next positions
 _NOT_GIVEN = (math.nan, math.nan, math.nan)
 
 
 class Mode(FlightMode):
-    """Flies the route from its current item, or from the one given."""
+    """Flies the route. Value: first item; default: the current one."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         route = guidance.route
@@ -34,20 +34,20 @@ class Mode(FlightMode):
         elif route.item is None or (route.on_last and not guidance.flying):
             route.restart()
         self._number: int | None = None
-        self._time_there = 0.0  # [s] since the item's place was reached
+        self._time_there = 0.0  # [s] since the item's position was reached
         self._item_mode: FlightMode | None = None  # another mode that flies the item
-        self._leg = Leg(ZERO, ZERO)  # to the item's place
-        self._yaw = math.nan  # that the item asks for [rad]
+        self._leg = Leg(ZERO, ZERO)  # to the item's position
+        self._yaw = math.nan  # [rad] of the item
         self._last_waypoint: Vec3 | None = None  # [m]
         self._count = len(route.items)
 
     @property
     def phase(self) -> str:
-        """Which item."""
+        """Text of the current item."""
         return "complete" if self._number is None else f"item {self._number + 1} of {self._count}"
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Fly the current item, or go on with the next."""
+        """Fly the current item, or continue with the next."""
         route = guidance.route
         if not guidance.armed:
             return
@@ -57,14 +57,14 @@ class Mode(FlightMode):
             self._stay(view, guidance)
             return
         if not guidance.flying and item.action in TO_PLACES:
-            guidance.lift_off(constants, view)  # a mission without a take-off starts from the ground all the same
+            guidance.lift_off(constants, view)  # a mission may start without a take-off item
         if route.current != self._number:
             self._begin(constants, guidance, item)
         if self._fly(constants, view, guidance, item):
             route.advance()
 
     def _after_instant_items(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Any:
-        """Do what takes no time; the item that comes then, None at the end."""
+        """Execute instant items. Return the next item, None at the end."""
         route = guidance.route
         for _ in route.items:
             item = route.item
@@ -75,7 +75,7 @@ class Mode(FlightMode):
         return route.item
 
     def _stay(self, view: CommanderInput, guidance: Guidance) -> None:
-        """The mission is over: hold where its last waypoint is, whose radius may have been wide."""
+        """Fly to the last waypoint, which may have a wide radius, and hold."""
         smoothing, last = guidance.smoothing, self._last_waypoint
         if last is None or not guidance.flying or norm(subtract(last, smoothing.position)) < ARRIVED:
             self.next_mode = "hold"
@@ -87,9 +87,9 @@ class Mode(FlightMode):
         self._number, self._time_there, self._item_mode = guidance.route.current, 0.0, None
         self._yaw = item.yaw + (guidance.smoothing.yaw if item.action == "yaw" and item.values else 0.0)  # relative
         if item.action == "takeoff":
-            given = math.isfinite(item.position.z)
-            asked = item.position.z if given else guidance.above_home(constants, "MIS_TAKEOFF_ALT")
-            height = max(constants.resting_height + 0.1, asked)
+            finite = math.isfinite(item.position.z)
+            altitude = item.position.z if finite else guidance.above_home(constants, "MIS_TAKEOFF_ALT")
+            height = max(constants.resting_height + 0.1, altitude)
             if not (guidance.flying and guidance.smoothing.position[2] >= height):
                 self._item_mode = takeoff.Mode(constants, guidance, height, item.yaw)
         elif item.action == "return" and guidance.flying:
@@ -100,10 +100,10 @@ class Mode(FlightMode):
                 self._last_waypoint = self._leg.target
 
     def _leg_to(self, guidance: Guidance, item: Any) -> Leg:
-        """The way to the item's place: along the line from the waypoint before, on through it where nothing stops."""
+        """Return the leg to the item's position, from the last waypoint, passed without a stop if possible."""
         here = guidance.smoothing.position
         target, start = _place(item, here), here
-        if item.action == "condition":  # what follows is flown to meanwhile
+        if item.action == "condition":  # the next position is approached meanwhile
             places = [i for i in islice(guidance.route.following(), FORESIGHT) if i.action in TO_PLACES]
             return Leg(here, _place(places[0], here) if places else here)
         if (
@@ -125,7 +125,7 @@ class Mode(FlightMode):
         return Leg(start, target, passing_speed(start, ahead, guidance.limits))
 
     def _fly(self, constants: Constants, view: CommanderInput, guidance: Guidance, item: Any) -> bool:
-        """Move the setpoint for one tick; whether the item is done."""
+        """Move the setpoint for one tick. Return True if the item is done."""
         if item.action in ("land", "return") and not guidance.flying:
             self._time_there += view.dt
             return self._time_there > LANDED_TIME
@@ -155,37 +155,37 @@ class Mode(FlightMode):
         return self._time_there >= item.hold
 
     def _reached(self, guidance: Guidance, item: Any) -> bool:
-        """Whether the item's place and yaw are reached."""
+        """Return True if position and yaw of the item are reached."""
         smoothing = guidance.smoothing
         aligned = math.isnan(self._yaw) or abs(wrap_angle(self._yaw - smoothing.yaw)) < guidance.yaw_tolerance
         return norm(subtract(self._leg.target, smoothing.position)) < _radius(guidance, item) and aligned
 
 
 def _radius(guidance: Guidance, item: Any) -> float:
-    """Distance [m] within which an item's place is reached."""
+    """Return the acceptance radius [m] of an item."""
     radius = item.radius if item.radius > 0.0 else guidance.parameters["NAV_ACC_RAD"]
     return radius if _flown_through(item) else min(radius, EXACT_RADIUS)
 
 
 def _flown_through(item: Any) -> bool:
-    """Whether nothing of the item itself asks for a stop at its place."""
+    """Return True if the item needs no stop at its position."""
     return item.action in ("waypoint", "loiter_time") and item.hold == 0.0
 
 
 def _instant(item: Any) -> bool:
-    """Whether an item takes no time: what has nothing to do here is a delay of no length."""
+    """Return True if an item takes no time; unsupported items are imported as zero delays."""
     return item.action in INSTANT or (item.action == "delay" and item.hold == 0.0)
 
 
 def _place(item: Any, here: Vec3) -> Vec3:
-    """Where an item leads [m]; a coordinate that it does not give is that of `here`."""
+    """Return the position of an item [m]; missing coordinates are those of `here`."""
     asked = tuple(item.position) if item.action in (*TO_PLACES, "land") else _NOT_GIVEN
     x, y, z = fill_in(here, asked)
     return x, y, here[2] if item.action in ("land", "loiter_to_alt") else z  # horizontally first
 
 
 def _act(constants: Constants, view: CommanderInput, guidance: Guidance, item: Any) -> None:
-    """Do what an item asks for that takes no time."""
+    """Execute an instant item."""
     place = tuple(item.position)
     if item.action == "speed":
         guidance.speed = item.values[0]

@@ -1,5 +1,4 @@
-"""Setpoints from outside: positions, velocities, accelerations, an attitude or body rates with their thrust; or the
-motors' voltages, past the controller."""
+"""Offboard control by position, velocity, acceleration, attitude, body rates and thrust, or motor voltages."""
 
 import math
 
@@ -14,12 +13,12 @@ from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import CUT_HEIGHT
 
 NAME = "offboard"
-ACCELERATION_TIME = 0.5  # [s] for which an acceleration is taken to last
-SINKING = 1.0  # [m/s] at least that a vehicle is asked for whose motors stand: where it stands too, it has landed
+ACCELERATION_TIME = 0.5  # [s] assumed duration of an acceleration
+SINKING = 1.0  # [m/s] minimum descent setpoint with motors off, which enables landing detection
 
 
 class Mode(FlightMode):
-    """Follows the newest setpoint; a failsafe watches that there is one."""
+    """Follows the newest setpoint; a failsafe handles their loss."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         if not guidance.offboard_fresh:
@@ -28,7 +27,7 @@ class Mode(FlightMode):
         self._attitude: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Towards the setpoint, within the limits."""
+        """Move towards the setpoint within the limits."""
         values = guidance.inputs.offboard
         self.motor_voltage = None
         if not guidance.armed:
@@ -53,7 +52,7 @@ class Mode(FlightMode):
     def _drive(
         self, constants: Constants, view: CommanderInput, guidance: Guidance, volts: tuple[float, ...]
     ) -> Setpoint | None:
-        """Voltages of the motors [V]. The setpoint goes along with the vehicle: others go on from there."""
+        """Apply motor voltages [V]. The setpoint follows the vehicle, for later modes."""
         self._attitude = None
         turning = any(v > 0.0 for v in volts)
         if turning:
@@ -71,9 +70,9 @@ class Mode(FlightMode):
     def _follow_attitude(
         self, constants: Constants, view: CommanderInput, guidance: Guidance, values: tuple[float, ...]
     ) -> Setpoint | None:
-        """An attitude (w, x, y, z) or body rates [rad/s], a thrust over the maximum or a climb rate [m/s]; NaN: none.
+        """Follow an attitude (w, x, y, z) or body rates [rad/s], with thrust over maximum or climb rate [m/s].
 
-        The yaw rate goes before the attitude's yaw.
+        NaN means missing. The yaw rate overrides the attitude's yaw.
         """
         thrust, climb_rate = value(values, 7), value(values, 8)
         if thrust > constants.hover_thrust or climb_rate > 0.0:
@@ -97,14 +96,14 @@ class Mode(FlightMode):
 def _follow_position(
     view: CommanderInput, guidance: Guidance, position: Vec3, velocity: Vec3, acceleration: Vec3
 ) -> None:
-    """Move the setpoint by what is given of position [m], velocity [m/s] and acceleration [m/s^2]; NaN: not given."""
+    """Move the setpoint by position [m], velocity [m/s] and acceleration [m/s^2]; NaN means missing."""
     smoothing, limits = guidance.smoothing, guidance.limits
     approach = smoothing.velocity_to(fill_in(smoothing.position, position), limits)
     gained = scale(ACCELERATION_TIME, clamp_norm(_or_zero(acceleration), limits.acceleration))
     x, y, z = (
         v if math.isnan(p) and math.isnan(asked) and not math.isnan(a) else 0.0
         for v, p, asked, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
-    )  # where an acceleration alone is given, it adds to the present velocity
+    )  # an acceleration alone adds to the present velocity
     smoothing.move_at(add(add(approach, _or_zero(velocity)), add(gained, (x, y, z))), limits, view.dt)
 
 

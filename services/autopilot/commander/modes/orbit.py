@@ -1,4 +1,4 @@
-"""Round a place on a circle, as PX4's mode of this name."""
+"""Circular flight around a position, as in PX4."""
 
 import math
 
@@ -9,7 +9,7 @@ from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
 
 NAME = "orbit"
-TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR; the last is the usual one
+TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR
 RADIUS, LEAST_RADIUS, MOST_RADIUS = 10.0, 1.0, 1000.0  # [m]
 SPEED, MOST_ACCELERATION = 1.0, 2.0  # [m/s], [m/s^2] towards the centre
 GAIN = 1.0  # [1/s] speed towards the circle over the distance from it
@@ -34,7 +34,7 @@ class Mode(FlightMode):
         self._turns_left = turns if turns > 0.0 else math.inf
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Fly to the circle, and along it."""
+        """Fly to the circle and along it."""
         smoothing, limits = guidance.smoothing, guidance.limits
         x, y, _z = smoothing.position
         dx, dy = x - self._centre[0], y - self._centre[1]
@@ -43,7 +43,7 @@ class Mode(FlightMode):
         out = GAIN * (self._radius - distance)
         near = abs(out) < 1.0
         along = self._speed if near else 0.0
-        # The setpoint follows its velocity with a lag: it is led by the acceleration towards the centre.
+        # Compensates the lag of the smoothed setpoint.
         lead = along * along / max(distance, LEAST_RADIUS) / 3.0
         velocity: Vec3 = ((out - lead) * ux - along * uy, (out - lead) * uy + along * ux, 0.0)
         vertical = smoothing.velocity_to((x, y, self._centre[2]), limits)[2]

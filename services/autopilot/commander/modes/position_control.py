@@ -1,4 +1,4 @@
-"""By hand: the sticks ask for velocities along the vehicle's own heading."""
+"""Manual flight by velocities along the heading."""
 
 import math
 
@@ -18,7 +18,7 @@ class Mode(FlightMode):
         self._position: Vec3 | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Fly as the sticks say; hold the position when they are in the middle."""
+        """Follow the sticks; hold the position when they are centred."""
         forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
         if not guidance.armed:
             return

@@ -1,4 +1,4 @@
-"""Home, to a rally point or to the mission's landing, as RTL_TYPE says: up, across and round the fence, down."""
+"""Return home, to a rally point or to the mission's landing, by RTL_TYPE and within the geofence."""
 
 import math
 
@@ -11,13 +11,13 @@ from lapwing.services.autopilot.commander.leg import Leg
 
 NAME = "return"
 ACCEPTANCE_RADIUS = 0.3  # [m] around a corner of the path
-OVERHEAD = 1.0  # [m] across from home, within which it does not climb
+OVERHEAD = 1.0  # [m] horizontal distance to the goal below which it does not climb
 HOME_OR_RALLY, TO_LANDING, ALONG_MISSION, NEAREST = range(4)  # RTL_TYPE
 _CLIMB, _CRUISE, _WAIT = "climb", "home", "wait"
 
 
 class Mode(FlightMode):
-    """Climb to the height of return (or stay where it is higher), cross, wait if asked to, land."""
+    """Climb to the return altitude, cross, wait, land."""
 
     needs_flight = True
 
@@ -36,11 +36,11 @@ class Mode(FlightMode):
 
     @property
     def phase(self) -> str:
-        """Phase of the return: climb, home (across), wait (over the landing place)."""
+        """Phase of the return: climb, home (crossing), wait (above the landing position)."""
         return _WAIT if self._index == len(self._corners) else _CRUISE if self._index else _CLIMB
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """One corner after the other, then land."""
+        """Fly from corner to corner, then land."""
         if not guidance.flying:
             return
         self._leg.step(guidance, math.nan, view.dt)
@@ -57,7 +57,7 @@ class Mode(FlightMode):
 
 
 def _way(guidance: Guidance) -> list[Point]:
-    """Corners [m] of the path back."""
+    """Return the corners [m] of the path back."""
     x, y, _ = guidance.smoothing.position
     kind, route = guidance.parameters["RTL_TYPE"], guidance.route
     landing = next(((k, i) for k, i in enumerate(route.items) if i.action == "land"), None)
@@ -77,7 +77,7 @@ def _way(guidance: Guidance) -> list[Point]:
 
 
 def _place(item: object) -> Point | None:
-    """Where an item leads [m], None where it says nothing of a place."""
+    """Return the position of an item [m]. Return None if it has none."""
     action, position = item.action, item.position  # type: ignore[attr-defined]
     known = math.isfinite(position.x) and math.isfinite(position.y)
     return (position.x, position.y) if known and action in ("waypoint", "loiter_time", "land") else None

@@ -1,4 +1,4 @@
-"""By hand: the sticks ask for tilts, a thrust and a yaw rate; let go of, it levels itself and drifts."""
+"""Manual flight by tilts, thrust and yaw rate; centred sticks level the vehicle."""
 
 import math
 
@@ -21,7 +21,7 @@ class Mode(FlightMode):
         self._flight: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Fly as the sticks say; when nobody holds them any more, by itself."""
+        """Follow the sticks; change mode without recent sticks."""
         forward, left, up, turn = (guidance.inputs.stick(k) for k in range(4))
         thrust = stick_thrust(constants, up)
         if not guidance.flying:
@@ -38,7 +38,7 @@ class Mode(FlightMode):
     def _turn(
         self, view: CommanderInput, guidance: Guidance, forward: float, left: float, turn: float, flight: AttitudeFlight
     ) -> float:
-        """Turn the attitude on by a tick; its yaw rate [rad/s]."""
+        """Rotate the attitude for a tick. Return its yaw rate [rad/s]."""
         tilt, rate = guidance.manual_tilt, turn * math.radians(guidance.parameters["MPC_MAN_Y_MAX"])
         flight.take(from_roll_pitch_yaw(-tilt * left, tilt * forward, flight.yaw + rate * view.dt), guidance)
         return rate

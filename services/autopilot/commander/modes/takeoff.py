@@ -1,4 +1,4 @@
-"""Up, and then hold."""
+"""Take-off."""
 
 import math
 
@@ -12,7 +12,7 @@ REACHED = 0.1  # [m]
 
 
 class Mode(FlightMode):
-    """Straight up to a world z [m], else MIS_TAKEOFF_ALT above home, at the yaw given or the present one."""
+    """Climb vertically, then hold. Values: world z [m], default MIS_TAKEOFF_ALT above home; yaw [rad]."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         asked, ground = value(values, 0), constants.resting_height
@@ -25,11 +25,11 @@ class Mode(FlightMode):
 
     @property
     def phase(self) -> str:
-        """The height that it climbs to."""
+        """Text of the target height."""
         return f"to {self._height:g} m"
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
-        """Climb; the setpoint starts from the ground as soon as the motors are armed."""
+        """Climb once the motors are armed."""
         if not guidance.armed:
             return
         guidance.lift_off(constants, view)

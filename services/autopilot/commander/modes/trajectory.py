@@ -1,4 +1,4 @@
-"""The scene's own `[trajectory]`, setpoint by setpoint."""
+"""The scene's `[trajectory]`."""
 
 from lapwing.services.autopilot.commander.commander_input import Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
@@ -8,7 +8,7 @@ NAME = "phases"
 
 
 class Mode(FlightMode):
-    """Follows the setpoints of the trajectory; once left, it is not entered again."""
+    """Trajectory mode; it cannot be entered again after it was left."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         raise ValueError("phases: the trajectory of the scene has been left")
