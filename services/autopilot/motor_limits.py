@@ -12,7 +12,7 @@ def check(scene: Scene, known: Airframe) -> None:
     """Check current, power and voltage of a motor in hover if `motor_electrics` is active (theory.md, eq. (2.9)).
 
     Raises:
-        KeyedError: a limit is exceeded.
+        ConfigError: a limit is exceeded.
     """
     if "motor_electrics" not in scene[Effects].tables:
         return

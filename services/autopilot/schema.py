@@ -60,7 +60,7 @@ class Autopilot(SceneTable):
             tree[cls.TABLE]["parameters"] = parse(text, path)
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
+        """Raise ConfigError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
         parameters.table(scene)
         if not self.trajectory and not self.operator:
             message = "false leaves no source of setpoints; set operator = true too"

@@ -45,7 +45,7 @@ class Parameter(NamedTuple):
         return self.least <= value <= self.most and not (self.whole and value != int(value))
 
     def check(self, value: float) -> None:
-        """Raise KeyedError if the value is invalid."""
+        """Raise ConfigError if the value is invalid."""
         if not self.allows(value):
             kind = "a whole number" if self.whole else "a number"
             raise ConfigError(self.name, f"got {value:g}", f"{kind} from {self.least:g} to {self.most:g}")
@@ -118,7 +118,7 @@ def table(scene: "Scene") -> dict[str, Parameter]:
     """Return the parameters of a scene with an `[autopilot]` by name, with the scene's defaults.
 
     Raises:
-        KeyedError: the scene sets an unknown parameter or an invalid value.
+        ConfigError: the scene sets an unknown parameter or an invalid value.
     """
     return dict(scene.once(_table))
 

@@ -33,7 +33,7 @@ class Communication(SceneTable):
         return 1 if self.coupling == "sequential" else 2
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless a tick is a whole number of nanoseconds."""
+        """Raise ConfigError unless a tick is a whole number of nanoseconds."""
         if 1_000_000_000 % self.rate:
             expected = "a rate with a whole number of ns per tick (100, 125, 200, 250, 400, 500, 1000, ...)"
             raise ConfigError("exchange.rate", f"got {self.rate} Hz", expected)
@@ -53,7 +53,7 @@ class Rates(SceneTable):
     contact: int | None = Field(default=None, gt=0)  # [Hz] forces on every foot of a multirotor; unset: not published
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless every rate divides the exchange rate."""
+        """Raise ConfigError unless every rate divides the exchange rate."""
         for key in type(self).model_fields:
             if (rate := getattr(self, key)) is not None:
                 ticks(scene, min(rate, scene[Communication].rate), f"rates.{key}")
@@ -63,7 +63,7 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
     """Return the ticks between messages at `rate` [Hz].
 
     Raises:
-        KeyedError: the rate of `key` does not divide the exchange rate.
+        ConfigError: the rate of `key` does not divide the exchange rate.
     """
     exchange = scene[Communication].rate
     if rate <= 0 or exchange % rate:

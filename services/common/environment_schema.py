@@ -40,7 +40,7 @@ class Steps(Table):
     heading: Turn = 0.0  # [rad] direction in which they are lined up, 0 along x
 
     def pairs(self) -> list[tuple[float, float]]:
-        """Return (distance, rise) of each step. Raise KeyedError if the keys differ in length."""
+        """Return (distance, rise) of each step. Raise ConfigError if the keys differ in length."""
         if len(self.distance) != len(self.rise):
             raise ConfigError(
                 "steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}"
@@ -87,7 +87,7 @@ class Terrain(Table):
     cylinder: tuple[Cylinder, ...] = Field(default=(), strict=False)  # upright cylinders with level tops
 
     def ground(self) -> Level | Relief:
-        """Return the terrain for compiled code. Raise KeyedError with a key relative to this table."""
+        """Return the terrain for compiled code. Raise ConfigError with a key relative to this table."""
         grid, steps = self.grid, self.steps
         if grid and grid.heights is None:
             raise ConfigError("grid", "has neither file nor heights", "one of them")
@@ -149,7 +149,7 @@ class EnvironmentTable(SceneTable):
         table["heights"] = heights.tolist()
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError if the date or the terrain is invalid."""
+        """Raise ConfigError if the date or the terrain is invalid."""
         try:
             _resolved(self)
         except ConfigError as error:
@@ -162,7 +162,7 @@ class EnvironmentTable(SceneTable):
 
 @lru_cache(maxsize=16)
 def _resolved(table: EnvironmentTable) -> Environment:
-    """Return the environment in numbers. Raise KeyedError with a key relative to the table."""
+    """Return the environment in numbers. Raise ConfigError with a key relative to the table."""
     try:
         terrain = table.terrain.ground()
     except ConfigError as error:

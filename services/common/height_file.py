@@ -17,7 +17,7 @@ def of_array(key: str, path: Path) -> np.ndarray:
     """Return the array of an .npy file.
 
     Raises:
-        KeyedError: for `key`, if the file has no two-dimensional array of numbers.
+        ConfigError: for `key`, if the file has no two-dimensional array of numbers.
     """
     try:
         array = np.load(path, allow_pickle=False)
@@ -44,7 +44,7 @@ def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) ->
         [m] rows from south to north, columns from west to east, shape (2 points + 1, 2 points + 1).
 
     Raises:
-        KeyedError: rasterio is missing, or the file has no heights in metres or does not cover the square.
+        ConfigError: rasterio is missing, or the file has no heights in metres or does not cover the square.
     """
     try:
         import rasterio

@@ -38,7 +38,7 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
         folder: folder of the file that names the mesh.
 
     Raises:
-        KeyedError: the file is missing or invalid.
+        ConfigError: the file is missing or invalid.
     """
     if not isinstance(name := named(tree, "airframe", "mesh"), str):
         return
@@ -54,7 +54,7 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
 
 
 def check(scene: Scene, mesh: str | None, reach: float) -> None:
-    """Raise KeyedError if the mesh was not read or is too large for rotors within `reach` [m] of the origin."""
+    """Raise ConfigError if the mesh was not read or is too large for rotors within `reach` [m] of the origin."""
     if mesh is None:
         return
     text = scene[Meshes].text(mesh) if scene.has(Meshes) else None

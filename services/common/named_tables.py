@@ -29,13 +29,13 @@ class NamedTables(SceneTable):
                 user_modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless every entry is a table."""
+        """Raise ConfigError unless every entry is a table."""
         for name, table in self.tables.items():
             if not isinstance(table, dict):
                 raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
 
     def load(self, scene: Scene) -> None:
-        """Import the user modules. Raise KeyedError if one cannot be imported."""
+        """Import the user modules. Raise ConfigError if one cannot be imported."""
         texts = user_modules.texts(scene)
         for name, table in self.tables.items():
             if "module" in table:

@@ -31,7 +31,7 @@ class Success(SceneTable):
     )  # expressions over the metrics of the flight; all must hold
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless every expression is valid."""
+        """Raise ConfigError unless every expression is valid."""
         for i, text in enumerate(self.require):
             try:
                 _expression(text)
@@ -39,7 +39,7 @@ class Success(SceneTable):
                 raise ConfigError(f"success.require.{i}", f"got {text!r}", EXPECTED) from None
 
     def check_names(self, known: Mapping[str, Any]) -> None:
-        """Raise KeyedError if an expression uses an unknown metric."""
+        """Raise ConfigError if an expression uses an unknown metric."""
         for i, text in enumerate(self.require):
             for name in sorted(_expression(text).names - set(known)):
                 raise ConfigError.unknown(f"success.require.{i}", "figure", name, known)

@@ -58,7 +58,7 @@ def _carried(thing: Any, folder: Path) -> str:
 
 
 def parted(key: str, text: str) -> tuple[str, str]:
-    """Return module and name of "module:Name". Raise KeyedError for another form."""
+    """Return module and name of "module:Name". Raise ConfigError for another form."""
     module, _, name = text.partition(":")
     if not module or not name.isidentifier():
         raise ConfigError(key, f"got {text!r}", '"module:Name"')
@@ -66,7 +66,7 @@ def parted(key: str, text: str) -> tuple[str, str]:
 
 
 def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
-    """Return a module that the run configuration stores. Raise KeyedError if it cannot be imported."""
+    """Return a module that the run configuration stores. Raise ConfigError if it cannot be imported."""
     try:
         return user_module.load(module, texts)
     except SyntaxError as error:
@@ -79,7 +79,7 @@ def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, An
     """Return the module of "module:Name" and the object of that name.
 
     Raises:
-        KeyedError: the module cannot be imported or lacks the name, or the object is not registered.
+        ConfigError: the module cannot be imported or lacks the name, or the object is not registered.
     """
     module, name = parted(key, text)
     if module == MEMORY:

@@ -34,7 +34,7 @@ def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
         module: module name.
 
     Raises:
-        KeyedError: the module is missing or cannot be read.
+        ConfigError: the module is missing or cannot be read.
     """
     for name, path in user_module.find(key, module, files.folder).items():
         tree.setdefault(Modules.TABLE, {})[name] = files.text(f"{Modules.TABLE}.{name}", key, path)

@@ -63,7 +63,7 @@ class Vehicle(SceneTable):
             tree[VehicleAirframe.TABLE] = laid_over(frame, {"mass": {"total": mass}})
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless the mass agrees with the airframe's."""
+        """Raise ConfigError unless the mass agrees with the airframe's."""
         if self.mass is None:
             return
         if not scene.has(VehicleAirframe):
@@ -87,7 +87,7 @@ class VehicleAirframe(Airframe, SceneTable):
     model_config = ConfigDict(strict=False)
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless the mesh was read and fits the rotors in size."""
+        """Raise ConfigError unless the mesh was read and fits the rotors in size."""
         mesh_schema.check(scene, self.mesh, max(math.hypot(*place) for place in self.rotors.position))
 
 
@@ -109,7 +109,7 @@ class Effects(NamedTables):
                     raise error.under(f"{cls.TABLE}.{name}") from None
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless all effects exist, have valid parameters and are compatible."""
+        """Raise ConfigError unless all effects exist, have valid parameters and are compatible."""
         super().check(scene)
         active(scene)
 
@@ -118,7 +118,7 @@ def airframe(scene: Scene) -> Airframe:
     """Return the scene's airframe with its payload, with positions relative to the common centre of mass.
 
     Raises:
-        KeyedError: the scene has no airframe.
+        ConfigError: the scene has no airframe.
     """
     if not scene.has(VehicleAirframe):
         raise ConfigError("vehicle.airframe", "missing", "the name of an airframe, or the path of a .toml file")
@@ -148,7 +148,7 @@ def rotor_constants(scene: Scene) -> RotorConstants:
     """Return the constants of the scene's rotor effect, or of the airframe's [propeller].
 
     Raises:
-        KeyedError: the scene has neither.
+        ConfigError: the scene has neither.
     """
     for effect in active(scene):
         if isinstance(effect, RotorQuadratic | RotorTable):
@@ -197,7 +197,7 @@ def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
 
 
 def _upright(pose: Pose) -> None:
-    """Raise KeyedError if the feet find no common ground, for example next to a wall."""
+    """Raise ConfigError if the feet find no common ground, for example next to a wall."""
     upward = rotate(pose[1], (0.0, 0.0, 1.0))[2]
     lean = math.degrees(math.acos(min(upward, 1.0)))
     if lean > STEEPEST_START:
@@ -206,7 +206,7 @@ def _upright(pose: Pose) -> None:
 
 
 def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
-    """Raise KeyedError if a part of the resting vehicle is below the ground."""
+    """Raise ConfigError if a part of the resting vehicle is below the ground."""
     (x, y, z), attitude = pose
     hull = frame.contact.hull if frame.contact else ()
     for part in ((0.0, 0.0, 0.0), *frame.rotors.position, *hull):

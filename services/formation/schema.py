@@ -25,7 +25,7 @@ class Formation(SceneTable):
     epsilon: float = Field(gt=0.0)  # time-scale separation of the attitude loop
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless there is a load and a direction for every link."""
+        """Raise ConfigError unless there is a load and a direction for every link."""
         if not scene.has(CooperativeLoad):
             raise ConfigError("cooperative_load", "missing", "a table [cooperative_load] for the formation")
         n = len(scene[CooperativeLoad].link_length)

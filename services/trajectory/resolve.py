@@ -52,7 +52,7 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
         keys: prefix of each vehicle's scene keys.
 
     Raises:
-        KeyedError: a leader does not exist or follows another vehicle.
+        ConfigError: a leader does not exist or follows another vehicle.
     """
     return {name: _following(name, shares, keys[name]) if share.parameters.follow else share
             for name, share in shares.items()}  # fmt: skip

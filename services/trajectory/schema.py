@@ -48,7 +48,7 @@ class Trajectory(Phases, SceneTable):
                         segment["points"] = parse(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:
-        """Raise KeyedError unless the segments join, phases are long enough, and a frame has a leader."""
+        """Raise ConfigError unless the segments join, phases are long enough, and a frame has a leader."""
         compiled(scene)
         if self.frame and not self.follow:
             raise ConfigError("trajectory.frame", "has no leader", "trajectory.follow, or no frame")

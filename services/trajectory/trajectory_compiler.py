@@ -27,7 +27,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
     """Compile a trajectory about an origin (position in world [m], yaw [rad]).
 
     Raises:
-        KeyedError: a phase is shorter than its segments, or a segment does not join its predecessor.
+        ConfigError: a phase is shorter than its segments, or a segment does not join its predecessor.
     """
     joined: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
     value = dict.fromkeys(CHANNELS, 0.0)

@@ -53,7 +53,7 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
         options: options of the constructor.
 
     Raises:
-        KeyedError: the controller cannot be constructed, has no rate, or its step fails or returns another type.
+        ConfigError: the controller cannot be constructed, has no rate, or its step fails or returns another type.
     """
     module, found = named(CONTROLLER, name, texts)
     start = (0.0, 0.0, vehicle.resting_height)
@@ -118,7 +118,7 @@ def constructor(
     """Return a function that constructs the user's class, or copies the user's object, that `key` names.
 
     Raises:
-        KeyedError: an object has options, or the constructor fails.
+        ConfigError: an object has options, or the constructor fails.
     """
     if options and not inspect.isclass(found):
         raise ConfigError(f"{key}_options", f"a {type(found).__name__} object takes no options", "a class")
@@ -135,7 +135,7 @@ def constructor(
 
 
 def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Return parameters and initial state of a compiled controller. Raise KeyedError if they are invalid."""
+    """Return parameters and initial state of a compiled controller. Raise ConfigError if they are invalid."""
     try:
         p, s = found(vehicle, **options)
     except FAULTS as error:

@@ -22,7 +22,7 @@ class Segment(BaseModel):
         return cls.model_fields["kind"].default
 
     def pieces(self, start: float) -> list[Piece]:
-        """Return the pieces from value `start` [u]. Raise KeyedError if they do not join it."""
+        """Return the pieces from value `start` [u]. Raise ConfigError if they do not join it."""
         raise NotImplementedError
 
     def end(self, start: float) -> float:

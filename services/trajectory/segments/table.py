@@ -30,7 +30,7 @@ class Table(Segment):
         return self
 
     def pieces(self, start: float) -> list[Piece]:
-        """Return one linear piece between neighbouring points. Raise KeyedError if the table does not join."""
+        """Return one linear piece between neighbouring points. Raise ConfigError if the table does not join."""
         if abs(self.points[0][1] - start) > TOLERANCE:
             message = f"the table starts at {self.points[0][1]}, but the channel is at {start}"
             raise ConfigError("points.0.1", f"{message}: put a ramp or a step before it")

@@ -48,5 +48,5 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
 
 
 def test_a_vehicle_too_heavy_to_hover_is_refused():
-    with pytest.raises(ValueError, match=r"less than the 49.0 N that"):
+    with pytest.raises(ValueError, match=r"below the 49.0 N"):
         build(load("paper"), AIRFRAME._replace(mass=20.0))
