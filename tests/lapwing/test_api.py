@@ -99,7 +99,7 @@ class Faulty(NamedTuple):
         (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), "fast"), "has rate = 'fast'; expected a number of steps a second"),
         (7, "memory:int has no step; expected the method `step`"),
         ("memory:Gone", "Gone was an object in the memory of the Python session"),
-        ("nowhere", "expected a text of the form \"module:Name\", got 'nowhere'"),
+        ("nowhere", "expected \"module:Name\", got 'nowhere'"),
     ],
 )
 def test_a_controller_that_cannot_be_flown_is_a_scene_error_of_one_line(controller, said):
