@@ -8,6 +8,7 @@ import typer
 from lapwing.cli import (  # noqa: F401 (they register themselves)
     campaign_commands,
     certificates_command,
+    flight_commands,
     log_commands,
     log_playback,
     new_command,

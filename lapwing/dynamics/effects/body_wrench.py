@@ -1,0 +1,46 @@
+"""Constant force and torque in body axes."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import wrench_body
+from lapwing.dynamics.vector import Vec3
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Force = Annotated[float, Ge(-1e4), Le(1e4)]
+Torque = Annotated[float, Ge(-1e4), Le(1e4)]
+
+
+class Settings(NamedTuple):
+    """Keys of the scene's table."""
+
+    force: tuple[Force, Force, Force] = (0.0, 0.0, 0.0)  # [N] at the centre of mass, body
+    torque: tuple[Torque, Torque, Torque] = (0.0, 0.0, 0.0)  # [N m] body
+
+
+class BodyWrench(NamedTuple):
+    """A constant force and torque in body axes: the trim of a real vehicle (theory.md, eq. (2.65)).
+
+    It stands for what is constant over seconds and no other effect explains: a shifted centre of mass, unequal motors,
+    a bent arm. Source: the output bias of output-error estimation, Jategaonkar, Flight Vehicle System Identification
+    (2015), section 4. Valid while these causes are constant in the body.
+    """
+
+    force: Vec3  # [N]
+    torque: Vec3  # [N m]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyWrench":
+        """Take both from the scene's table."""
+        given = checked(Settings, table)
+        return cls(given.force, given.torque)
+
+
+@wrench_body(BodyWrench)
+def body_wrench(e, memory, s, rotors):
+    """Force [N] and torque [N m] in body coordinates."""
+    return e.force, e.torque

@@ -1,0 +1,42 @@
+"""Torque of the air against the vehicle's rotation."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._hooks import torque
+from lapwing.dynamics.vector import Vec3, multiply, scale, subtract
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+Coefficient = Annotated[float, Ge(0), Le(1e3)]
+
+
+class Settings(NamedTuple):
+    """Keys of the scene's table."""
+
+    linear: tuple[Coefficient, Coefficient, Coefficient]  # [N m s/rad] about body x, y, z
+
+
+class RotationalDrag(NamedTuple):
+    """A torque -c omega about each body axis, relative to the air (theory.md, eq. (2.66)).
+
+    It lumps the damping of the rotors, whose inflow changes as the vehicle rolls and pitches, and of the fuselage.
+    Source: the damping derivatives L_p, M_q, N_r of flight mechanics; identified from flights. Valid for rates at
+    which the inflow stays small beside the induced velocity. Beside `rotor_inflow` it adds to the damping there.
+    """
+
+    linear: Vec3  # [N m s/rad]
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotationalDrag":
+        """Take the coefficients from the scene's table."""
+        return cls(checked(Settings, table).linear)
+
+
+@torque(RotationalDrag)
+def rotational_drag(e, memory, s, rotors):
+    """Torque [N m] in body coordinates."""
+    return scale(-1.0, multiply(e.linear, subtract(s.motion.omega_body, s.air_rate_body)))

@@ -1,0 +1,119 @@
+"""Mapping files: which column holds which quantity, in which unit and frame."""
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from lapwing.dynamics.validation import fault
+
+GRAVITY = 9.80665  # [m/s^2]
+SCALES = {
+    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9,
+    "m": 1.0, "cm": 1e-2, "mm": 1e-3,
+    "m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3,
+    "rad": 1.0, "deg": np.pi / 180.0,
+    "rad/s": 1.0, "deg/s": np.pi / 180.0, "mrad/s": 1e-3,
+    "m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY,
+    "V": 1.0, "mV": 1e-3, "cV": 1e-2,
+}  # fmt: skip
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Scalar(_Table):
+    """One column."""
+
+    column: str
+    unit: str
+    range: tuple[float, float] | None = None  # SI; readings outside are faults
+    smoothing: float = 0.0  # [s] window of a running median
+
+
+class Vector(_Table):
+    """Three columns of a vector, or four of a quaternion."""
+
+    columns: tuple[str, ...]
+    unit: str
+    frame: Literal["enu", "ned", "flu", "frd", "enu_flu", "ned_frd"]
+    sign: tuple[int, ...] = ()  # of each column, after the frame; all positive if left out
+
+
+class Motors(_Table):
+    """A column for each motor, in the order of the airframe."""
+
+    columns: tuple[str, ...]
+    unit: Literal["duty", "V"]
+    full_scale: float = 1.0  # value of the columns at full duty, or at 1 V
+    offset: float = 0.0  # value of the columns at zero duty
+
+
+class Mapping(_Table):
+    """Every quantity that an import knows."""
+
+    time: Scalar
+    position: Vector
+    attitude: Vector
+    velocity: Vector | None = None
+    omega: Vector
+    specific_force: Vector | None = None
+    motors: Motors
+    battery: Scalar | None = None
+    power: Scalar | None = None
+
+    @property
+    def columns(self) -> list[str]:
+        """Every column named."""
+        tables = [getattr(self, name) for name in type(self).model_fields]
+        return [c for t in tables if t is not None for c in ([t.column] if isinstance(t, Scalar) else t.columns)]
+
+
+def shipped_mappings() -> list[str]:
+    """Return the names of the mappings that ship."""
+    return sorted(f.name.removesuffix(".toml") for f in files(__package__).joinpath("mappings").iterdir())
+
+
+def load_mapping(name: str) -> Mapping:
+    """Read a mapping by the name of one that ships, or by the path of a TOML file.
+
+    Raises:
+        ValueError: no such mapping, or an invalid one.
+    """
+    shipped = shipped_mappings()
+    if name in shipped:
+        text = files(__package__).joinpath("mappings", f"{name}.toml").read_text(encoding="utf-8")
+    else:
+        path = Path(name)
+        if path.suffix != ".toml":
+            raise ValueError(f"--mapping {name}: unknown; use one of {', '.join(shipped)}, or a .toml file")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ValueError(f"--mapping {name}: cannot be read: {getattr(error, 'strerror', error)}") from None
+    try:
+        mapping = Mapping.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"--mapping {name}: not valid TOML: {error}") from None
+    except ValidationError as error:
+        raise ValueError(f"--mapping {name}: {fault(error, Mapping)}") from None
+    _check(name, mapping)
+    return mapping
+
+
+def _check(name: str, mapping: Mapping) -> None:
+    for key in type(mapping).model_fields:
+        table: Any = getattr(mapping, key)
+        if table is None or isinstance(table, Motors):
+            continue
+        counts = (3, 4) if key == "attitude" else (3,)
+        if isinstance(table, Vector) and len(table.columns) not in counts:
+            raise ValueError(f"--mapping {name}: {key}.columns has {len(table.columns)} names; expected {counts[-1]}")
+        other = {"attitude": ("wxyz", "xyzw"), "power": ("W",)}.get(key, ())
+        if table.unit not in SCALES and table.unit not in other:
+            known = ", ".join((*SCALES, *other))
+            raise ValueError(f"--mapping {name}: {key}.unit {table.unit!r} is unknown; use one of {known}")

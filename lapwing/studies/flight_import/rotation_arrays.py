@@ -1,0 +1,63 @@
+"""Quaternions w, x, y, z in arrays of shape (n, 4), body to world."""
+
+import numpy as np
+
+SMALL = 1e-9  # [rad]
+
+
+def unit(q: np.ndarray) -> np.ndarray:
+    """Return the quaternions with norm 1; NaN where the norm is 0."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the products a b."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: np.ndarray) -> np.ndarray:
+    """Return the inverse rotations."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotation_vector(q: np.ndarray) -> np.ndarray:
+    """Return the rotation vectors [rad] of angle up to pi, shape (n, 3)."""
+    q = q * np.where(q[..., :1] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    return q[..., 1:] * np.where(sine > SMALL, angle / np.maximum(sine, SMALL), 2.0)
+
+
+def from_vector(v: np.ndarray) -> np.ndarray:
+    """Return the quaternions of rotation vectors [rad], shape (n, 3)."""
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * v], axis=-1)
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return body vectors in world coordinates, shape (n, 3)."""
+    t = 2.0 * np.cross(q[..., 1:], v)
+    return v + q[..., :1] * t + np.cross(q[..., 1:], t)
+
+
+def body_rate(q: np.ndarray, interval: np.ndarray) -> np.ndarray:
+    """Return the mean body rate [rad/s] over the interval [s] before each sample, shape (n, 3); zero at the first."""
+    turned = rotation_vector(product(conjugate(q[:-1]), q[1:])) / interval[1:, None]
+    return np.concatenate([np.zeros((1, 3)), turned])
+
+
+def from_ned_frd(q: np.ndarray) -> np.ndarray:
+    """Return attitudes of FRD body axes in NED as those of FLU body axes in ENU."""
+    half = np.sqrt(0.5)
+    return product(product(np.array([0.0, half, half, 0.0]), q), np.array([0.0, 1.0, 0.0, 0.0]))

@@ -1,0 +1,1 @@
+"""Identification: parameters of the plant estimated from recorded flights."""

@@ -1,0 +1,202 @@
+"""Output-error estimation of plant parameters over multi-step windows.
+
+The plant predicts every window from its measured start under the measured commands; the parameters minimise a robust
+sum of squared prediction errors. Only the commands inside a window enter the prediction, not the measured response, so
+that the feedback of the autopilot does not bias the estimate the way it biases equation-error regression (Jategaonkar,
+Flight Vehicle System Identification, 2015, sections 4 and 9).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
+from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
+from lapwing.studies.validation.windows import Errors, compare, predict, window_starts
+
+STEP = 1e-4  # of a scaled parameter, for derivatives
+RANGE = 50.0  # times the start value, and its fraction, within which a positive parameter is sought
+HORIZONS = (10, 25, 50)  # samples
+LOSS_SCALE = 0.5  # residual, in units of its scale, where the robust loss turns from square to linear
+CLUSTER = 4.0  # [s] of flight that counts as one independent observation for standard errors
+LARGEST = 1e3  # residual, in units of its scale
+FIELDS = ("position", "velocity", "attitude", "rate")
+
+
+class Window(NamedTuple):
+    """Windows of one flight."""
+
+    flight: int
+    starts: np.ndarray
+
+
+class Fit(NamedTuple):
+    """Estimated parameters."""
+
+    keys: tuple[str, ...]
+    start: np.ndarray  # values before
+    values: np.ndarray
+    standard_errors: np.ndarray  # clustered over spans of flight, not over samples
+    correlations: np.ndarray  # shape (k, k)
+    cost: float  # robust mean squared residual, over its scale
+    evaluations: int
+    undetermined: tuple[str, ...]  # keys that the flights do not determine
+
+
+class OutputError:
+    """The estimation problem: residuals of all windows for any parameter values."""
+
+    def __init__(
+        self,
+        plant: PlantRows,
+        flights: Sequence[Recording],
+        keys: Sequence[str],
+        start: Sequence[float],
+        windows: int = 1500,
+        memory: TrimMemory = NO_TRIM,
+        horizons: tuple[int, ...] = HORIZONS,
+    ):
+        """Choose windows that do not overlap more than their number asks for.
+
+        Args:
+            plant: of the scene, at the interval of the recordings.
+            flights: to learn from.
+            keys: free parameters: keys of the scene, or of `flight_parameters`.
+            start: their values to begin with.
+            windows: about how many to use.
+            memory: of the trim.
+            horizons: [samples] at which errors count.
+        """
+        self.plant, self.flights, self.keys = plant, list(flights), tuple(keys)
+        self.start, self.memory, self.horizons = np.array(start, float), memory, horizons
+        self.scale = np.where(self.start != 0.0, np.abs(self.start), 1e-2)
+        available = [window_starts(f, horizons[-1], 1) for f in self.flights]
+        total = sum(map(len, available))
+        if total == 0:
+            raise ValueError("no flight has a valid window in the air; give flights that leave the ground")
+        stride = max(1, total // windows)
+        self.windows = [Window(k, a[stride // 2 :: stride]) for k, a in enumerate(available) if len(a)]
+        self.weights = np.ones((len(horizons), len(FIELDS)))
+        self.weights = 1.0 / self._scales()
+        self.evaluations = 0
+        self._count = sum(len(w.starts) for w in self.windows) * len(horizons) * len(FIELDS) * 3
+
+    def _scales(self) -> np.ndarray:
+        """Spread of the errors at the start values, by horizon and field: the units of the residuals."""
+        residual = self._errors([self.start])[0]
+        with np.errstate(invalid="ignore"):
+            return np.maximum(np.nanmedian(np.abs(residual), axis=(0, 3)) * 1.4826, 1e-9)
+
+    def residuals(self, sets: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return scaled residuals of each parameter set, shape (windows, h, 4, 3)."""
+        return [errors * self.weights[None, :, :, None] for errors in self._errors(sets)]
+
+    def _errors(self, sets: Sequence[np.ndarray]) -> list[np.ndarray]:
+        own = [k for k, key in enumerate(self.keys) if not is_flight_parameter(key)]
+        groups: dict[tuple, list[int]] = {}
+        for i, values in enumerate(sets):
+            rest = tuple((self.keys[k], float(values[k])) for k in range(len(self.keys)) if k not in own)
+            groups.setdefault(rest, []).append(i)
+        out: list[np.ndarray | None] = [None] * len(sets)
+        for rest, members in groups.items():
+            flights = [apply_flight_parameters(f, dict(rest)) for f in self.flights]
+            self.plant.set_parameters([{self.keys[k]: float(sets[i][k]) for k in own} for i in members])
+            states = start_states(self.plant, flights, self.memory)
+            for j, i in enumerate(members):
+                parts = []
+                for flight, starts in self.windows:
+                    r = flights[flight]
+                    found = predict(self.plant, r, starts, states[flight], self.horizons, j)
+                    parts.append(_stacked(compare(r, starts, self.horizons, found)))
+                out[i] = np.concatenate(parts)
+        return [values for values in out if values is not None]
+
+    def clusters(self) -> np.ndarray:
+        """Return the cluster of each window: flight and span of time."""
+        span = round(CLUSTER / self.plant.interval)
+        names = np.concatenate([flight * 1_000_000 + starts // span for flight, starts in self.windows])
+        return np.unique(names, return_inverse=True)[1]
+
+    def solve(
+        self,
+        begin: np.ndarray | None = None,
+        most: int = 20,
+        report: Callable[[int, np.ndarray, float], None] | None = None,
+    ) -> Fit:
+        """Minimise the robust loss.
+
+        Args:
+            begin: values to continue from; the start values without.
+            most: evaluations of the derivatives at most.
+            report: called after each step with its number, the values, and the cost.
+        """
+        bounds = np.array([(s / RANGE, s * RANGE) if s > 0.0 else (-np.inf, np.inf) for s in self.start]).T
+
+        def residual(x: np.ndarray) -> np.ndarray:
+            self.evaluations += 1
+            try:
+                return _flat(self.residuals([x * self.scale])[0])
+            except ValueError:  # a step to values that the scene rejects: the solver takes a shorter one
+                return np.full(self._count, LARGEST)
+
+        def jacobian(x: np.ndarray) -> np.ndarray:
+            steps = STEP * np.maximum(np.abs(x), 1e-2)
+            sets = [x * self.scale, *((x + steps * row) * self.scale for row in np.eye(len(x)))]
+            base, *found = (_flat(r) for r in self.residuals(sets))
+            if report:
+                report(len(calls), x * self.scale, float(np.mean(_loss(base))))
+            calls.append(1)
+            return np.column_stack([(f - base) / step for f, step in zip(found, steps, strict=True)])
+
+        calls: list[int] = []
+        begin = self.start if begin is None else begin
+        inner = np.clip(begin / self.scale, bounds[0] / self.scale * (1 + 1e-9), bounds[1] / self.scale * (1 - 1e-9))
+        solution = least_squares(
+            residual, inner, jac=jacobian, bounds=(bounds[0] / self.scale, bounds[1] / self.scale),
+            loss="soft_l1", f_scale=LOSS_SCALE, x_scale="jac", max_nfev=most, ftol=1e-5, xtol=1e-5,
+        )  # fmt: skip
+        return self._fit(solution.x, jacobian(solution.x))
+
+    def _fit(self, x: np.ndarray, jacobian: np.ndarray) -> Fit:
+        """Standard errors by the sandwich estimator over clusters of windows."""
+        residual = _flat(self.residuals([x * self.scale])[0])
+        gain = 1.0 / np.sqrt(1.0 + (residual / LOSS_SCALE) ** 2)  # derivative of the loss
+        weighted = jacobian * gain[:, None]
+        information = jacobian.T @ weighted
+        score = (weighted * residual[:, None]).reshape(len(self.clusters()), -1, len(x)).sum(axis=1)
+        names = self.clusters()
+        count = int(names.max()) + 1
+        total = np.zeros((count, len(x)))
+        np.add.at(total, names, score)
+        total -= total.mean(axis=0)
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        normal = information / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(normal)
+        inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
+        middle = total.T @ total * count / max(count - 1, 1)
+        covariance = inverse @ middle @ inverse
+        deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        correlation = covariance / np.maximum(np.outer(deviation, deviation), 1e-300)
+        vague = deviation > 0.5 * np.maximum(np.abs(x), 1e-2)
+        mixed = np.abs(correlation - np.eye(len(x))).max(axis=1, initial=0.0) > 0.98
+        return Fit(
+            self.keys, self.start, x * self.scale, deviation * self.scale, correlation, float(np.mean(_loss(residual))),
+            self.evaluations, tuple(k for k, a, b in zip(self.keys, vague, mixed, strict=True) if a or b),
+        )  # fmt: skip
+
+
+def _stacked(e: Errors) -> np.ndarray:
+    """Errors of all fields, shape (n, h, 4, 3)."""
+    return np.stack([getattr(e, name) for name in FIELDS], axis=2)
+
+
+def _flat(residual: np.ndarray) -> np.ndarray:
+    return np.clip(np.nan_to_num(residual, nan=LARGEST, posinf=LARGEST, neginf=-LARGEST), -LARGEST, LARGEST).ravel()
+
+
+def _loss(residual: np.ndarray) -> Any:
+    return 2.0 * LOSS_SCALE**2 * (np.sqrt(1.0 + (residual / LOSS_SCALE) ** 2) - 1.0)

@@ -1,0 +1,1 @@
+"""Validation: prediction errors of the plant against recorded flights."""

@@ -1,0 +1,53 @@
+"""Terminal tables of `lapwing validate`."""
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.studies.validation.prediction_metrics import FIELDS, Metric
+from lapwing.studies.validation.procedure import Validation
+
+UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2"), strict=True))
+
+
+def show(console: Console, found: Validation) -> None:
+    """Print the errors beside the baselines, and what was left out."""
+    table = Table(
+        title=f"{found.scene}: mean absolute prediction error, {found.windows} windows, {len(found.flights)} flights"
+    )
+    table.add_column("after", justify="right")
+    table.add_column("predicted by")
+    for name in FIELDS:
+        table.add_column(f"{name.replace('_', ' ')} [{UNITS[name]}]", justify="right")
+    for k, steps in enumerate(found.horizons):
+        after = f"{steps * found.interval:g} s"
+        table.add_row(after, "plant", *(_with_interval(m) for m in found.plant[k]))
+        for name, rows in found.baselines.items():
+            last = name == list(found.baselines)[-1]
+            table.add_row("", name.replace("_", " "), *(_plain(m.mean) for m in rows[k]), end_section=last)
+    console.print(table)
+    memory = found.memory
+    console.print(
+        f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
+        f"{memory.torque:g} s (torque); 95 % intervals over flights",
+        highlight=False,
+    )
+    for line in found.skipped:
+        console.print(f"left out: {line}", highlight=False)
+    faulty = [(f.recording.name, f.recording.faults) for f in found.flights if f.recording.faults]
+    for name, faults in faulty:
+        text = ", ".join(f"{cause}: {count}" for cause, count in faults.items())
+        console.print(f"marked samples: {name}: {text}", highlight=False)
+
+
+def _with_interval(metric: Metric) -> str:
+    if not math.isfinite(metric.mean):
+        return "-"
+    if not math.isfinite(metric.low):
+        return _plain(metric.mean)
+    return f"{_plain(metric.mean)} ({_plain(metric.low)} to {_plain(metric.high)})"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "-"

@@ -1,0 +1,73 @@
+"""Best linear prediction: a regression from the start state and the commands of the window to the change of state.
+
+It knows no physics. What it predicts better than the plant is in the data, and missing in the model. Its coefficients
+come from the other flights: each flight is predicted by a fit that has not seen it.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.flight_import.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
+from lapwing.studies.validation.windows import Errors, compare
+
+SLICE = 5  # samples of commands that one regressor averages
+RIDGE = 1e-3  # of the number of windows, on standardised regressors
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tuple[int, ...]) -> list[Errors]:
+    """Return the errors of the linear prediction of each flight, fitted to the other flights (to itself if alone)."""
+    regressors = [_regressors(f, s, horizons[-1]) for f, s in zip(flights, starts, strict=True)]
+    targets = [_targets(f, s, horizons) for f, s in zip(flights, starts, strict=True)]
+    scale = np.concatenate(regressors).std(axis=0) + 1e-9
+    regressors = [r / scale for r in regressors]
+    moments = np.array([r.T @ r for r in regressors])
+    products = [r.T @ t for r, t in zip(regressors, targets, strict=True)]
+    whole, whole_product, count = moments.sum(axis=0), sum(products), sum(map(len, starts))
+    out = []
+    for k, (flight, s) in enumerate(zip(flights, starts, strict=True)):
+        alone = len(flights) == 1
+        moment = whole if alone else whole - moments[k]
+        right = whole_product if alone else whole_product - products[k]
+        gain = np.linalg.solve(moment + RIDGE * count * np.eye(len(moment)), right)
+        change = (regressors[k] @ gain).reshape(len(s), len(horizons), 12)
+        out.append(compare(flight, s, horizons, _applied(flight, s, horizons, change)))
+    return out
+
+
+def _regressors(flight: Recording, starts: np.ndarray, longest: int) -> np.ndarray:
+    back = conjugate(flight.attitude[starts])
+    state = [flight.omega[starts], rotate(back, flight.velocity[starts]), rotate(back, np.tile(UP, (len(starts), 1)))]
+    push = np.concatenate([np.zeros((1, flight.rotors)), np.cumsum(flight.motor_voltage**2, axis=0)])
+    edges = np.arange(-2 * SLICE, longest + 1, SLICE)
+    commands = [(push[starts + b] - push[starts + a]) / SLICE for a, b in pairwise(edges)]
+    return np.column_stack([*state, *commands, np.ones(len(starts))])
+
+
+def _targets(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -> np.ndarray:
+    """Changes in body axes of the start: position beyond constant velocity, velocity, attitude, rate."""
+    out = []
+    start = flight.attitude[starts]
+    for h in horizons:
+        drift = flight.position[starts + h] - flight.position[starts] - h * flight.interval * flight.velocity[starts]
+        out += [
+            rotate(conjugate(start), drift),
+            rotate(conjugate(start), flight.velocity[starts + h] - flight.velocity[starts]),
+            rotation_vector(product(conjugate(start), flight.attitude[starts + h])),
+            flight.omega[starts + h],
+        ]
+    return np.column_stack(out)
+
+
+def _applied(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], change: np.ndarray) -> np.ndarray:
+    predicted = np.zeros((*change.shape[:2], 16))
+    start, velocity = flight.attitude[starts][:, None], flight.velocity[starts][:, None]
+    time = (np.array(horizons) * flight.interval)[:, None]
+    turn = np.broadcast_to(start, (*change.shape[:2], 4))
+    predicted[..., :3] = flight.position[starts][:, None] + velocity * time + rotate(turn, change[..., :3])
+    predicted[..., 7:10] = velocity + rotate(turn, change[..., 3:6])
+    predicted[..., 3:7] = product(turn, from_vector(change[..., 6:9]))
+    predicted[..., 10:13] = change[..., 9:12]
+    return predicted

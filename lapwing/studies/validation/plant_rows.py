@@ -1,0 +1,182 @@
+"""The compiled plant of a scene, stepped for many start states and parameter sets at once by the batch executor."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from os import cpu_count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.scene import Overrides, Scene, SceneError
+from lapwing.dynamics import simd_batch
+from lapwing.dynamics.effects._types import Motion
+from lapwing.kernels.row_packing import pack_row, row_width
+from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.plant.blocks.multirotor import MultirotorPlant
+from lapwing.services.scene_resolver import load_one, resolve
+
+LONGEST_STEP = 0.01  # [s] of the integrator
+FORCE, TORQUE = "effects.body_wrench.force", "effects.body_wrench.torque"
+LANES = simd_batch.WIDTH
+
+
+class PlantRows:
+    """A scene's plant with one tick per sample of a recording.
+
+    Attributes:
+        interval: [s] of a tick.
+        rotors: number of rotors.
+        motion: number of columns of the motion: position, attitude, velocity, omega, rotor speeds.
+        rows: a fresh plant for each parameter set, shape (sets, columns).
+        mass: [kg] of each parameter set, shape (sets,).
+        inertia: [kg m^2] of each parameter set, shape (sets, 3, 3).
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | Path,
+        interval: float,
+        overrides: Overrides = (),
+        sets: Sequence[Mapping[str, Any]] = ({},),
+    ):
+        """Resolve the scene once for each parameter set.
+
+        Args:
+            scene: path, name, or a loaded scene; its model is a single rigid body.
+            interval: [s] between two samples; the plant's tick.
+            overrides: of the scene, for every parameter set.
+            sets: values by dotted key, for each parameter set.
+
+        Raises:
+            SceneError: the scene is invalid or of another model.
+            ValueError: the interval is no fraction of a second.
+        """
+        rate = round(1.0 / interval)
+        if abs(rate * interval - 1.0) > 1e-6:
+            raise ValueError(f"samples are {interval:g} s apart; expected a whole number of them in a second")
+        steps = int(np.ceil(interval / LONGEST_STEP - 1e-9))
+        self.interval = interval
+        self._base = _with_wrench(load_one(scene, overrides))
+        self._clock = {"exchange.rate": rate, "solver.step": interval / steps}
+        first = self._resolved({})
+        self._core = first.core
+        self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)
+        self.motion = row_width(self.like.motion)
+        self.rotors = len(self.like.voltage)
+        self._pool = ThreadPoolExecutor(cpu_count())
+        base = pack_row(self.like)
+        moved = [self._row({FORCE: [1.0, 0.0, 0.0]}), self._row({TORQUE: [1.0, 0.0, 0.0]})]
+        columns = [int(np.flatnonzero(row != base)[0]) for row in moved]
+        self._force, self._torque = (slice(c, c + 3) for c in columns)
+        self.set_parameters(sets)
+
+    def set_parameters(self, sets: Sequence[Mapping[str, Any]]) -> None:
+        """Resolve the scene for other parameter sets."""
+        made = [self._made(values) for values in sets]
+        self.rows = np.array([row for row, _, _ in made])
+        self.mass = np.array([mass for _, mass, _ in made])
+        self.inertia = np.array([inertia for _, _, inertia in made])
+
+    @property
+    def speed_per_volt(self) -> float:
+        """Steady rotor speed over motor voltage [rad/(s V)] of the first parameter set."""
+        return float(self.like.parameters.layout.speed_per_volt)
+
+    def start(self, sets: np.ndarray) -> np.ndarray:
+        """Return blocks of fresh vehicles of the parameter sets with these indices, shape (blocks, columns, lanes)."""
+        count = -(-len(sets) // LANES) * LANES
+        padded = np.concatenate([sets, np.full(count - len(sets), sets[-1] if len(sets) else 0)])
+        return np.ascontiguousarray(self.rows[padded].reshape(-1, LANES, self.rows.shape[1]).transpose(0, 2, 1))
+
+    def write(self, blocks: np.ndarray, columns: slice, values: np.ndarray) -> None:
+        """Set columns of the first len(values) vehicles."""
+        n = len(values)
+        view = blocks[:, columns].transpose(0, 2, 1)
+        if n == len(blocks) * LANES:
+            view[:] = values.reshape(-1, LANES, values.shape[1])
+            return
+        whole = n // LANES
+        view[:whole] = values[: whole * LANES].reshape(-1, LANES, values.shape[1])
+        if n % LANES:
+            view[whole, : n % LANES] = values[whole * LANES :]
+
+    def read(self, blocks: np.ndarray, columns: slice, n: int) -> np.ndarray:
+        """Return columns of the first n vehicles, shape (n, columns)."""
+        return blocks[:, columns].transpose(0, 2, 1).reshape(-1, columns.stop - columns.start)[:n]
+
+    def add_wrench(self, blocks: np.ndarray, force: np.ndarray, torque: np.ndarray) -> None:
+        """Add constant forces [N] and torques [N m] in body axes, shape (n, 3) each."""
+        n = len(force)
+        self.write(blocks, self._force, self.read(blocks, self._force, n) + force)
+        self.write(blocks, self._torque, self.read(blocks, self._torque, n) + torque)
+
+    def advance(self, blocks: np.ndarray, voltage: np.ndarray) -> None:
+        """Advance all vehicles by one tick under motor voltages [V], shape (n, rotors)."""
+        count = len(blocks) * LANES
+        commands = np.zeros((count, self.rotors))
+        commands[: len(voltage)] = voltage
+        flat, columns = blocks.reshape(-1), blocks.shape[1]
+        keys, ticks = np.zeros((count, 2), np.int64), np.zeros(count, np.int64)
+        core = self._core
+        parts = min(cpu_count() or 1, len(blocks))
+        edges = [len(blocks) * k // parts for k in range(parts + 1)]
+
+        def work(k: int) -> None:
+            simd_batch.advance(
+                core.method, self.like, flat, columns, keys, ticks, commands, core.step, core.steps,
+                edges[k], edges[k + 1], 1,
+            )  # fmt: skip
+
+        if parts == 1:
+            work(0)
+        else:
+            list(self._pool.map(work, range(parts)))
+
+    def _resolved(self, values: Mapping[str, Any]) -> Any:
+        return _plant(self._scene(values))
+
+    def _scene(self, values: Mapping[str, Any]) -> Scene:
+        return load_one(self._base, {**self._clock, **_whole_lists(self._base, values)})
+
+    def _row(self, values: Mapping[str, Any]) -> np.ndarray:
+        return self._made(values)[0]
+
+    def _made(self, values: Mapping[str, Any]) -> tuple[np.ndarray, float, np.ndarray]:
+        scene = self._scene(values)
+        plant = _plant(scene)
+        member = simd_batch.member(plant.core.vehicle, plant.start.vehicle)
+        if [type(e) for e in plant.core.vehicle.effects] != [type(e) for e in self._core.vehicle.effects]:
+            raise SceneError("effects", "a parameter set has other effects than the scene", "the same effects")
+        mass = airframe(scene).mass
+        return pack_row(member), mass.total, mass.matrix
+
+
+def _with_wrench(scene: Scene) -> Scene:
+    """Return the scene with an effect `body_wrench`, for the trim."""
+    if "body_wrench" in scene[Effects].tables:
+        return scene
+    return load_one(scene, {FORCE: [0.0, 0.0, 0.0]})
+
+
+def _whole_lists(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace elements of an airframe's list, which its file may leave out, by the whole list."""
+    out: dict[str, Any] = {}
+    for key, value in values.items():
+        prefix, _, element = key.rpartition(".")
+        if not (element.isdigit() and key.startswith("airframe.")):
+            out[key] = value
+            continue
+        if prefix not in out:
+            out[prefix] = scene.lookup(prefix)
+        found = list(out[prefix])
+        found[int(element)] = value
+        out[prefix] = found
+    return out
+
+
+def _plant(scene: Scene) -> Any:
+    plant = resolve(scene).services["plant"].parameters
+    if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
+        raise SceneError("vehicle.model", f"got {plant.model!r}", "the model of a single rigid body")
+    return plant

@@ -1,0 +1,162 @@
+"""Validation of a scene's plant on recorded flights."""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lapwing.cosim.scene import Overrides, Scene
+from lapwing.studies.flight_import.open_flight import open_flight
+from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.validation.linear_baseline import linear_fit
+from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pooled
+from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
+from lapwing.studies.validation.windows import Errors, compare, predict, window_starts
+
+STRIDE = 5  # samples between the starts of two windows
+
+
+@dataclass(frozen=True)
+class FlightErrors:
+    """Prediction errors of one flight."""
+
+    recording: Recording
+    starts: np.ndarray  # samples at which windows begin
+    plant: Errors
+    states: StartStates
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Prediction errors of a scene's plant over flights."""
+
+    scene: str
+    interval: float  # [s] of a step
+    horizons: tuple[int, ...]  # [steps]
+    memory: TrimMemory
+    flights: tuple[FlightErrors, ...]
+    skipped: tuple[str, ...]  # a line for each flight without a window
+    plant: list[list[Metric]]  # by horizon and field
+    baselines: dict[str, list[list[Metric]]]
+
+    @property
+    def windows(self) -> int:
+        """Number of windows."""
+        return sum(len(f.starts) for f in self.flights)
+
+
+def validate(
+    scene: Scene | str | Path,
+    paths: Sequence[Path],
+    mapping: str | None,
+    horizons: tuple[int, ...],
+    overrides: Overrides = (),
+    memory: TrimMemory = USUAL_TRIM,
+    stride: int = STRIDE,
+    say: Callable[[str, int, int], None] = lambda text, done, total: None,
+) -> Validation:
+    """Predict every window of every flight, and compare.
+
+    Args:
+        scene: the vehicle's plant.
+        paths: flights, all sampled at one rate.
+        mapping: of raw files, as `open_flight`.
+        horizons: [steps] at which to compare, ascending.
+        overrides: of the scene.
+        memory: of the trim.
+        stride: samples between the starts of two windows.
+        say: called with what is done, the number of flights done, and their number.
+
+    Raises:
+        ValueError: a flight cannot be read, none has a window in the air, or rates or rotors differ.
+    """
+    recordings = read_flights(paths, mapping, say)
+    interval = recordings[0].interval
+    used, starts, skipped = [], [], []
+    for recording in recordings:
+        found = window_starts(recording, horizons[-1], stride)
+        if len(found):
+            used.append(recording)
+            starts.append(found)
+        else:
+            skipped.append(f"{recording.name}: no valid window in the air")
+    if not used:
+        raise ValueError(f"{skipped[0]}; give flights that leave the ground")
+    plant = PlantRows(scene, interval, overrides)
+    for recording in used:
+        if recording.rotors != plant.rotors:
+            raise ValueError(
+                f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; map the others"
+            )
+    say("start states", 0, len(used))
+    states = start_states(plant, used, memory)
+    flights = []
+    for k, (recording, s, state) in enumerate(zip(used, starts, states, strict=True)):
+        say(recording.name, k, len(used))
+        errors = compare(recording, s, horizons, predict(plant, recording, s, state, horizons))
+        flights.append(FlightErrors(recording, s, errors, state))
+    say("baselines", len(used), len(used))
+    held = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
+    baselines = {"constant_velocity": held, "linear_fit": linear_fit(used, starts, horizons)}
+    return Validation(
+        str(Path(str(getattr(scene, "name", scene))).stem), interval, horizons, memory, tuple(flights), tuple(skipped),
+        pooled([magnitudes(f.plant) for f in flights]),
+        {name: pooled([magnitudes(e) for e in errors]) for name, errors in baselines.items()},
+    )  # fmt: skip
+
+
+def read_flights(paths: Sequence[Path], mapping: str | None, say: Callable[[str, int, int], None]) -> list[Recording]:
+    """Read flights of one rate.
+
+    Raises:
+        ValueError: a flight cannot be read, or its rate differs from the first one's.
+    """
+    recordings = []
+    for k, path in enumerate(paths):
+        say(f"reading {path.name}", k, len(paths))
+        recordings.append(open_flight(path, mapping))
+        if abs(recordings[-1].interval - recordings[0].interval) > 1e-6:
+            rates = f"{1.0 / recordings[-1].interval:g} Hz, others {1.0 / recordings[0].interval:g} Hz"
+            raise ValueError(f"{path}: sampled at {rates}; validate them apart")
+    return recordings
+
+
+def write_json(path: Path, found: Validation) -> None:
+    """Write errors, confidence intervals and baselines by horizon."""
+    rows = []
+    for k, steps in enumerate(found.horizons):
+        row: dict = {"steps": steps, "time": steps * found.interval, "windows": found.windows}
+        row |= _values(found.plant[k])
+        row["confidence_95"] = {
+            name: [_number(m.low), _number(m.high)] for name, m in zip(FIELDS, found.plant[k], strict=True)
+        }
+        row["baselines"] = {name: _values(rows_of[k]) for name, rows_of in found.baselines.items()}
+        rows.append(row)
+    flights = {f.recording.name: _flight(found, f) for f in found.flights}
+    content = {
+        "scene": found.scene,
+        "trim": found.memory._asdict(),
+        "horizons": rows,
+        "flights": flights,
+        "skipped": list(found.skipped),
+    }
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def _flight(found: Validation, flight: FlightErrors) -> dict:
+    means = np.nanmean(magnitudes(flight.plant)[:, -1], axis=0) if len(flight.starts) else np.full(len(FIELDS), np.nan)
+    row: dict = {"windows": len(flight.starts)}
+    row |= {name: _number(v) for name, v in zip(FIELDS, means.tolist(), strict=True)}
+    return row | {"faults": flight.recording.faults, "notes": list(flight.recording.notes)}
+
+
+def _values(metrics: list[Metric]) -> dict[str, float | None]:
+    return {name: _number(m.mean) for name, m in zip(FIELDS, metrics, strict=True)}
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,144 @@
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight_recordings import INTERVAL, real_flights, simulated, write_csv
+
+from lapwing.studies.validation.linear_baseline import linear_fit
+from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.prediction_metrics import constant_velocity, magnitudes, pooled
+from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
+from lapwing.studies.validation.windows import compare, predict, window_starts
+
+SCENE = "crazyflie_21"
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return PlantRows(SCENE, INTERVAL)
+
+
+@pytest.fixture(scope="module")
+def flights(plant):
+    return simulated(plant, 6.0, [1, 2, 3], noise=0.0)
+
+
+def errors(plant, flight, horizons, memory=NO_TRIM):
+    (states,) = start_states(plant, [flight], memory)
+    starts = window_starts(flight, horizons[-1], 7)
+    return compare(flight, starts, horizons, predict(plant, flight, starts, states, horizons))
+
+
+def test_own_flight_is_predicted_to_rounding(plant, flights):
+    flight = flights[0]
+    (states,) = start_states(plant, [flight], NO_TRIM)
+    starts = np.arange(200, 400, 7)  # the rotors have forgotten what they began with
+    found = compare(flight, starts, (1, 10, 50), predict(plant, flight, starts, states, (1, 10, 50)))
+    assert np.abs(found.position).max() < 1e-8
+    assert np.abs(found.attitude).max() < 1e-6
+    assert np.abs(found.rate).max() < 1e-6
+
+
+def test_trim_recovers_constant_force(plant, flights):
+    pushed = PlantRows(SCENE, INTERVAL, ["effects.body_wrench.force=[0.02, -0.01, 0.03]"])
+    (flight,) = simulated(pushed, 6.0, [4], noise=0.0)
+    (states,) = start_states(plant, [flight], TrimMemory(0.2, 1.0))
+    assert states.force[0, -2] == pytest.approx([0.02, -0.01, 0.03], abs=2e-3)
+    assert np.abs(errors(plant, flight, (50,), TrimMemory(0.2, 1.0)).position).mean() < 0.1 * (
+        np.abs(errors(plant, flight, (50,)).position).mean()
+    )
+
+
+def test_trim_uses_no_later_measurement(plant, flights):
+    flight = flights[0]
+    omega = flight.omega.copy()
+    omega[301:] += 5.0
+    (before,) = start_states(plant, [flight], TrimMemory(0.2, 1.0))
+    (after,) = start_states(plant, [replace(flight, omega=omega)], TrimMemory(0.2, 1.0))
+    assert np.array_equal(before.torque[0, :301], after.torque[0, :301])
+
+
+def test_windows_stay_clear_of_invalid_samples(flights):
+    flight = flights[0]
+    valid = flight.valid.copy()
+    valid[300] = False
+    starts = window_starts(replace(flight, valid=valid), 50, 1)
+    assert not ((starts >= 250) & (starts <= 320)).any()
+    assert {249, 321} <= set(starts.tolist())
+
+
+def test_constant_velocity_matches_closed_form(flights):
+    flight, starts = flights[0], np.array([100, 200])
+    found = constant_velocity(flight, starts, (50,))
+    expected = flight.position[starts] + 0.5 * flight.velocity[starts] - flight.position[starts + 50]
+    assert found.position[:, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_linear_fit_beats_constant_velocity(flights):
+    starts = [window_starts(f, 20, 2) for f in flights]
+    fitted = np.mean([np.abs(e.velocity).mean() for e in linear_fit(flights, starts, (20,))])
+    held = np.mean(
+        [np.abs(constant_velocity(f, s, (20,)).velocity).mean() for f, s in zip(flights, starts, strict=True)]
+    )
+    assert fitted < 0.5 * held
+
+
+def test_interval_resamples_flights_not_windows():
+    flights = [np.full((1000, 1, 5), value) for value in (1.0, 2.0, 3.0, 4.0)]
+    ((metric, *_),) = pooled(flights)
+    assert metric.mean == pytest.approx(2.5)
+    assert metric.low < 1.8
+    assert metric.high > 3.2
+
+
+def test_magnitudes_are_means_over_axes(plant, flights):
+    found = errors(plant, flights[0], (10,))
+    assert magnitudes(found)[:, 0, 1] == pytest.approx(np.abs(found.velocity[:, 0]).mean(axis=1))
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
+
+
+def test_command_writes_errors_and_baselines(plant, tmp_path):
+    paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
+    out, page = tmp_path / "errors.json", tmp_path / "page.html"
+    done = run(
+        "validate", SCENE, *paths, "--mapping", "nanobench", "--horizons", "1,50", "--json", out, "--report", page
+    )
+    assert done.returncode == 0, done.stderr
+    first, last = json.loads(out.read_text())["horizons"]
+    assert (first["steps"], last["steps"]) == (1, 50)
+    assert last["windows"] > 50
+    assert 0.0 < last["position"] < last["baselines"]["constant_velocity"]["position"]
+    assert set(last["baselines"]) == {"constant_velocity", "linear_fit"}
+    assert "Errors over the envelope" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--horizons", "50,10"), "--horizons 50,10: expected ascending"),
+        (("--mapping", "nowhere"), "--mapping nowhere: unknown"),
+        ((), "needs --mapping"),
+    ],
+)
+def test_command_rejects_bad_options(plant, tmp_path, arguments, message):
+    path = write_csv(tmp_path / "flight.csv", simulated(plant, 1.0, [1])[0])
+    done = run("validate", SCENE, path, "--json", tmp_path / "out.json", *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out.json").exists()
+
+
+def test_real_flights_are_predicted_better_than_baseline():
+    from lapwing.studies.validation.procedure import validate
+
+    paths = sorted(real_flights("nanobench").glob("B9_trefoil_slow_rep*.csv.gz"))[:4]
+    found = validate(SCENE, paths, "nanobench", (10, 50))
+    for field in range(4):
+        assert found.plant[-1][field].mean < found.baselines["constant_velocity"][-1][field].mean
