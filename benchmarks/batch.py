@@ -40,7 +40,7 @@ def best(run):
 
 def rates(scene: str) -> tuple[float, float, float]:
     """10^6 steps/s of a scene's plant: of a batch on all cores and on one, and of one vehicle after the other."""
-    batch = lapwing.Batch(scene, N)
+    batch = lapwing.BatchSimulator(scene, N)
     batch.reset(position_world=(0.0, 0.0, 2000.0), rotor_speed=np.full(4, 330.0))
     core, volts = batch._core, np.full((N, 4), 31.6)
     given = (core.method, batch._like, batch._blocks.reshape(-1), batch._blocks.shape[1], batch._keys, batch._ticks)

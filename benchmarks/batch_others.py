@@ -1,4 +1,4 @@
-"""Many vehicles side by side: `lapwing.Batch` beside mujoco.rollout and Crazyflow on the CPU, and how exact each is.
+"""`lapwing.BatchSimulator` compared with mujoco.rollout and Crazyflow on the CPU: speed and accuracy.
 
     python -m benchmarks.batch_others
 
@@ -30,10 +30,10 @@ VOLTS = 31.6
 
 
 class Lapwing:
-    """`lapwing.Batch` of the scene `hover`."""
+    """`lapwing.BatchSimulator` of the scene `hover`."""
 
     def __init__(self, n, step):
-        self.batch = lapwing.Batch("hover", n, overrides=[f"solver.step={step}"])
+        self.batch = lapwing.BatchSimulator("hover", n, overrides=[f"solver.step={step}"])
         speed = self.batch.hover_speed
         self.batch.reset(position_world=HIGH, omega_body=OMEGA, rotor_speed=speed)
         self.volts, self.steps = np.full((n, 4), VOLTS), self.batch._core.steps

@@ -3,7 +3,7 @@
 ```python
 import lapwing
 
-scene = lapwing.load("delivery_mission", {"effects.wind_random.mean": (3.0, 1.0, 0.0)})
+scene = lapwing.load_scene("delivery_mission", {"effects.wind_random.mean": (3.0, 1.0, 0.0)})
 flight = lapwing.fly(scene, seed=7)
 flight.rmse, flight.truth.position, flight.report("flight.html")
 ```
@@ -13,8 +13,8 @@ What is named here is the public interface; everything is imported when it is fi
 
 TYPE_CHECKING = False  # what type checkers take for true: nothing is imported before `lapwing` answers Ctrl-C
 if TYPE_CHECKING:
-    from lapwing.api import campaign, fly, load, read
-    from lapwing.batch_simulator import Batch, BatchState
+    from lapwing.api import campaign, fly, load_scene, read_log
+    from lapwing.batch_simulator import BatchSimulator, BatchState
     from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.scene import Scene, SceneError
     from lapwing.flight import Flight
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from lapwing.studies.outcome import FlightOutcome
 
 _WHERE = {
-    "Batch": "lapwing.batch_simulator",
+    "BatchSimulator": "lapwing.batch_simulator",
     "BatchState": "lapwing.batch_simulator",
     "Event": "lapwing.studies.flight_events",
     "Flight": "lapwing.flight",
@@ -40,15 +40,15 @@ _WHERE = {
     "choice": "lapwing.studies.campaign.distributions",
     "fly": "lapwing.api",
     "linspace": "lapwing.studies.campaign.distributions",
-    "load": "lapwing.api",
+    "load_scene": "lapwing.api",
     "loguniform": "lapwing.studies.campaign.distributions",
     "normal": "lapwing.studies.campaign.distributions",
-    "read": "lapwing.api",
+    "read_log": "lapwing.api",
     "uniform": "lapwing.studies.campaign.distributions",
 }
 
 __all__ = [
-    "Batch",
+    "BatchSimulator",
     "BatchState",
     "Event",
     "Flight",
@@ -63,10 +63,10 @@ __all__ = [
     "choice",
     "fly",
     "linspace",
-    "load",
+    "load_scene",
     "loguniform",
     "normal",
-    "read",
+    "read_log",
     "uniform",
 ]
 

@@ -18,7 +18,7 @@ from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
 
-def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
+def load_scene(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """Read a scene and all that it names, override, and validate.
 
     Args:
@@ -49,7 +49,7 @@ def fly(
 
     Args:
         scene: what to fly: a path, a name, or a loaded one.
-        overrides: as of `load`.
+        overrides: see `load_scene`.
         seed: of all randomness, 0 to 2^63 - 1; None: the scene's.
         controller: one's own in the place of the scene's: a class, an object of one (each take-off begins with a copy
             of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
@@ -72,10 +72,10 @@ def fly(
                 own[f"autopilot.{key}"] = stack.enter_context(lent(thing, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        return _flown(resolve(load(scene_resolver.load_one(scene, overrides), own)))
+        return _flown(resolve(load_scene(scene_resolver.load_one(scene, overrides), own)))
 
 
-def read(log: str | Path) -> Flight:
+def read_log(log: str | Path) -> Flight:
     """The flight of an MCAP log.
 
     Raises:
@@ -99,7 +99,7 @@ def campaign(
         scene: what to fly: a path, a name, or a loaded one.
         seeds: of each run's own randomness; as many runs as there are.
         vary: how keys of the scene vary from run to run: {"vehicle.mass": lapwing.normal(10.4, 0.2)}.
-        overrides: as of `load`.
+        overrides: see `load_scene`.
         seed: of the campaign. What a run draws depends on this, on its number and on the key alone.
         design: how the runs fill the space of what varies: "random", "lhs", "sobol" or "grid".
 
@@ -124,7 +124,7 @@ def campaign(
     def one(run: int) -> Flight:
         if fixed is not None:
             return _flown(reseed(fixed, seeds[run]))
-        return _flown(resolve(load(base, {**drawn.values(run), "run.seed": seeds[run]})))
+        return _flown(resolve(load_scene(base, {**drawn.values(run), "run.seed": seeds[run]})))
 
     first = one(0)  # alone: it compiles
     with ThreadPoolExecutor(cpu_count()) as pool:

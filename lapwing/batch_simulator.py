@@ -41,11 +41,11 @@ class BatchState(NamedTuple):
     rotor_speed: np.ndarray  # [rad/s], shape (n, rotors)
 
 
-class Batch:
+class BatchSimulator:
     """n vehicles of a scene, without sensors and autopilot, stepped together.
 
     ```python
-    batch = Batch("hover", 4096, vary={"vehicle.mass": lapwing.normal(10.4, 0.2)})
+    batch = BatchSimulator("hover", 4096, vary={"vehicle.mass": lapwing.normal(10.4, 0.2)})
     state = batch.step(motor_voltages=np.full((4096, 4), 33.5))
     state = batch.step(thrust=np.full(4096, 102.0), body_rates=np.zeros((4096, 3)), ticks=5)
     batch.reset([3, 17], position_world=(0.0, 0.0, 5.0))
@@ -70,7 +70,7 @@ class Batch:
             n: how many.
             vary: how keys of the scene vary from member to member; member k draws what run k of a campaign draws. Each
                 costs the resolving of a scene, about 6 ms.
-            overrides: as of `lapwing.load`.
+            overrides: as of `lapwing.load_scene`.
             seed: of the draws, and of the members' randomness.
 
         Raises:

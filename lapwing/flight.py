@@ -62,12 +62,12 @@ class Flight(studied.FlightData):
                 writer.write(EVENTS.key(self.vehicle), EVENTS.message, payload, time_ns, deterministic=False)
         return target
 
-    def report(self, path: str | Path | None = None, beside: studied.FlightData | None = None) -> Path:
+    def report(self, path: str | Path | None = None, compare_with: studied.FlightData | None = None) -> Path:
         """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
 
         Args:
             path: of the report; by default an .html beside the log, or SCENE.html here for a flight in memory.
-            beside: another flight, laid over this one in every plot.
+            compare_with: second flight, drawn over this one in every plot.
 
         Returns:
             The report's path.
@@ -76,7 +76,7 @@ class Flight(studied.FlightData):
             ValueError: it cannot be written, or the name has another ending.
         """
         source = Path(self.origin.source)
-        flights = [self] if beside is None else [self, beside]
+        flights = [self] if compare_with is None else [self, compare_with]
         return write(flights, Path(path) if path else source.with_suffix(".html"))
 
     def plot(self, path: str | Path | None = None) -> "Figure":

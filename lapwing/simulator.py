@@ -28,7 +28,7 @@ class Observation(NamedTuple):
     truth: TrueState  # SI, world ENU, body FLU
     sensors: dict[str, Any]  # the newest reading of each sensor, by its name
     estimate: StateEstimate | None  # of the autopilot; None where motor voltages are given, which need none
-    ended: bool  # the run's duration is over
+    done: bool  # the run has reached its duration, or its state is invalid
 
 
 class UserCommandBlock:

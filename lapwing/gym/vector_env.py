@@ -1,4 +1,4 @@
-"""The environments: a `lapwing.Batch` under thrust and body rates, with a task."""
+"""The environments: a `lapwing.BatchSimulator` under thrust and body rates, with a task."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.batch_simulator import Batch, BatchState
+from lapwing.batch_simulator import BatchSimulator, BatchState
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.gym.tasks import TASKS, Target
 from lapwing.studies.campaign.distributions import Distribution
@@ -51,7 +51,7 @@ class DroneVectorEnv(VectorEnv):
             num_envs: how many.
             task: one of `TASKS`.
             scene: whose vehicle and physics.
-            overrides: as of `lapwing.load`.
+            overrides: as of `lapwing.load_scene`.
             vary: how keys of the scene vary from vehicle to vehicle.
             render_mode: none is known.
 
@@ -62,7 +62,7 @@ class DroneVectorEnv(VectorEnv):
         if task not in TASKS:
             raise ValueError(f"task: expected one of {', '.join(TASKS)}, got {task!r}")
         self.task, self.num_envs, self.render_mode = TASKS[task](), num_envs, render_mode
-        self.batch = Batch(scene, num_envs, vary, overrides)
+        self.batch = BatchSimulator(scene, num_envs, vary, overrides)
         self._ticks = max(1, round(1.0 / (RATE * self.batch.interval)))
         self._ground = float(self.batch.state.position_world[0, 2])
         self.single_action_space = Box(-1.0, 1.0, (4,), np.float32)

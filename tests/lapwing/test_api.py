@@ -46,7 +46,7 @@ def test_a_class_a_copy_and_a_name_fly_like_the_scene_that_names_it(altitude):
         lapwing.fly("hover", SHORT, controller="given_altitude:Altitude"),
         lapwing.fly("hover", SHORT, controller=altitude),
         lapwing.fly("hover", SHORT, controller=altitude(vehicle)),
-        lapwing.fly(lapwing.load("hover", SHORT), controller=type("Local", (altitude,), {})),
+        lapwing.fly(lapwing.load_scene("hover", SHORT), controller=type("Local", (altitude,), {})),
     ]
     assert {flight.digest for flight in flights} == {named.digest}
     assert [len(flight.setup.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would carry
@@ -119,10 +119,10 @@ def test_options_belong_to_a_class_and_a_controller_to_a_scene_with_an_autopilot
 
 
 def test_a_loaded_scene_takes_more_overrides_and_the_later_ones_hold():
-    scene = lapwing.load("hover", {"run.duration": 1.5, "run.seed": 3})
-    again = lapwing.load(scene, ["run.duration=0.5"])
+    scene = lapwing.load_scene("hover", {"run.duration": 1.5, "run.seed": 3})
+    again = lapwing.load_scene(scene, ["run.duration=0.5"])
     assert (again.lookup("run.duration"), again.lookup("run.seed")) == (0.5, 3)
-    assert lapwing.load(again) is again
+    assert lapwing.load_scene(again) is again
     assert repr(again) == "<Scene hover, run.duration=1.5, run.seed=3, run.duration=0.5>"
     flight = lapwing.fly(scene, {"run.duration": 0.5}, seed=4)
     assert (flight.setup.seed, flight.setup.duration) == (4, 0.5)
@@ -132,7 +132,7 @@ def test_a_loaded_scene_takes_more_overrides_and_the_later_ones_hold():
 
 
 def test_a_campaign_varies_a_loaded_scene_by_seed_and_run():
-    scene = lapwing.load("hover", {"run.duration": 0.5})
+    scene = lapwing.load_scene("hover", {"run.duration": 0.5})
     vary = {"vehicle.mass": lapwing.normal(10.4, 0.2)}
     flights = lapwing.campaign(scene, (5, 6, 7), vary, seed=4)
     masses = [flight.setup.services["autopilot"].parameters.airframe.mass for flight in flights]
@@ -151,8 +151,8 @@ def test_a_campaign_varies_a_loaded_scene_by_seed_and_run():
         (lambda: lapwing.campaign("hover", []), "seeds: there are none; expected at least one"),
         (lambda: lapwing.fly("hover", seed=-1), "run.seed: expected a whole number at least 0"),
         (lambda: lapwing.fly("hoverr"), "unknown scene 'hoverr'; did you mean hover?"),
-        (lambda: lapwing.load("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),
-        (lambda: lapwing.load("hover", {3: 1}), "expected the keys of overrides as texts, got 3"),
+        (lambda: lapwing.load_scene("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),
+        (lambda: lapwing.load_scene("hover", {3: 1}), "expected the keys of overrides as texts, got 3"),
         (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: nobody steers there"),
     ],
 )

@@ -27,7 +27,7 @@ def flown(method, p, key, state, command, h, n, ticks):
 
 @pytest.fixture(scope="module")
 def batch():
-    return lapwing.Batch(MISSION, N, VARY, seed=5)
+    return lapwing.BatchSimulator(MISSION, N, VARY, seed=5)
 
 
 def alone(k, volts, ticks, start=None):
@@ -78,7 +78,7 @@ def test_members_are_reset_alone(batch):
 
 
 def test_body_rates_are_followed_and_thrust_holds_the_weight():
-    batch = lapwing.Batch("hover", 4)
+    batch = lapwing.BatchSimulator("hover", 4)
     batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=np.full(4, 330.0))
     wanted = np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
     weight = load("hover").lookup("airframe.mass").total * 9.80665
@@ -90,9 +90,12 @@ def test_body_rates_are_followed_and_thrust_holds_the_weight():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (lambda b: lapwing.Batch("hover", 0), "n: expected at least 1 member, got 0"),
-        (lambda b: lapwing.Batch("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
-        (lambda b: lapwing.Batch("hover", 2, overrides=LOADED), "effects.carried_load: .*without what they carry"),
+        (lambda b: lapwing.BatchSimulator("hover", 0), "n: expected at least 1 member, got 0"),
+        (lambda b: lapwing.BatchSimulator("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
+        (
+            lambda b: lapwing.BatchSimulator("hover", 2, overrides=LOADED),
+            "effects.carried_load: .*what they carry",
+        ),
         (lambda b: b.step(), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(thrust=np.zeros(N)), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(np.zeros((N, 3))), r"motor_voltages: expected numbers of shape \(19, 4\), got \(19, 3\)"),

@@ -97,7 +97,7 @@ OF_ONE = {
     "fly": lapwing.fly,
     "campaign": lambda scene: lapwing.campaign(scene, [1]),
     "Simulator": lapwing.Simulator,
-    "Batch": lambda scene: lapwing.Batch(scene, 2),
+    "Batch": lambda scene: lapwing.BatchSimulator(scene, 2),
 }
 
 

@@ -63,6 +63,6 @@ def test_positions_may_be_arrays_and_a_scene_may_be_loaded():
     place = np.array([0.0, 0.0, 1.0])
     ends = [
         lapwing.Simulator(scene, seed=2).step(setpoint=lapwing.Reference(position), ticks=50).truth
-        for scene, position in (("hover", tuple(place)), (lapwing.load("hover"), place))
+        for scene, position in (("hover", tuple(place)), (lapwing.load_scene("hover"), place))
     ]
     assert ends[0] == ends[1]

@@ -134,7 +134,9 @@ def test_mission_target_is_the_end_of_the_trajectory():
     flight = lapwing.fly("hover", {"run.duration": 1.0})
     assert flight.mission.is_longer
     assert flight.outcome.kind == "completed"
-    target = lapwing.studies.mission.mission_of(lapwing.services.scene_resolver.resolve(lapwing.load("hover")), None)
+    target = lapwing.studies.mission.mission_of(
+        lapwing.services.scene_resolver.resolve(lapwing.load_scene("hover")), None
+    )
     assert target.target[:2] == (0.0, 0.0)
     assert not target.is_longer
 

@@ -159,7 +159,7 @@ def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
         {"airframe.mass.total": 8.0224, "airframe.mass.payload": 0.0, "airframe.payload": box,
          "effects.payload.release_time": 0.1},
     )  # fmt: skip
-    batch = lapwing.Batch(scene, 2)
+    batch = lapwing.BatchSimulator(scene, 2)
     for _ in range(50):
         found = batch.step(motor_voltages=np.full((2, 4), 36.0))
     core, state = resolve(scene).services["plant"].parameters.core, resolve(scene).services["plant"].parameters.start

@@ -99,8 +99,8 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     assert set(height["sensor"]) == {"height"}
     fly_single(setup, tmp_path / "single.mcap")
     fly_processes(ProcessSpec("mission", setup, {}, "test-own-sensors", log=str(tmp_path / "own.mcap")), Silent())
-    logs = [lapwing.read(tmp_path / f"{name}.mcap") for name in ("single", "own")]
-    logs.append(lapwing.read(flight.save(tmp_path / "saved.mcap")))
+    logs = [lapwing.read_log(tmp_path / f"{name}.mcap") for name in ("single", "own")]
+    logs.append(lapwing.read_log(flight.save(tmp_path / "saved.mcap")))
     assert {log.digest for log in logs} == {flight.digest}
     assert (logs[1].topic("own_sensor/height")["values"] == height["values"]).all()
 
