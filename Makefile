@@ -78,9 +78,15 @@ $(VENV)/audit/bin/pip-audit:
 	$(PYTHON) -m venv $(VENV)/audit
 	$(VENV)/audit/bin/python -m pip install --quiet --disable-pip-version-check "cyclonedx-bom>=7" "pip-audit>=2.9"
 
-sbom: $(VENV)/.installed $(VENV)/audit/bin/pip-audit
+# The packages that images ship, installed apart from those for development: their metadata has the licences.
+$(VENV)/shipped/.installed: deploy/requirements.lock
+	$(PYTHON) -m venv $(VENV)/shipped
+	$(VENV)/shipped/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes $(addprefix --requirement ,$(SHIPPED))
+	touch $@
+
+sbom: $(VENV)/shipped/.installed $(VENV)/audit/bin/pip-audit
 	mkdir -p build
-	cat $(SHIPPED) | $(VENV)/audit/bin/cyclonedx-py requirements - --pyproject pyproject.toml \
+	$(VENV)/audit/bin/cyclonedx-py environment $(VENV)/shipped/bin/python --pyproject pyproject.toml \
 		--output-reproducible --output-format JSON --output-file build/sbom.json
 
 DATABASE := https://api.osv.dev/v1/vulns/OSV-2020-111
