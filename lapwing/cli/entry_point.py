@@ -1,16 +1,16 @@
-"""The command `lapwing` from its first moment on: it answers Ctrl-C before it has imported the rest."""
+"""Entry point of the command `lapwing`: handles Ctrl-C before the other modules are imported."""
 
 
 def main() -> None:
-    """Entry point of `lapwing`."""
+    """Run the command `lapwing`."""
     try:
         from lapwing.cosim.processes.interrupt import Interrupted, end_at_once, say_end
 
         try:
             end_at_once()
-            from lapwing.cli.std_streams import open_closed
+            from lapwing.cli.std_streams import prepare_streams
 
-            open_closed()
+            prepare_streams()
             from lapwing.cli.main import main as carry_out
 
             carry_out()

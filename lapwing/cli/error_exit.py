@@ -1,4 +1,4 @@
-"""What the user can mend ends in one line and exit code 2, a failed run in one line and exit code 1."""
+"""Exit codes, and errors as one line on standard error."""
 
 import signal
 import traceback
@@ -11,13 +11,13 @@ from lapwing.cli.output_paths import release_claims
 from lapwing.cli.stdout_guard import OutputError
 
 USER_ERROR = 2
-DIFFERENT = 3  # two logs, or a log and its digest, do not agree
-FLIGHT_FAILED = 4  # an expression of the scene's `success.require` does not hold
+DIFFERENT = 3  # two logs, or a log and its digest, differ
+FLIGHT_FAILED = 4  # a criterion of the scene's `success.require` is not met
 
 
 @contextmanager
 def user_errors() -> Iterator[None]:
-    """Turn what the user can mend into one line and exit code 2, a failed run into one line and exit code 1."""
+    """Print errors as one line; exit with 2 for invalid input, with 1 for a failed run or a system error."""
     from lapwing.cosim.run_errors import BusError, LockStepError, RunFailed
 
     try:
@@ -27,17 +27,22 @@ def user_errors() -> Iterator[None]:
     except (RunFailed, LockStepError) as error:
         fail(str(error), 1, error.__cause__)
     except OutputError as error:
-        if error.closed:  # nobody reads any more: end as any program does that is sent SIGPIPE
+        if error.closed:  # end like a program that receives SIGPIPE
             raise SystemExit(128 + signal.SIGPIPE) from None
         fail(str(error), 1)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        fail(f"{error.filename or 'system'}: {reason}", 1)
+    except MemoryError:
+        fail("system: not enough memory", 1)
     finally:
         release_claims()
 
 
 def fail(message: str, code: int, cause: BaseException | None = None) -> None:
-    """End with one line and an exit code; after the line, where an error in the user's own code came from."""
-    with suppress(OSError):  # the exit code tells it, too
-        typer.echo(f"lapwing: {' '.join(message.split())}", err=True)  # one line, whatever the message quotes
+    """Exit with one line on standard error, followed by the traceback of an error in user code."""
+    with suppress(OSError):  # standard error may be full
+        typer.echo(f"lapwing: {' '.join(message.split())}", err=True)
         if cause is not None:
             traceback.print_exception(cause)
     raise SystemExit(code)

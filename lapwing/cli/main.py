@@ -1,5 +1,6 @@
-"""All commands of `lapwing`: the modules beside this one register them, and import what one needs when it runs."""
+"""The command line. The other modules of this package register the commands, which import what they need."""
 
+import os
 import sys
 from typing import Annotated
 
@@ -24,12 +25,19 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
 from lapwing.cli.stdout_guard import checked_output
 
-# Of unknown options and missing arguments; not every version of typer exports the class itself.
+# Raised for unknown options and missing arguments; not every version of typer exports the class.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _check_working_directory() -> None:
+    try:
+        os.getcwd()
+    except OSError:
+        raise ValueError("working directory: does not exist; change to another folder") from None
+
+
+def _show_version(requested: bool) -> None:
+    if requested:
         from lapwing.cosim.config.provenance import package_version
 
         typer.echo(f"lapwing {package_version()}")
@@ -39,15 +47,16 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="show the version and end")
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="show the version and exit")
     ] = False,
 ) -> None:
     """Co-simulation of multirotors in lock step over Zenoh, recorded to MCAP."""
 
 
 def main() -> None:
-    """Carry out what the command line says."""
+    """Run the command of the command line."""
     with user_errors(), checked_output():
+        _check_working_directory()
         from lapwing.cosim.processes.gc_tuning import leave_garbage
 
         leave_garbage()

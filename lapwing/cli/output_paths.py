@@ -67,6 +67,8 @@ def check_log(path: Path | None) -> None:
     """Raise ValueError if a log cannot be written or another process writes it; its writer locks it."""
     if path is None:
         return
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise ValueError(f"{path}: is not a regular file; expected the name of a file to write")
     _create(path)
     with _write_errors(path):
         OutputLock(path).close()

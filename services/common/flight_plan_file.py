@@ -18,6 +18,7 @@ OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # scene ov
 READY_TIMEOUT = 60.0  # [s] for the vehicle to become ready for take-off
 SOURCE = "plan"
 HEADER = "QGC WPL 110"
+EXPECTED = "expected a mission saved by a ground station"
 _ABOVE_SEA, _ABOVE_HOME, _NO_PLACE = (0, 5), (3, 6), 2  # MAV_FRAME
 
 _Params = Sequence[float]
@@ -65,8 +66,10 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
             items, fence, rally = _waypoints(text, datum)
         else:
             items, fence, rally = _plan(json.loads(text), datum)
-    except (KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        raise ValueError(f"{path}: not a plan: {type(error).__name__} at {error}") from None
+    except KeyError as error:
+        raise ValueError(f"{path}: not a plan: key {error} is missing; {EXPECTED}") from None
+    except (TypeError, IndexError, AttributeError, OverflowError):
+        raise ValueError(f"{path}: not a plan: an entry has the wrong type or length; {EXPECTED}") from None
     except RecursionError:
         raise ValueError(f"{path}: not a plan: nested too deeply") from None
     except json.JSONDecodeError as error:

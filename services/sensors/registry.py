@@ -59,7 +59,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
     values = dict(table)
     values.pop("module", None)
     name = values.pop("preset", next(iter(module.PRESETS)))
-    if name not in module.PRESETS:
+    if not isinstance(name, str) or name not in module.PRESETS:
         raise ConfigError.unknown(f"{sensor}.preset", "preset", name, module.PRESETS)
     preset = module.PRESETS[name]
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())

@@ -57,6 +57,8 @@ class Files:
         Raises:
             KeyedError: it cannot be read.
         """
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise ConfigError(named_by, f"{path}: is not a regular file")
         try:
             content = path.read_bytes()
             text = content.decode("utf-8")

@@ -141,6 +141,8 @@ def _find(scene: str | Path, shipped: Path) -> Path:
 
 def _read(path: Path) -> str:
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise SceneError("", "is not a regular file", "a scene file (TOML)", KeyOrigin(path))
         return path.read_text(encoding="utf-8")
     except IsADirectoryError:
         raise SceneError("", "is a folder", "a scene file (TOML)", KeyOrigin(path)) from None
