@@ -17,6 +17,7 @@ from lapwing.cosim.config import user_module
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json, to_json
 from lapwing.cosim.processes.run_monitor import MONITOR
+from lapwing.cosim.run_errors import BusError, ExitCode, LockStepError
 
 _LENGTH = struct.Struct("<Q")
 LONGEST = 15  # characters that the system keeps of a process's name
@@ -74,18 +75,17 @@ def _read(size: int) -> bytes:
     return data
 
 
-def take_part(given: ProcessSpec) -> None:
-    """Take part in a run to its end.
+def take_part(given: ProcessSpec) -> ExitCode:
+    """Take part in a run to its end. Return COMPLETED, or TERMINATED after SIGTERM.
 
     Raises:
-        ValueError: what the user can mend.
-        LockStepError: the lock step cannot go on.
+        ValueError: for a reason that the user can fix.
+        LockStepError: the lock step cannot continue.
     """
     from lapwing.cosim.access import private_sockets
     from lapwing.cosim.access.publisher_ids import PublisherIds
     from lapwing.cosim.executors.lockstep import run_encoder, run_lockstep
     from lapwing.cosim.executors.participant import Participant, Stopped
-    from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.transport.bus import ZenohBus, mesh
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
@@ -125,8 +125,11 @@ def take_part(given: ProcessSpec) -> None:
         except Stopped:
             if process.abandoned:
                 raise LockStepError(f"{given.name}: {process.abandoned} is gone before the run has ended") from None
+            if process.terminated:
+                return ExitCode.TERMINATED
     if process.orphaned:
         private_sockets.remove(given.peers[given.name])
+    return ExitCode.COMPLETED
 
 
 def import_ahead(names: Iterable[str]) -> None:
@@ -144,7 +147,6 @@ def _heard(process: Any) -> dict[str, Any]:
     from lapwing.services.process_table import MAVLINK, ROS2
 
     get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
-
     mailbox = OperatorInbox(process.setup.vehicles, lambda: get(0.0))
     return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
 
@@ -152,23 +154,17 @@ def _heard(process: Any) -> dict[str, Any]:
 def main(name: str) -> None:
     """Take part as the launcher says, most likely under this name."""
     from lapwing.cosim.processes.gc_tuning import leave_garbage
-    from lapwing.cosim.run_errors import BusError, LockStepError
 
     leave_garbage()
     with suppress(OSError):  # what `ps` and `top` call it, where the system has that
         Path("/proc/self/comm").write_text(name[:LONGEST])
     import_ahead([name])
     try:
-        take_part(take_over())
-    except (ValueError, BusError) as error:
-        _end(str(error), 2)
-    except LockStepError as error:
-        _end(str(error), 1)
-
-
-def _end(message: str, code: int) -> None:
-    print(f"lapwing: {' '.join(message.split())}", file=sys.stderr)
-    raise SystemExit(code)
+        code = take_part(take_over())
+    except (ValueError, BusError, LockStepError) as error:
+        code = error.EXIT_CODE if isinstance(error, LockStepError) else ExitCode.REJECTED
+        print(f"lapwing: {' '.join(str(error).split())}", file=sys.stderr)
+    raise SystemExit(int(code))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,23 @@
-"""How a run fails. Imports nothing, so that the command line knows the errors before it needs the rest."""
+"""Errors of a run, and the exit codes and signal between a launcher and its processes.
+
+Imports only the standard library, so that the command line knows the errors before it loads the rest.
+"""
+
+import signal
+from enum import IntEnum
+
+END_SIGNAL = signal.SIGHUP  # from a launcher: end in order; SIGTERM comes from elsewhere, and its receiver is named
+
+
+class ExitCode(IntEnum):
+    """Exit code of a participant's process."""
+
+    COMPLETED = 0  # the run has reached its end
+    FAILED = 1
+    REJECTED = 2  # for a reason that the user can fix
+    DIVERGED = 3
+    CUT_SHORT = 4  # another participant ended before the run did
+    TERMINATED = 128 + signal.SIGTERM
 
 
 class BusError(RuntimeError):
@@ -6,12 +25,22 @@ class BusError(RuntimeError):
 
 
 class RunFailed(RuntimeError):
-    """A run that did not reach its end; the text names the culprit."""
+    """A run that did not reach its end; the text names the process at fault."""
 
 
 class LockStepError(RuntimeError):
-    """The lock step cannot go on; the text says who waits for what."""
+    """The lock step cannot continue; the text names who waits for what."""
+
+    EXIT_CODE = ExitCode.FAILED
 
 
 class DivergedError(LockStepError):
-    """A state is not sound: no longer finite, or where its coordinates end."""
+    """A state is invalid: non-finite, or outside the range of its coordinates."""
+
+    EXIT_CODE = ExitCode.DIVERGED
+
+
+class CutShortError(LockStepError):
+    """Another participant ended before the run did; the text names it."""
+
+    EXIT_CODE = ExitCode.CUT_SHORT

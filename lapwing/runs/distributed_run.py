@@ -71,13 +71,13 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
             raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
         elif watch.began is None and time.monotonic() < deadline:
             watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
-        elif culprit := watch.frozen(names):
+        elif culprit := watch.stall_message(names):
             raise RunFailed(culprit)
     # After a cut, links come back one after another; whoever says how it ended stays until it is heard
     others = names - {process_table.RECORDER}
     _comes(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
     live(watch)
-    if early := watch.broken_off():
+    if early := watch.abort_message():
         raise RunFailed(early)
 
 

@@ -26,7 +26,7 @@ class LiveFeed:
     def observe(self, watch: RunMonitor) -> None:
         """Take in what is new in a run that is watched."""
         watch.listen = self._take
-        if not watch.spoken >= self._services:
+        if not watch.reporting_services >= self._services:
             return
         steps = [step for flight in self._flights if (step := flight.step(watch.time_ns)) is not None]
         if len(steps) < len(self._flights):  # the plant tells of all vehicles at once, or of none

@@ -49,7 +49,8 @@ def run(process: Participant, given: Any) -> None:
                     continue
                 if head != BATCH_KEY:
                     if payload:  # an end without a reason is that of the run
-                        writer.metadata |= failure(payload.decode(errors="replace"), head == DIVERGED_KEY)
+                        text = payload.decode(errors="replace")  # the first cause counts
+                        writer.metadata = failure(text, head == DIVERGED_KEY) | writer.metadata
                     continue
                 pending.add(name, payload, time_ns // setup.interval_ns)
                 pages = pending.complete()

@@ -6,7 +6,7 @@ It is no part of the lock step: the services are joined pairwise, and the router
 import time
 from typing import Any
 
-from lapwing.cosim.executors.participant import POLL, Participant
+from lapwing.cosim.executors.participant import POLL, Participant, Stopped
 from lapwing.services.process_table import RECORDER
 
 
@@ -17,3 +17,5 @@ def run(process: Participant, given: Any) -> None:
     process.end_with(RECORDER)
     while not process.stopping:
         time.sleep(POLL)
+    if not process.abandoned:
+        raise Stopped

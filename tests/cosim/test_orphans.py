@@ -8,7 +8,7 @@ import sys, time
 from types import SimpleNamespace
 from lapwing.cosim.executors import participant as process
 process.ORPHANED = 0.1
-process.Process.end_with_parent(SimpleNamespace(), sys.argv[1])
+process.Participant.end_with_parent(SimpleNamespace(), sys.argv[1])
 print("busy", flush=True)
 time.sleep(600.0)
 """

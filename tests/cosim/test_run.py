@@ -88,8 +88,8 @@ class Running:
         assert self._recorded() > 100
         return self.launcher.returncode, said
 
-    def assert_gone(self):
-        deadline = time.monotonic() + END
+    def assert_gone(self, seconds=END):
+        deadline = time.monotonic() + seconds
         while alive := [name for name, pid in self.children.items() if running(pid)]:
             assert time.monotonic() < deadline, f"still there: {alive}"
             time.sleep(0.05)
@@ -195,15 +195,35 @@ def test_a_signal_ends_all_processes_and_completes_the_log(started, number, code
     assert run.whole()
 
 
-@pytest.mark.parametrize("victim", ["plant", "recorder"])
-def test_a_service_that_dies_is_named_and_ends_the_run(started, victim):
+@pytest.mark.parametrize(
+    ("victim", "number"),
+    [
+        ("plant", signal.SIGKILL),
+        ("recorder", signal.SIGKILL),
+        ("plant", signal.SIGTERM),
+        ("trajectory", signal.SIGTERM),
+    ],
+)
+def test_service_ended_by_a_signal_is_named_and_ends_the_run(started, victim, number):
     run = started(f"test-dead-{victim}")
-    os.kill(run.children[victim], signal.SIGKILL)
+    os.kill(run.children[victim], number)
     code, said = run.end()
     assert code == 1
-    assert said.startswith(f"lapwing: {victim} ended unexpectedly (signal 9) at t = ")
+    assert said.startswith(f"lapwing: {victim} ended unexpectedly (signal {number:d}) at t = ")
     assert said.count("\n") == 1
     assert run.whole() == (victim != "recorder")
+    if number == signal.SIGTERM:
+        with LogReader(run.log) as log:
+            assert log.metadata["failure"] == f"{victim} was ended by SIGTERM"
+
+
+def test_launcher_stopped_during_the_end_of_a_run_succeeds(started):
+    run = started("test-paused", "--set", "run.duration=4", "--set", "success.require=[]")
+    run.launcher.send_signal(signal.SIGSTOP)
+    run.assert_gone(STARTED)  # once the lease of the launcher's session is over
+    run.launcher.send_signal(signal.SIGCONT)
+    assert run.end() == (0, "")
+    assert run.whole()
 
 
 def test_a_killed_recorder_loses_half_a_second_at_most(started):

@@ -149,7 +149,7 @@ def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path
 def test_somebodys_program_with_another_set_up_is_refused(tmp_path):
     other = to_json(resolve(load(SCENE, {"run.duration": 9.0}))).encode()
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
-        program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", lambda _: other)
+        program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", other)
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
         program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
         _, said = run.communicate(timeout=120)

@@ -14,6 +14,7 @@ FROZEN = 30.0  # [s] after which a launcher that was frozen is let go on
 
 
 FULL = "full disk"
+TERMINATE = "terminate"
 INTERRUPT = "Ctrl-C"  # at any moment; where the seed is odd nothing is compiled yet
 
 
@@ -27,6 +28,10 @@ class Kind(NamedTuple):
 
 def kill(pid: int) -> None:
     _send(pid, signal.SIGKILL)
+
+
+def terminate(pid: int) -> None:
+    _send(pid, signal.SIGTERM)
 
 
 def freeze(pid: int) -> None:
@@ -85,6 +90,13 @@ def _interrupted(victim: str, code: int, said: str) -> str:
     return "" if right else f"expected exit code 130 and one line, got {code}: {said!r}"
 
 
+def _terminated(victim: str, code: int, said: str) -> str:
+    if victim != LAUNCHER:
+        return _named(r"VICTIM ended unexpectedly \(signal 15\)")(victim, code, said)
+    right = (code, said) == (143, "lapwing: ended by SIGTERM\n")
+    return "" if right else f"expected exit code 143 and one line, got {code}: {said!r}"
+
+
 KINDS = {
     "kill": Kind(kill, _named(r"VICTIM ended unexpectedly \(signal 9\)")),
     "freeze": Kind(freeze, _named("VICTIM: (no answer|stopped) for")),
@@ -92,4 +104,5 @@ KINDS = {
     "starve": Kind(starve, _flies_on),
     FULL: Kind(nothing, _no_space),
     INTERRUPT: Kind(interrupt, _interrupted),
+    TERMINATE: Kind(terminate, _terminated),
 }

@@ -49,7 +49,7 @@ class Run:
     def __init__(self, scene="hover", overrides=()):
         self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
         self._graph = BlockDiagram(self.setup, create_all(self.setup), PAGE)
-        self.spoken, self.listen, self.time_ns = set(self.setup.services), None, 0
+        self.reporting_services, self.listen, self.time_ns = set(self.setup.services), None, 0
         self.published = []
 
     def publish(self, key, time_ns, payload):

@@ -10,7 +10,7 @@ from lapwing.cosim.executors import realtime
 from lapwing.cosim.executors.deadlines import Deadlines
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant, Stopped
-from lapwing.cosim.run_errors import DivergedError
+from lapwing.cosim.run_errors import CutShortError, DivergedError
 from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
 from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, PacketReceiver, PacketSender, sources
 from lapwing.cosim.transport.packet_schedule import ticks_at_once
@@ -29,8 +29,8 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     whether that was the end of the run.
 
     Raises:
-        Stopped: asked to end.
-        LockStepError: a message did not come, not the one that was due, or a state is not sound.
+        Stopped: this process was requested to end.
+        LockStepError: a message is missing or out of order, a state is invalid, or another participant ended early.
     """
     setup = process.setup
     graph = BlockDiagram(setup, [service], 2 * PAGE)
@@ -69,7 +69,12 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
             process.say_last(ENDED_KEY)
     except EndOfRun as end:
         if owns_time:
-            process.say_last(ENDED_KEY, f"{end} ended before the run did")
+            process.say_last(ENDED_KEY, message := f"{end} ended before the run did")
+            raise CutShortError(message) from None
+    except Stopped:
+        if process.terminated:
+            process.say_last(ENDED_KEY, f"{process.name} was ended by SIGTERM")
+        raise
     except DivergedError as error:  # said before the end is
         process.say_last(DIVERGED_KEY, str(error))
         raise

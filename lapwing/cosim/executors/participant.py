@@ -12,7 +12,7 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.run_config_message import pack, unpack
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
-from lapwing.cosim.run_errors import LockStepError
+from lapwing.cosim.run_errors import END_SIGNAL, LockStepError
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
     ALIVE_KEY,
@@ -80,6 +80,7 @@ class Participant:
         self.participants, self.key_prefix = participants, participants.key_prefix
         self.others, self.speed, self.core = others, speed, core
         self.stopping = False
+        self.terminated = False  # by SIGTERM, which does not come from the launcher
         self.orphaned = False  # the launcher is gone
         self.abandoned = ""  # who watched the run, and is gone
         self._compiling = False
@@ -89,7 +90,8 @@ class Participant:
         self._changed = threading.Event()  # in one of the two
         self._last_words: list[tuple[str, str]] = []
         on_compile(self._tell_of_compiling)
-        signal.signal(signal.SIGTERM, self._stop)
+        signal.signal(END_SIGNAL, self._stop)
+        signal.signal(signal.SIGTERM, self._terminate)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
 
     @property
@@ -101,6 +103,9 @@ class Participant:
 
     def _stop(self, *_: object) -> None:
         self.stopping = True
+
+    def _terminate(self, *_: object) -> None:
+        self.stopping = self.terminated = True
 
     def _tell_of_compiling(self, _: str) -> None:
         if not self._compiling:

@@ -1,4 +1,4 @@
-"""A process of a run as its launcher holds it. It may be started before it is known what it is given."""
+"""Child processes of a launcher. A child may be started before its specification is known."""
 
 import importlib
 import subprocess
@@ -11,59 +11,67 @@ from typing import IO, NamedTuple
 
 from lapwing.cosim.processes.forked_process import Forked
 
-PARTICIPANT = "lapwing.services.process_main"  # the module that a child runs
+PARTICIPANT = "lapwing.services.process_main"  # module that a child runs
+ChildProcess = subprocess.Popen | Forked
 
 
 class Child(NamedTuple):
     """A child of this process."""
 
-    process: subprocess.Popen | Forked
-    said: IO[bytes]  # all that it has written to its standard output and error
+    process: ChildProcess
+    output: IO[bytes]  # its standard output and error
+
+    def text(self) -> str:
+        """Return all output so far."""
+        self.output.seek(0)
+        return self.output.read().decode(errors="replace").strip()
+
+    def last_line(self) -> str:
+        """Return ": " and the last line of the output, "" if there is none."""
+        lines = self.text().splitlines()
+        return f": {lines[-1].removeprefix('lapwing: ')}" if lines else ""
 
 
 def start(name: str) -> Child:
-    """Start a participant in a new interpreter; it waits for its specification on standard input."""
-    said = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
+    """Start the participant `name` in a new interpreter; it waits for its specification on standard input."""
+    output = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
     # -P: nothing is imported from the working directory
     command = [sys.executable, "-P", "-m", PARTICIPANT, name]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=said, stderr=said, start_new_session=True)
-    return Child(process, said)
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True)
+    return Child(process, output)
 
 
 def _may_fork() -> bool:
-    """Whether a fork finds all as it is here: other systems' libraries may have threads before anything is flown."""
-    from lapwing.cosim.transport.bus import in_use  # not before: a command that flies nothing has no need of Zenoh
+    """Return True if a fork inherits a consistent state: no other threads, and no Zenoh session so far."""
+    from lapwing.cosim.transport.bus import in_use  # not before: a command that flies nothing does not load Zenoh
 
     return sys.platform == "linux" and threading.active_count() == 1 and not in_use()
 
 
 def _fork(name: str) -> Child:
-    """The same, with all that this process has imported."""
+    """Start the participant `name` as a fork, with the modules that this process has imported."""
     main = importlib.import_module(PARTICIPANT).main
-    said = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
-    return Child(Forked(lambda: main(name), said), said)
+    output = tempfile.TemporaryFile()  # noqa: SIM115 (its owner closes it)
+    return Child(Forked(lambda: main(name), output), output)
 
 
 @contextmanager
 def started_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
-    """Children by name, of which `launch` takes those that it needs and ends the others.
-
-    Where that is possible they have what this process has imported.
-    """
+    """Start participants, forked if possible, for `launch` to take; end those that are left."""
     begin = _fork if _may_fork() else start
     children = {name: begin(name) for name in names}
     try:
         yield children
     finally:
-        dismiss(children)
+        terminate_unused(children)
 
 
-def dismiss(children: dict[str, Child]) -> None:
-    """End those that nobody needs."""
+def terminate_unused(children: dict[str, Child]) -> None:
+    """Kill children that were started early and are not needed."""
     for child in children.values():
         assert child.process.stdin is not None
         child.process.stdin.close()
         child.process.kill()
         child.process.wait()
-        child.said.close()
+        child.output.close()
     children.clear()

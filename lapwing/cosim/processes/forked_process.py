@@ -1,4 +1,4 @@
-"""A child that goes on with all that this process has imported, where a new interpreter would import it once more."""
+"""Forked child process: it keeps the modules that this process has imported."""
 
 import os
 import signal
@@ -10,39 +10,39 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, NoReturn
 
-POLL = 0.005  # [s] between two looks at whether it has ended
+POLL = 0.005  # [s] between two checks whether it has exited
 
 
 class Forked:
-    """What a launcher needs of `subprocess.Popen`, with the same names.
+    """Child process with the subset of the interface of `subprocess.Popen` that a launcher uses.
 
     Attributes:
-        pid: its number.
-        stdin: the other end of its standard input.
-        returncode: exit code, or the number of the signal that has ended it, negative; None while it runs.
+        pid: process id.
+        stdin: write end of its standard input.
+        returncode: exit code, or the negative number of the signal that ended it; None while it runs.
     """
 
-    def __init__(self, run: Callable[[], None], said: IO[bytes]):
-        """A child that runs `run`, in a session of its own, and writes to `said`."""
+    def __init__(self, run: Callable[[], None], output: IO[bytes]):
+        """Start a child in a new session that calls `run` and writes its standard output and error to `output`."""
         mine, own = os.pipe()
         sys.stdout.flush()
         sys.stderr.flush()
         self.pid = os.fork()
         if self.pid == 0:
-            _run(run, mine, said.fileno())
+            _run(run, mine, output.fileno())
         os.close(mine)
         self.stdin: IO[bytes] | None = os.fdopen(own, "wb")
         self.returncode: int | None = None
 
     def poll(self) -> int | None:
-        """Its exit code, None while it runs."""
+        """Return the exit code, None while it runs."""
         return self._look(os.WNOHANG)
 
     def wait(self, timeout: float | None = None) -> int:
-        """Its exit code, once it has ended.
+        """Wait for the exit and return the exit code.
 
         Raises:
-            subprocess.TimeoutExpired: not within `timeout` seconds.
+            subprocess.TimeoutExpired: no exit within `timeout` seconds.
         """
         if timeout is None:
             code = self._look(0)
@@ -55,35 +55,32 @@ class Forked:
             time.sleep(POLL)
         return code
 
-    def terminate(self) -> None:
-        """Ask it to end."""
-        self._send(signal.SIGTERM)
-
     def kill(self) -> None:
-        """End it."""
-        self._send(signal.SIGKILL)
+        """Send SIGKILL."""
+        self.send_signal(signal.SIGKILL)
 
-    def _look(self, options: int) -> int | None:
-        if self.returncode is None and (found := os.waitpid(self.pid, options))[0]:
-            self.returncode = os.waitstatus_to_exitcode(found[1])
-        return self.returncode
-
-    def _send(self, number: int) -> None:
-        if self.poll() is None:  # its number is another process's once it has been waited for
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless the child has exited."""
+        if self.poll() is None:  # its id may belong to another process after it was waited for
             os.kill(self.pid, number)
 
+    def _look(self, options: int) -> int | None:
+        if self.returncode is None and (status := os.waitpid(self.pid, options))[0]:
+            self.returncode = os.waitstatus_to_exitcode(status[1])
+        return self.returncode
 
-def _run(run: Callable[[], None], standard_input: int, said: int) -> NoReturn:
-    """What the child does. It leaves without what this process has registered for its own end."""
+
+def _run(run: Callable[[], None], standard_input: int, output: int) -> NoReturn:
+    """Run the child. It exits without the exit handlers that this process has registered."""
     code = 1
     try:
         os.setsid()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        for here, there in ((standard_input, 0), (said, 1), (said, 2)):
+        for here, there in ((standard_input, 0), (output, 1), (output, 2)):
             os.dup2(here, there)
-        for file in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of those before it
+        for file in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of earlier children
             if file > 2:
                 with suppress(OSError):
                     os.close(file)
@@ -96,7 +93,7 @@ def _run(run: Callable[[], None], standard_input: int, said: int) -> NoReturn:
 
 
 def _code_of(run: Callable[[], None]) -> int:
-    """The exit code that a program would have that does no more."""
+    """Return the exit code of a program that only calls `run`."""
     try:
         run()
     except SystemExit as end:

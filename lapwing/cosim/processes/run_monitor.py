@@ -112,7 +112,7 @@ class RunMonitor:
                     self._logged = True
                     self._declare(LOGGED_KEY)
             elif head == ENDED_KEY:
-                self.outcome = payload.decode(errors="replace")
+                self.outcome = self.outcome or payload.decode(errors="replace")  # the first cause counts
             elif head == REFUSED_KEY and payload.isdigit():
                 self._refused[name] = int(payload)
 
@@ -150,7 +150,7 @@ class RunMonitor:
         self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
 
     @property
-    def spoken(self) -> set[str]:
+    def reporting_services(self) -> set[str]:
         """The services that have handed over messages."""
         return set(self._times)
 
@@ -159,14 +159,16 @@ class RunMonitor:
         """How many messages of strangers all participants have refused, as far as they have told."""
         return sum(self._refused.values()) + self._bus.refused
 
-    def broken_off(self) -> str | None:
+    def abort_message(self) -> str | None:
         """A sentence about a run that ended before its time, None where it came to its end or diverged."""
         if self.outcome == "" or self.diverged:
             return None
         why = f": {self.outcome}" if self.outcome else ""
         return f"the run ended before its time, at t = {self.time_ns * 1e-9:.3f} s{why}"
 
-    def frozen(self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0) -> str | None:
+    def stall_message(
+        self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0
+    ) -> str | None:
         """A sentence that names who holds up the run, None while it goes on.
 
         Args:

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from lapwing.cosim.processes.launcher import RunFailed
+from lapwing.cosim.run_errors import RunFailed
 
 PATIENCE = 10.0  # [s] for the scheduler to answer
 

@@ -6,7 +6,7 @@ from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from lapwing.cosim.processes.launcher import RunFailed
+from lapwing.cosim.run_errors import RunFailed
 from lapwing.studies.workers import workers
 
 

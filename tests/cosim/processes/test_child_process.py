@@ -19,17 +19,17 @@ def test_one_that_nobody_needs_ends_with_the_context_and_one_that_is_taken_goes_
         taken, left = early.pop("mavlink"), early["recorder"]
         assert taken.process.poll() is None
     assert left.process.poll() is not None
-    assert left.said.closed
+    assert left.output.closed
     try:
         assert taken.process.poll() is None
         taken.process.stdin.close()
         assert taken.process.wait(60.0) == 1  # nobody will tell it what to do
-        taken.said.seek(0)
-        assert taken.said.read() == b""
+        taken.output.seek(0)
+        assert taken.output.read() == b""
     finally:
         taken.process.kill()
         taken.process.wait()
-        taken.said.close()
+        taken.output.close()
 
 
 def code_of(run):
@@ -67,14 +67,14 @@ def test_a_fork_ends_as_a_program_of_its_own_would():
         assert said.read() == b"own session\nend of input"
 
 
-@pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("terminate", signal.SIGTERM)])
+@pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("send_signal", signal.SIGTERM)])
 def test_a_fork_is_ended_by_a_signal_and_then_let_alone(end, number):
     with tempfile.TemporaryFile() as said:
         child = Forked(lambda: time.sleep(60.0), said)
         child.stdin.close()
         with pytest.raises(subprocess.TimeoutExpired):
             child.wait(0.05)
-        getattr(child, end)()
+        getattr(child, end)(*[number] * (end == "send_signal"))
         assert child.wait() == -number
         child.kill()
 

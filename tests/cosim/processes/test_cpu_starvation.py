@@ -99,24 +99,24 @@ def silent_for(watch, seconds):
 def test_a_starved_service_is_not_held_to_be_frozen_and_others_are_as_soon_as_ever(watch):
     names = ["plant", "sensors"]
     silent_for(watch, 2.4)
-    assert watch.frozen(names) is None
+    assert watch.stall_message(names) is None
     silent_for(watch, 2.6)
-    assert watch.frozen(names) == "plant, sensors: no answer for 2.5 s, at t = 0.000 s"
-    assert watch.frozen(names, lambda who: 0.0)
-    assert watch.frozen(names, lambda who: 0.2) is None
+    assert watch.stall_message(names) == "plant, sensors: no answer for 2.5 s, at t = 0.000 s"
+    assert watch.stall_message(names, lambda who: 0.0)
+    assert watch.stall_message(names, lambda who: 0.2) is None
     silent_for(watch, 20.0)
-    assert watch.frozen(names, lambda who: 17.6) is None
-    assert watch.frozen(names, lambda who: 17.0)
+    assert watch.stall_message(names, lambda who: 17.6) is None
+    assert watch.stall_message(names, lambda who: 17.0)
 
 
 def test_who_waits_for_a_frozen_one_does_not_excuse_it(watch):
     silent_for(watch, 2.6)
     watch.waiting["sensors"] = "the truth"
     starved = {"plant": 0.0, "sensors": 2.0}
-    found = watch.frozen(starved, lambda who: sum(starved[name] for name in who))
+    found = watch.stall_message(starved, lambda who: sum(starved[name] for name in who))
     assert found == "plant: no answer for 2.5 s, at t = 0.000 s"
 
 
 def test_nobody_is_excused_for_ever(watch):
     silent_for(watch, LONGEST + 0.1)
-    assert watch.frozen(["plant"], lambda who: LONGEST)
+    assert watch.stall_message(["plant"], lambda who: LONGEST)

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from lapwing.cosim.processes.launcher import RunFailed
+from lapwing.cosim.run_errors import RunFailed
 from lapwing.studies.campaign import local
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import begin, manifest
