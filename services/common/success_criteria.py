@@ -14,6 +14,8 @@ from lapwing.dynamics.config_error import ConfigError
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
+LONGEST = 500  # characters of an expression
+MOST_NODES = 200  # of its syntax tree
 
 _MAY_HAVE = (
     ast.Expression, ast.Constant, ast.Name, ast.Attribute, ast.Load, ast.Tuple, ast.List, ast.Call,
@@ -36,7 +38,8 @@ class Success(SceneTable):
             try:
                 _expression(text)
             except ValueError:
-                raise ConfigError(f"success.require.{i}", f"got {text!r}", EXPECTED) from None
+                shown = text if len(text) <= 80 else f"{text[:77]}..."
+                raise ConfigError(f"success.require.{i}", f"got {shown!r}", EXPECTED) from None
 
     def check_names(self, known: Mapping[str, Any]) -> None:
         """Raise ConfigError if an expression uses an unknown metric."""
@@ -57,19 +60,30 @@ class _Expression(NamedTuple):
 def holds(text: str, figures: Mapping[str, Any]) -> bool:
     """Return True if the expression holds. For a NaN, such as the touch-down speed in the air, only != holds."""
     try:
-        return bool(eval(_expression(text).code, {"__builtins__": {}, **FUNCTIONS}, {"figures": figures}))
+        names = {"__builtins__": {}, "number": _number, **FUNCTIONS}
+        return bool(eval(_expression(text).code, names, {"figures": figures}))
     except (ArithmeticError, TypeError, ValueError):
         return False
+
+
+def _number(value: Any) -> float:
+    """Return an operand of arithmetic. Raise TypeError for texts and sequences, whose products exhaust the memory."""
+    if not isinstance(value, int | float):
+        raise TypeError(f"{type(value).__name__} in arithmetic")
+    return value
 
 
 @cache
 def _expression(text: str) -> _Expression:
     """Compile an expression of metrics, constants, comparisons and arithmetic. Raise ValueError for any other."""
+    if len(text) > LONGEST:
+        raise ValueError(text)
     try:
         tree = ast.parse(text.strip(), mode="eval")
-    except SyntaxError:
+    except (SyntaxError, RecursionError, MemoryError):
         raise ValueError(text) from None
-    if not all(isinstance(node, _MAY_HAVE) for node in ast.walk(tree)):
+    nodes = list(ast.walk(tree))
+    if len(nodes) > MOST_NODES or not all(isinstance(node, _MAY_HAVE) for node in nodes):
         raise ValueError(text)
     lookup = _Lookup()
     return _Expression(
@@ -91,6 +105,15 @@ class _Lookup(ast.NodeTransformer):
         """Replace `outcome`."""
         return self._look(node)
 
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """Restrict arithmetic to numbers."""
+        if any(isinstance(side, ast.List | ast.Tuple) or _is_text(side) for side in (node.left, node.right)):
+            raise ValueError(ast.unparse(node))
+        node.left, node.right = (
+            ast.Call(ast.Name("number", ast.Load()), [self.visit(side)], []) for side in (node.left, node.right)
+        )
+        return node
+
     def visit_Call(self, node: ast.Call) -> ast.expr:
         """Accept a call of one of the functions."""
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS or node.keywords:
@@ -104,3 +127,7 @@ class _Lookup(ast.NodeTransformer):
             raise ValueError(name)
         self.names.add(name)
         return ast.Subscript(ast.Name("figures", ast.Load()), ast.Constant(name), ast.Load())
+
+
+def _is_text(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)

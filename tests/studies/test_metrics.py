@@ -110,8 +110,29 @@ def test_expressions_over_figures(text, true):
     ["", "rmse.x <", "x = 3", "__import__('os')", "rmse.x.__class__()", "[x for x in y]", "(1).real", "f'{x}'"],
 )
 def test_nothing_else_is_an_expression(text):
-    with pytest.raises(SceneError, match=r"success.require.0: expected an expression over figures"):
+    with pytest.raises(SceneError, match=r"success.require.0: expected an expression"):
         load("hover", {"success.require": [text]})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[1] * 3000000000 == outcome",
+        "'a' * 99999999999 == outcome",
+        "not " * 20_000 + "(time < 1)",
+        "(" * 300 + "1" + ")" * 300,
+        " or ".join(["time < 1"] * 60),
+    ],
+    ids=["list", "text", "depth", "parentheses", "length"],
+)
+def test_success_rejects_expressions_that_exhaust_memory(text):
+    with pytest.raises(SceneError, match=r"success.require.0: expected an expression"):
+        load("hover", {"success.require": [text]})
+
+
+def test_success_arithmetic_takes_numbers_only():
+    assert not holds("outcome * 99999999999 == 1", {"outcome": "landed"})
+    assert holds("2 * time - 1 == 3", {"time": 2.0})
 
 
 def test_default_success_requires_a_completed_mission():

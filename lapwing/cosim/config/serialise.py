@@ -147,13 +147,21 @@ def _decoded(value: Any, modules: Collection[str]) -> Any:
         if tag == "dict":
             return {key: _decoded(item, modules) for key, item in value["of"].items()}
         if tag == "scalar":
-            return np.dtype(value["dtype"]).type(_decoded(value["of"], modules))
+            return np.dtype(_listed(value["dtype"], SCALARS)).type(_decoded(value["of"], modules))
         if tag == "array":
-            return np.array(_decoded(value["of"], modules), dtype=value["dtype"]).reshape(value["shape"])
+            flat = [_decoded(item, modules) for item in value["of"]]
+            return np.array(flat, dtype=_listed(value["dtype"], DTYPES)).reshape(value["shape"])
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"damaged {tag!r}: {error!r}") from None
     members = {key: _decoded(item, modules) for key, item in value.items() if key != TAG}
     return _record(_class_of(str(tag), modules), str(tag), members)
+
+
+def _listed(dtype: Any, allowed: Collection[str]) -> str:
+    """Return the name of an allowed type: another, such as a text of 10^9 characters, could exhaust the memory."""
+    if not isinstance(dtype, str) or dtype not in allowed:
+        raise TypeError(f"dtype {dtype!r}; expected one of {', '.join(allowed)}")
+    return dtype
 
 
 def _record(cls: type, name: str, members: dict[str, Any]) -> Any:

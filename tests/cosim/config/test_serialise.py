@@ -163,3 +163,17 @@ def test_nothing_is_imported_for_a_text_but_what_is_declared(tmp_path, monkeypat
     assert "somebodys" not in sys.modules
     assert from_json(text, ["somebodys"]) == (0.5,)
     sys.modules.pop("somebodys")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"$":"scalar","dtype":"U1000000000","of":1}',
+        '{"$":"array","dtype":"V2000000000","shape":[1],"of":[0]}',
+        '{"$":"array","dtype":"float64","shape":[1000000000],"of":[0]}',
+        '{"$":"array","dtype":7,"shape":[1],"of":[0]}',
+    ],
+)
+def test_arrays_of_other_types_or_sizes_are_rejected(text):
+    with pytest.raises(ValueError, match=r"damaged|reshape"):
+        from_json(text)
