@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from benchmarks.accuracy import ten_hours
-from benchmarks.accuracy.other_simulators import installed
+from benchmarks.other_simulators import accuracy, installed
 from lapwing.studies.accuracy.systems import problems
 from lapwing.studies.accuracy.work_precision import Point, measure
 from lapwing.studies.accuracy.work_precision_plot import COLOURS, MARKERS
@@ -75,7 +75,7 @@ def draw(found: dict[str, list[Point]]) -> None:
 def main() -> None:
     from importlib.metadata import version
 
-    others = installed()
+    others = installed(accuracy.__name__)
     print("versions: " + ", ".join(f"{p.NAME} {version(p.MODULE)}" for p in others))
     found: dict[str, list[Point]] = {}
     for case in CASES:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
+from lapwing.cli.error_exit import fail, user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_plot
 from lapwing.studies.tune.bandwidths import Bandwidths
@@ -189,6 +189,9 @@ def tune(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="write Bode plots, step responses and tables (HTML)")
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="write the gains even if they fail a flight of a perturbed vehicle")
+    ] = False,
 ) -> None:
     """Design controller gains and refine them in simulated flight.
 
@@ -220,9 +223,11 @@ def tune(
                     loaded, target, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
                 )
         console_output.show(screen, found)
-        if out:
+        if out and (force or not found.failures):
             procedure.write(out, found.gains)
             typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
         if report:
             page.write(report, found)
             typer.echo(f"{report}: Bode plots, margins and steps")
+        if out and found.failures and not force:
+            fail(f"{out}: not written, the gains fail {'; '.join(found.failures)}; use --force to write them", 1)

@@ -310,6 +310,7 @@ const fly = (section, given, live) => {
   const near = new IntersectionObserver(async (entries) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
     near.disconnect();
+    await library;
     await Plotly.newPlot(box, [...traces, ...moving.map(({ trace }) => trace)], layout, { responsive: true, displaylogo: false });
     drawn = true;
     show(false);

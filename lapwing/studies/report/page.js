@@ -21,6 +21,7 @@
     const { data, layout, timed } = JSON.parse(figure.querySelector("script").textContent);
     const box = figure.querySelector("div");
     if (range) for (const axis of timed) layout[axis].range = range.slice();
+    await library;
     await Plotly.newPlot(box, data, layout, config);
     if (!timed.length) return;
     const plot = { box, timed, axis: timed[0], panels: timed.map((axis) => `${axis}${axis.replace("x", "y")}`.replaceAll("axis", "")) };

@@ -1,5 +1,7 @@
 """The report as a page for a browser: what the flight came to, and the plots; one file that needs no network."""
 
+import base64
+import gzip
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,7 +71,14 @@ def render(template: str, sections: Iterable[Section], **values: Any) -> str:
         ValueError: that script is not installed.
     """
     code = (_HERE / "page.js").read_text(encoding="utf-8")
-    return _TEMPLATES.get_template(template).render(library=script(), code=code, sections=sections, **values)
+    return _TEMPLATES.get_template(template).render(
+        library=_compressed(script()), code=code, sections=sections, **values
+    )
+
+
+def _compressed(text: str) -> str:
+    """Return a text compressed with gzip, in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 
 
 def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list[Accuracy]:

@@ -4,7 +4,7 @@ STEERED = ("reduced", "multibody", "slung_load")  # the models of vehicles that 
 
 WIDTH = 10.0  # [inch] of every figure; the page shows 100 pixels an inch
 DPI = 125
-POINTS = 4000  # drawn of a line at most
+POINTS = 1000  # of a line at most: extremes at every second pixel of the page
 
 # Okabe and Ito's palette: told apart also without red-green vision.
 FLOWN = "#0072B2"

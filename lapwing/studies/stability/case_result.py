@@ -36,7 +36,6 @@ class Row(NamedTuple):
     measured: float
     naive: str  # the naive method
     naive_measured: float
-    other_simulators: tuple[tuple[str, float], ...] = ()  # name with method, and figure on the same case
 
     @property
     def passes(self) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.studies.stability import cases, other_simulators
+from lapwing.studies.stability import cases
 from lapwing.studies.stability.case_result import CaseResult, Plot, Row, Sweep
 from lapwing.studies.workers import workers
 
@@ -70,10 +70,8 @@ def one(name: str, sweep: bool) -> Result:
         why = f"ended in an error: {error}"
         found = CaseResult([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
     with np.errstate(all="ignore"):
-        others = other_simulators.figures(name)
         walked = module.sweep() if sweep else None
-    beside = [row._replace(other_simulators=tuple(others.get(row.name, {}).items())) for row in found.rows]
-    return Result(name, module.HARD, found._replace(rows=beside), walked, time.perf_counter() - started)
+    return Result(name, module.HARD, found, walked, time.perf_counter() - started)
 
 
 def _told(result: Result, progress: Callable[[str], None]) -> Result:

@@ -34,7 +34,7 @@ def distance(bound: float, measured: float) -> str:
 
 COLUMNS = {  # name: share of the width, None where it is as wide as its figures
     "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
-    "naive method": 5, "its result": None, "other simulators": 4,
+    "naive method": 5, "its result": None,
 }  # fmt: skip
 FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}  # letters
 
@@ -53,7 +53,6 @@ def table(console: Console, results: Sequence[Result]) -> None:
                 row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
                 distance(row.bound, row.measured), _coloured(row.passes), escape(row.naive),
                 f"{figure(row.naive_measured)} {_coloured(row.naive_passes, not row.naive_passes)}",
-                "\n".join(f"{escape(name)}: {figure(value)}" for name, value in row.other_simulators),
             )  # fmt: skip
         console.print(shown)
 
@@ -78,7 +77,7 @@ def sweeps(console: Console, results: Sequence[Result]) -> None:
 
 
 def as_json(results: Sequence[Result]) -> dict[str, Any]:
-    """{"cases": [...]}, an entry for each row, with "other_simulators" where any has run it; not finite: null."""
+    """Return {"cases": [...]} with an entry for each row; values that are not finite are null."""
     return {
         "cases": [
             {
@@ -88,11 +87,6 @@ def as_json(results: Sequence[Result]) -> dict[str, Any]:
                 "verdict": verdict(row.passes),
                 "naive_measured": _finite(row.naive_measured),
                 "naive_verdict": verdict(row.naive_passes),
-                **(
-                    {"other_simulators": {name: _finite(value) for name, value in row.other_simulators}}
-                    if row.other_simulators
-                    else {}
-                ),
             }
             for result in results
             for row in result.found.rows

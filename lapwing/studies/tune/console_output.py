@@ -1,4 +1,4 @@
-"""What `lapwing tune` has found, as tables."""
+"""Results of `lapwing tune` as tables."""
 
 import math
 from collections.abc import Iterator
@@ -8,6 +8,7 @@ from rich.table import Table
 
 from lapwing.services.autopilot.margins import Margins
 from lapwing.studies.tracking import AXES, shown
+from lapwing.studies.tune.corners import failure
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.identify import LOOPS
 from lapwing.studies.tune.procedure import Tuned
@@ -23,19 +24,22 @@ UNITS = {
 
 
 class Rows:
-    """A table before it is drawn: title, heads and rows of text; the first column names the row."""
+    """Table as text: title, heads and rows; the first column names the row."""
 
     def __init__(self, title: str, *heads: str):
         self.title, self.heads = title, heads
         self.rows: list[tuple[str, ...]] = []
+        self.failed: set[int] = set()  # numbers of rows that report a failure
 
-    def add(self, *cells: str) -> None:
-        """One more row."""
+    def add(self, *cells: str, failed: bool = False) -> None:
+        """Add a row."""
+        if failed:
+            self.failed.add(len(self.rows))
         self.rows.append(cells)
 
 
 def tables(found: Tuned) -> Iterator[Rows]:
-    """Every table of the study, the answer first."""
+    """Yield every table of the study, the result first."""
     yield _margins(found)
     if found.polished:
         yield _errors(found)
@@ -44,18 +48,20 @@ def tables(found: Tuned) -> Iterator[Rows]:
 
 
 def show(console: Console, found: Tuned) -> None:
-    """Print the tables for people."""
+    """Print the tables, failures in red."""
     for rows in tables(found):
         table = Table(title=rows.title, title_justify="left")
         for k, head in enumerate(rows.heads):
             table.add_column(head, justify="right" if k else "left", no_wrap=True)
-        for row in rows.rows:
-            table.add_row(*row)
+        for k, row in enumerate(rows.rows):
+            table.add_row(*row, style="bold red" if k in rows.failed else None)
         console.print(table)
+    for text in found.failures:
+        console.print(f"new gains fail: {text}", style="bold red", highlight=False, soft_wrap=True)
 
 
 def cell(m: Margins) -> str:
-    """Margins in few words."""
+    """Return margins as a short text."""
     if not 0.0 < m.crossover < math.inf:
         return f"no crossover: gain {'above' if m.crossover else 'below'} 1"
     up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
@@ -67,15 +73,20 @@ def _margins(found: Tuned) -> Rows:
         "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", found.before.name, "new"
     )
     for name in found.after.margins:
-        rows.add(name, cell(found.before.margins[name]), cell(found.after.margins[name]))
+        rows.add(
+            name,
+            cell(found.before.margins[name]),
+            cell(found.after.margins[name]),
+            failed=name in found.after.shortfalls,
+        )
     return rows
 
 
 def _errors(found: Tuned) -> Rows:
     p = found.polished
     assert p is not None
-    title = f"RMSE of {len(p.after)} flights of the scene: as designed, and polished ({p.candidates} gain sets flown)"
-    rows = Rows(title, "axis", "designed", "polished")
+    title = f"RMSE of {len(p.after)} flights of the scene: as designed and refined ({p.candidates} gain sets flown)"
+    rows = Rows(title, "axis", "designed", "refined")
     for axis in AXES:
         unit, scale = shown(axis)
         rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
@@ -84,10 +95,13 @@ def _errors(found: Tuned) -> Rows:
 
 def _corners(found: Tuned) -> Rows:
     rows = Rows(
-        "The flight with a vehicle that differs from the controller's model", "vehicle", "max. position error, m", "end"
+        "Flights with a vehicle that differs from the controller's model",
+        "vehicle",
+        "max. position error, m",
+        "outcome",
     )
     for corner, f in found.corners.items():
-        rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"])
+        rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"], failed=bool(failure(f)))
     return rows
 
 

@@ -1,5 +1,6 @@
-"""The non-linear closed loop with mass, inertia and thrust wrong by a fifth, which the controller is not told."""
+"""Closed-loop flights with mass, inertia and thrust that differ by 20 % from the controller's model."""
 
+from collections.abc import Mapping
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -18,11 +19,11 @@ from lapwing.studies.campaign.campaign_config import TOPICS
 from lapwing.studies.metrics import metrics
 from lapwing.studies.simulate import fly
 
-WRONG = 0.2  # of the nominal value
+DEVIATION = 0.2  # of the nominal value
 
 
 class Corner(NamedTuple):
-    """Factors on the true vehicle."""
+    """Factors on the true vehicle relative to the autopilot's model."""
 
     mass: float
     inertia: float
@@ -32,23 +33,28 @@ class Corner(NamedTuple):
         return ", ".join(f"{name} {100.0 * (value - 1.0):+.0f} %" for name, value in self._asdict().items())
 
 
-CORNERS = [Corner(*signs) for signs in product((1.0 - WRONG, 1.0 + WRONG), repeat=3)]
+CORNERS = [Corner(*signs) for signs in product((1.0 - DEVIATION, 1.0 + DEVIATION), repeat=3)]
 
 
 def flown(setup: RunConfig) -> dict[str, Any]:
-    """Figures of a flight of which all that a campaign looks at is told at every tick."""
+    """Return the metrics of a flight."""
     return metrics(fly(setup, TOPICS))
 
 
+def failure(flight: Mapping[str, Any]) -> str:
+    """Return the outcome of a flight that failed, from its metrics; "" if it succeeded."""
+    return "" if flight["outcome"] in ("landed", "completed") else str(flight["outcome_text"])
+
+
 def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:
-    """The run with another gain set, also where the scene's parameters had changed single gains of its own."""
+    """Return the run with another gain set, which also replaces gains changed by the scene's parameters."""
     own, changed = setup.services["autopilot"].parameters, {p.name: p for p in of_gains(gains)}
     parameters = tuple(changed.get(p.name, p) for p in own.parameters)
     return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
 
 
 def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
-    """The run with a vehicle that differs from the one which the autopilot knows."""
+    """Return the run with a vehicle that differs from the autopilot's model."""
     frame = airframe(scene)
     mass = frame.mass.model_copy(
         update={
@@ -72,7 +78,7 @@ def _with(setup: RunConfig, name: str, parameters: Any) -> RunConfig:
 
 
 def _stronger(effect: Any, factor: float) -> Any:
-    """An effect whose rotors give `factor` times the thrust; others as they are."""
+    """Return an effect with its rotor thrust times `factor`; effects without rotors unchanged."""
     if "thrust_constant" not in getattr(effect, "_fields", ()):
         return effect
     return effect._replace(thrust_constant=factor * effect.thrust_constant)

@@ -1,4 +1,4 @@
-"""The whole of `lapwing tune`: a linear model, the gains that are there, a design for margins, a polish in flight."""
+"""Procedure of `lapwing tune`: linear model, present gains, design for margins, refinement in simulated flights."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ from lapwing.studies.tune.linearise import Hover, hover
 
 
 class Judged(NamedTuple):
-    """A gain set and what it is worth."""
+    """A gain set with its margins."""
 
     name: str
     parameters: Parameters
@@ -33,23 +33,30 @@ class Judged(NamedTuple):
 
 
 class Tuned(NamedTuple):
-    """What has been found."""
+    """Result of a tuning."""
 
     scene: str
     tick: float  # [s] the controller's period
     compiled: Hover  # from the model
     identified: Identified | None  # from a log
-    assumed: Airframe  # what the design is for
+    assumed: Airframe  # airframe that the design assumes
     before: Judged
     after: Judged
     gains: GainSet
-    polished: gain_refinement.Polished | None  # None where nothing is flown along
+    polished: gain_refinement.Polished | None  # None without a trajectory
     corners: dict[corners.Corner, gain_refinement.Figures]
 
     @property
     def model(self) -> Hover:
-        """The linear model that was designed for."""
+        """Linear model of the design."""
         return self.identified.model if self.identified else self.compiled
+
+    @property
+    def failures(self) -> list[str]:
+        """Loops of the new gains without their margins, and flights of perturbed vehicles that failed."""
+        loops = [f"{name}: {why}" for name, why in self.after.shortfalls.items()]
+        return loops + [f"{corner}: {corners.failure(flight)}" for corner, flight in self.corners.items()
+                        if corners.failure(flight)]  # fmt: skip
 
 
 def tune(
@@ -59,21 +66,21 @@ def tune(
     log: Path | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Tuned:
-    """Design a gain set for the scene's vehicle about hover, and polish it on the scene's flight.
+    """Design a gain set for the scene's vehicle about hover and refine it in flights of the scene.
 
     Args:
-        scene: whose vehicle, path and wind.
-        wanted: bandwidths to begin with.
-        say: told of everything that is not as it ought to be.
-        log: a flight to identify the plant from, instead of linearising the compiled model.
+        scene: scene with the vehicle, trajectory and wind.
+        wanted: initial bandwidths.
+        say: called with each warning.
+        log: log to identify the plant from; None to linearise the compiled model.
         progress: called after every gain set that was flown.
 
     Raises:
-        ValueError: the scene has no autopilot, its vehicle cannot hover, the log does not tell enough, or no gains hold
-            the margins.
+        ValueError: the scene has no autopilot, its vehicle cannot hover, the log does not excite all loops, or no gains
+            have the margins.
     """
     if not scene.has(Autopilot):
-        raise ValueError(f"{scene.path}: has no [autopilot] to tune; expected a scene whose vehicle it flies")
+        raise ValueError(f"{scene.path}: has no [autopilot] to tune; use a scene with an autopilot")
     for name, value in wanted._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
@@ -85,7 +92,7 @@ def tune(
     plant = assumed_airframe(airframe, model)
     before = _judged(config.gains, own, plant, tick)
     for name, why in before.shortfalls.items():
-        say(f"warning: gains {config.gains}: {name}: {why}")
+        say(f"warning: present gains {config.gains} of the scene: {name}: {why}")
     reached = design(model, airframe, tick, wanted, say)
     gains, polished, at_corners = gain_set(model, reached), None, {}
     if follows_trajectory(scene) and scene[Vehicle].model == "reduced" and not config.operator:
@@ -94,7 +101,7 @@ def tune(
         setup = corners.with_gains(campaign_setup(scene), gains)
         at_corners = {c: corners.flown(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
     else:
-        say("not polished: there is no [trajectory] that the vehicle flies along by itself")
+        say("gains not refined in flight: the scene has no [trajectory] that its autopilot follows")
     after = _judged("new", build(gains.plain(), airframe), plant, tick)
     return Tuned(scene.name, tick, compiled, identified, plant, before, after, gains, polished, at_corners)
 
@@ -105,7 +112,7 @@ def _judged(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
 
 
 def write(path: Path, gains: GainSet) -> None:
-    """Write a gain set as a scene can name it."""
+    """Write a gain set to a TOML file that a scene can name."""
     lines = ["# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
     for key, value in gains.model_dump().items():
         if isinstance(value, tuple):

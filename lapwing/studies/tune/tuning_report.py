@@ -1,4 +1,4 @@
-"""The page of `lapwing tune`: margins, Bode plots and step responses before and after, and what was flown."""
+"""Page of `lapwing tune`: margins, Bode plots, step responses before and after, and flights."""
 
 import math
 from pathlib import Path
@@ -28,7 +28,7 @@ LOOKS = ((REFERENCE, "dash"), (FLOWN, "solid"))  # of before and after
 
 
 def write(path: Path, found: Tuned) -> None:
-    """Write the page."""
+    """Write the page to a file."""
     both = (found.before, found.after)
     loops = [systems(j.parameters, found.assumed, found.tick, DELAY) for j in both]
     sections = [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lapwing.cli.study_commands import stability
-from lapwing.studies.stability import cases, console_output, other_simulators
+from lapwing.studies.stability import cases, console_output
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.case_runner import chosen, one
 from lapwing.studies.stability.chart import chart
@@ -29,7 +29,6 @@ CHEAP = (
 
 @pytest.mark.parametrize("name", CHEAP)
 def test_a_case_stands_and_its_naive_method_does_not(name, monkeypatch):
-    monkeypatch.setattr(other_simulators, "figures", lambda case: {})  # they decide nothing, and take a minute
     result = one(name, False)
     assert result.found.rows
     for row in result.found.rows:

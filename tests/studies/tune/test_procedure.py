@@ -25,7 +25,7 @@ def found():
     return tune(load_scene(HOVER), Bandwidths(), lambda _: None)
 
 
-def test_what_is_written_can_be_read_and_flown(found, tmp_path):
+def test_written_gains_can_be_read_and_flown(found, tmp_path):
     path = tmp_path / "new.toml"
     write(path, found.gains)
     assert load(str(path)) == found.gains
@@ -35,7 +35,7 @@ def test_what_is_written_can_be_read_and_flown(found, tmp_path):
     assert height.max() - height[0] == pytest.approx(1.0, abs=0.05)
 
 
-def test_polishing_keeps_the_margins_and_lessens_the_error(found):
+def test_refinement_keeps_margins_and_reduces_errors(found):
     assert found.after.shortfalls == {}
     assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
     moved, asked = found.polished.bandwidths, Bandwidths()
@@ -43,11 +43,11 @@ def test_polishing_keeps_the_margins_and_lessens_the_error(found):
     assert moved.position == asked.position  # nothing of this flight goes along x or y
 
 
-def test_the_same_scene_gives_the_same_gains(found):
+def test_tuning_is_deterministic(found):
     assert tune(load_scene(HOVER), Bandwidths(), lambda _: None).gains == found.gains
 
 
-def test_every_corner_lands(found):
+def test_perturbed_vehicles_land(found):
     assert len(found.corners) == 8
     assert not [f["outcome_text"] for f in found.corners.values() if f["outcome"] != "landed"]
     assert max(f["max_distance"] for f in found.corners.values()) < 0.3
@@ -66,10 +66,25 @@ def test_page_and_tables(found, tmp_path):
     assert "x_plant_input" in console.export_text()
 
 
-def test_weak_gains_of_the_scene_are_warned_about_with_the_margin():
+def test_failing_gains_are_named_and_need_force(found, tmp_path, monkeypatch):
+    corner = next(iter(found.corners))
+    crash = found.corners[corner] | {"outcome": "crashed", "outcome_text": "Crashed at 3.00 s: turned over"}
+    failing = found._replace(corners=found.corners | {corner: crash})
+    assert (found.failures, failing.failures) == ([], [f"{corner}: Crashed at 3.00 s: turned over"])
+    monkeypatch.setattr("lapwing.studies.tune.procedure.tune", lambda *_: failing)
+    out = tmp_path / "new.toml"
+    result = CliRunner().invoke(app, ["tune", str(HOVER), "--out", str(out)])
+    assert (result.exit_code, out.exists()) == (1, False)
+    assert "Crashed at 3.00 s" in result.output
+    assert "--force" in result.output
+    result = CliRunner().invoke(app, ["tune", str(HOVER), "--out", str(out), "--force"])
+    assert (result.exit_code, out.exists()) == (0, True)
+
+
+def test_weak_present_gains_give_a_warning():
     said = []
     tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), said.append)
-    assert any(line.startswith("warning: gains paper: roll: phase margin 2") for line in said)
+    assert any(line.startswith("warning: present gains paper of the scene: roll: phase margin 2") for line in said)
 
 
 def gains_with(tmp_path, **changes):
@@ -78,7 +93,7 @@ def gains_with(tmp_path, **changes):
     return path
 
 
-def test_unstable_gains_are_warned_about_before_a_flight(tmp_path):
+def test_check_warns_of_unstable_gains(tmp_path):
     path = gains_with(tmp_path, altitude=(160.0, 120.0, 3200.0))
     assert unstable_loops(load_scene(HOVER)) == []
     result = CliRunner().invoke(app, ["check", str(HOVER), "--set", f"autopilot.gains={path}"])
@@ -88,14 +103,14 @@ def test_unstable_gains_are_warned_about_before_a_flight(tmp_path):
     assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
 
 
-def test_no_scene_that_is_shipped_is_unstable():
+def test_shipped_scenes_have_stable_gains():
     for path in sorted(SCENES.glob("*.toml")):
         scene = load_scene(path)
         for vehicle in scene.vehicles or (scene,):
             assert unstable_loops(vehicle) == [], path
 
 
-def test_bad_input_is_one_line(tmp_path):
+def test_invalid_input_is_one_line(tmp_path):
     with pytest.raises(ValueError, match=r"^--altitude -1: expected a bandwidth above 0 rad/s$"):
         tune(load_scene(HOVER), Bandwidths(altitude=-1.0), lambda _: None)
     with pytest.raises(ValueError, match=r"has no \[autopilot\] to tune"):

@@ -6,7 +6,7 @@ import exudyn as exu
 import numpy as np
 from exudyn import utilities as build
 
-from lapwing.studies.stability.other_simulators import _free_bodies
+from benchmarks.other_simulators.stability import _free_bodies
 
 
 def settings(duration: float, steps: int, samples: int) -> Any:

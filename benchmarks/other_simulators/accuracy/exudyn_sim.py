@@ -7,7 +7,7 @@ import exudyn as exu
 import numpy as np
 from exudyn import utilities as build
 
-from benchmarks.accuracy.other_simulators import matrix, outcome
+from benchmarks.other_simulators.accuracy import matrix, outcome
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, heavy_top
 

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from benchmarks.accuracy.other_simulators import matrix, outcome
+from benchmarks.other_simulators.accuracy import matrix, outcome
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

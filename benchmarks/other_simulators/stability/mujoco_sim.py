@@ -7,9 +7,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from benchmarks.other_simulators.stability import Errors, _ball_feet, _free_bodies
 from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.stability.cases import landing, redundant_constraints, slopes, toppling
-from lapwing.studies.stability.other_simulators import Figures, _ball_feet, _free_bodies
 
 INTEGRATORS = ("RK4", "implicitfast")
 CONTACT = "MuJoCo implicitfast, elliptic cone"
@@ -61,7 +61,7 @@ def way(angle: float, seconds: float) -> float:
     return float(np.linalg.norm(run_on(model, data, seconds).qpos[:3] - before))
 
 
-def standing() -> Figures:
+def standing() -> Errors:
     """Creep on a slope, and what is left of a slide."""
     model, data = vehicle(0.0, slopes.DYNAMIC)
     run_on(model, data, 3.0).qvel[0] = 1.0
@@ -69,7 +69,7 @@ def standing() -> Figures:
     return {"creep": {CONTACT: way(math.radians(20.0), 600.0)}, "stick_slip": {CONTACT: left}}
 
 
-def sliding() -> Figures:
+def sliding() -> Errors:
     """Below the angle at which feet let go, and beyond it."""
     a = math.radians(30.0)
     model, data = vehicle(a, slopes.DYNAMIC)
@@ -88,12 +88,12 @@ def falls(axis: int, angle: float) -> bool:
     return _ball_feet.toppled(axis, 1.0 - 2.0 * (data.qpos[4] ** 2 + data.qpos[5] ** 2))
 
 
-def leaning() -> Figures:
+def leaning() -> Errors:
     """The angle at which it topples."""
     return {"leaning": {CONTACT: _ball_feet.error(falls)}}
 
 
-def four_bars(n: int = 2) -> Figures:
+def four_bars(n: int = 2) -> Errors:
     """Two windows: couplers hang on their left crank and are tied to the right one."""
     c = redundant_constraints
     rod = '<inertial pos="0.5 0 0" mass="1" diaginertia="0.0001 0.0833333333333333 0.0833333333333333"/>'

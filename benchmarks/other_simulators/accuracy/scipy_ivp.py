@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.accuracy.other_simulators import matrix, outcome
+from benchmarks.other_simulators.accuracy import matrix, outcome
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.other_simulators.stability import Errors
 from lapwing.studies.stability.cases import intermediate_axis, looping, odd_inertia
-from lapwing.studies.stability.other_simulators import Figures
 from lapwing.studies.stability.sampled_runs import drift
 
 # (inertia [kg m^2], start, duration [s], steps, samples) -> R_world_body and omega_body, shape (samples + 1, 12)
 March = Callable[[Any, Any, float, int, int], np.ndarray]
 
 
-def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Figures]]:
+def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
     """The `CASES` of free bodies, of methods by the name that they are shown under."""
 
-    def tumbling() -> Figures:
+    def tumbling() -> Errors:
         c = intermediate_axis
         found: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
         for name, march in methods.items():
@@ -25,7 +25,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Figures]]:
                 found[row][name] = float(values.max())
         return found
 
-    def loops() -> Figures:
+    def loops() -> Errors:
         c = looping
         return {
             "momentum": {
@@ -34,7 +34,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Figures]]:
             }
         }
 
-    def odd_bodies() -> Figures:
+    def odd_bodies() -> Errors:
         c = odd_inertia
         return {
             body: {

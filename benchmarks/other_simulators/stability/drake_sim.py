@@ -14,8 +14,8 @@ from pydrake.multibody.tree import FixedOffsetFrame, QuaternionFloatingJoint, Re
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
 
+from benchmarks.other_simulators.stability import Errors, _ball_feet, _free_bodies
 from lapwing.studies.stability.cases import landing, redundant_constraints, slopes, toppling
-from lapwing.studies.stability.other_simulators import Figures, _ball_feet, _free_bodies
 
 DISCRETE = "Drake discrete"
 SCHEMES = {"Drake RK3": "runge_kutta3", "Drake RK5": "runge_kutta5", DISCRETE: None}  # None: a discrete plant
@@ -109,7 +109,7 @@ def way(angle: float, seconds: float) -> float:
     return float(np.linalg.norm(model.position_world() - before))
 
 
-def standing() -> Figures:
+def standing() -> Errors:
     """Creep on a slope, and what is left of a slide."""
     model = vehicle(0.0, slopes.DYNAMIC)
     model.run_on(3.0)
@@ -119,7 +119,7 @@ def standing() -> Figures:
     return {"creep": {DISCRETE: way(math.radians(20.0), 600.0)}, "stick_slip": {DISCRETE: left}}
 
 
-def sliding() -> Figures:
+def sliding() -> Errors:
     """Below the angle at which feet let go, and beyond it."""
     a = math.radians(30.0)
     model = vehicle(a, slopes.DYNAMIC)
@@ -141,12 +141,12 @@ def falls(axis: int, angle: float) -> bool:
     return _ball_feet.toppled(axis, model.attitude_matrix()[2, 2])
 
 
-def leaning() -> Figures:
+def leaning() -> Errors:
     """The angle at which it topples."""
     return {"leaning": {DISCRETE: _ball_feet.error(falls)}}
 
 
-def four_bars(n: int = 2) -> Figures:
+def four_bars(n: int = 2) -> Errors:
     """Two windows: couplers hang on their left crank and are tied to the right one."""
     c = redundant_constraints
     model = Model(c.END / c.STEPS, None, (0.0, -c.GRAVITY, 0.0))

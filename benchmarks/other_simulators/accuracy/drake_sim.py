@@ -16,8 +16,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from benchmarks.accuracy.other_simulators import matrix, outcome
-from benchmarks.accuracy.other_simulators.mujoco_sim import ACROSS, AXIAL, rotor_speeds
+from benchmarks.other_simulators.accuracy import matrix, outcome
+from benchmarks.other_simulators.accuracy.mujoco_sim import ACROSS, AXIAL, rotor_speeds
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 

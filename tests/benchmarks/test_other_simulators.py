@@ -1,0 +1,70 @@
+"""Other simulators on the stability cases: the rows that they measure, and missing packages."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import benchmarks.other_simulators
+from benchmarks.other_simulators import stability
+from benchmarks.other_simulators.stability import _ball_feet
+from lapwing.dynamics import discovery
+from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
+from lapwing.studies.stability import cases
+from lapwing.studies.stability.cases import toppling
+
+
+def test_errors_of_installed_simulators_are_printed(monkeypatch, capsys):
+    simulator = SimpleNamespace(CASES={"exact_time": lambda: {row: {"Made-up RK4": 0.25}}})
+    row = cases.get("exact_time").run().rows[0].name
+    monkeypatch.setattr(stability, "installed", lambda package: [simulator])
+    assert stability.errors("exact_time") == {row: {"Made-up RK4": 0.25}}
+    benchmarks.other_simulators.main(("exact_time",))
+    assert "Made-up RK4" in capsys.readouterr().out
+
+
+def test_simulators_that_are_not_installed_are_skipped(monkeypatch, capsys):
+    def missing(package, name, what):
+        raise ImportError(name)
+
+    monkeypatch.setattr(benchmarks.other_simulators.discovery, "get", missing)
+    assert stability.errors("looping") == {}
+    assert "mujoco_sim: skipped" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "package"), [("drake_sim", "pydrake"), ("exudyn_sim", "exudyn"), ("mujoco_sim", "mujoco")]
+)
+def test_simulators_measure_rows_of_cases(name, package):
+    pytest.importorskip(package)
+    simulator = discovery.get(stability, name, "simulator")
+    assert set(simulator.CASES) <= set(cases.names())
+    loops = simulator.CASES["looping"]()["momentum"]
+    assert loops
+    assert max(loops.values()) < 1e-5  # three digits below the naive method: the same body, turning the same way
+
+
+def test_drake_four_bars_follow_the_equation_of_motion():
+    pytest.importorskip("pydrake")
+    simulator = discovery.get(stability, "drake_sim", "simulator")
+    assert simulator.four_bars()["four_bar"][simulator.DISCRETE] < 0.05  # [m], of tips that move by 2 m
+
+
+@pytest.mark.parametrize("axis", toppling.AXES)
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_set_down_vehicle_touches_with_two_balls(axis, angle):
+    height, attitude = _ball_feet.set_down(axis, angle)
+    R = np.reshape(rotation_matrix(Quaternion(*attitude)), (3, 3))
+    lowest = sorted(height + R[2] @ ball for ball in _ball_feet.BALLS)
+    assert lowest[:2] == pytest.approx([_ball_feet.RADIUS] * 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3])
+def test_toppling_edge_is_below_the_centre_of_mass(off):
+    def falls(axis, angle):
+        _, attitude = _ball_feet.set_down(axis, angle - off)
+        R = np.reshape(rotation_matrix(Quaternion(*attitude)), (3, 3))
+        lowest = min(_ball_feet.BALLS, key=lambda ball: R[2] @ ball)
+        return (R @ lowest)[1 - axis] * lowest[1 - axis] < 0.0  # on the other side of the centre of mass
+
+    assert _ball_feet.error(falls) == pytest.approx(off, abs=1e-10)
