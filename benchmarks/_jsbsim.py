@@ -16,7 +16,7 @@ class JsbsimQuad:
     """The vehicle, loaded once and flown again and again from its start."""
 
     def __init__(self, step: float):
-        """With steps of `step` [s], of which a control interval is a whole number; ImportError without JSBSim."""
+        """Create the aircraft with `step` [s], a divisor of the control interval; ImportError without JSBSim."""
         import jsbsim
 
         with tempfile.TemporaryDirectory() as folder:
@@ -37,7 +37,7 @@ class JsbsimQuad:
         self._step = step
 
     def fly(self, seconds: float, target: tuple[float, float, float]) -> np.ndarray:
-        """Where it is [m] after a flight towards a target [m]: north, east, up of the start, shape (3,)."""
+        """Return the position [m] after a flight towards a target [m]: north, east, up of the start, shape (3,)."""
         fdm, start = self._fdm, np.array([0.0, 0.0, HEIGHT])  # JSBSim counts "up" from the ground
         fdm.reset_to_initial_conditions(0)
         for axis, value in zip(AXES, start + target, strict=True):

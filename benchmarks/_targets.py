@@ -1,4 +1,4 @@
-"""What a user waits for, as measured, beside its bar."""
+"""Measured figures and their targets."""
 
 import os
 import shutil
@@ -26,7 +26,7 @@ class Row(NamedTuple):
 
     @property
     def short(self) -> bool:
-        """Whether it falls short of its bar."""
+        """True if the figure misses its target."""
         return self.measured < self.bar if self.more else self.measured > self.bar
 
 
@@ -69,5 +69,5 @@ def said_within(command: list[str], **options) -> tuple[float, str]:
 
 
 def size_mb(path: Path) -> float:
-    """Of a file [MB]."""
+    """Return the size of a file [MB]."""
     return path.stat().st_size / 1e6

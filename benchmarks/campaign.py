@@ -1,4 +1,4 @@
-"""How fast campaigns fly on one core, and what a run takes besides its flight, with kernels compiled before.
+"""Speed of campaigns on one core, and the share of a run besides its flight, with compiled kernels.
 
 Besides its flight a run takes resolving the scene, making and reading its graph, and its figures: each is told.
 
@@ -30,7 +30,7 @@ PARTS = {
     "rows as columns": (FlightData, "of_each"),
     "figures": (campaign_runs, "figures"),
 }
-"""What the parts of a run are called, and the functions that do them."""
+"""Parts of a run: name and functions."""
 
 
 def main(runs=20):
@@ -46,7 +46,7 @@ def main(runs=20):
 
 
 def flown(given):
-    """Of the runs of a plan: processor time [s], what a run takes besides its flight to the flight, time flown [s]."""
+    """Return processor time [s], ratio of other work to the flight, and simulated time [s] of the runs of a plan."""
     rows, total, simulated = {}, [], 0.0
     row_of(given, 0, rows)  # loads what is compiled
     with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""What a campaign takes as it grows: processor time a run and peak memory of the whole command, report included.
+"""Processor time for each run and peak memory of a campaign over its size, report included.
 
     python -m benchmarks.campaign_scaling [MOST]
 

@@ -1,4 +1,4 @@
-"""What a fresh clone takes, its kernel cache empty and its packages installed before: minutes each.
+"""Minutes that a fresh clone takes with an empty kernel cache and installed packages.
 
 python -m benchmarks.clone
 """
@@ -34,7 +34,7 @@ def rows():
 
 
 def peak_mb(said: str) -> float:
-    """Of the largest worker [MB], of what `make test` has said."""
+    """Return the peak memory of the largest worker [MB] from the output of `make test`."""
     (line,) = PEAK.findall(said)
     return max(float(number) for number in re.findall(r"(\d+) MB", line))
 

@@ -61,7 +61,7 @@ def rotorpy(**integrator):
 
 
 class Simulator(NamedTuple):
-    """How one flies."""
+    """One simulator's closed loop."""
 
     fly: Callable[[], object]  # some flights
     flights: int  # how many these are
@@ -69,7 +69,7 @@ class Simulator(NamedTuple):
 
 
 def simulators():
-    """Those that are installed, by name."""
+    """Return the installed simulators by name."""
     found = {"lapwing": Simulator(ours, RUNS, our_error)}
     if find_spec("rotorpy"):
         found["RotorPy"] = Simulator(rotorpy, 1, lambda: apart(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12)))

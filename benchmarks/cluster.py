@@ -1,4 +1,4 @@
-"""What a shard takes of a Dask scheduler and of the command that waits for it: how many workers one can keep busy.
+"""Cost of a shard for a Dask scheduler and the waiting command: the number of workers that one can serve.
 
     python -m benchmarks.cluster [SHARDS]
 

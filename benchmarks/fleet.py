@@ -1,4 +1,4 @@
-"""What a fleet takes as it grows: processor time for a simulated second, in one process and in those of services.
+"""Processor time for a simulated second over the size of a fleet, in one process and in several.
 
     python -m benchmarks.fleet [MOST]
 

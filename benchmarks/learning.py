@@ -78,7 +78,7 @@ def main(steps=STEPS):
 
 
 def measure(name, steps):
-    """Of a contestant.
+    """Train a contestant.
 
     Returns:
         environment steps a second [1/s] and processor time of one [s], with random actions;

@@ -1,4 +1,4 @@
-"""What the services' own Python takes in a cycle of the lock step: `benchmarks.lockstep` with a bus that does nothing.
+"""Python time of the services in a lock-step cycle: `benchmarks.lockstep` with a bus that does nothing.
 
     python -m benchmarks.lockstep_python [CYCLES]
 

@@ -1,4 +1,4 @@
-"""How many messages a second the recorder takes without losing one, with a fast disk and with a slow one.
+"""Messages per second that the recorder writes without loss, on a fast disk and on a slow one.
 
     python -m benchmarks.log [SECONDS]
 

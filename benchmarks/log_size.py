@@ -1,4 +1,4 @@
-"""How small a log can be: levels of compression, orders of the messages, and the least that its numbers need.
+"""Size of a log by compression level and message order, and the least size that its numbers need.
 
     python -m benchmarks.log_size [LOG]      (of the delivery mission, where none is named)
 

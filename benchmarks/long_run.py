@@ -1,4 +1,4 @@
-"""What a run takes in memory to its end, figures and page included, as it grows longer.
+"""Peak memory of a run over its length, metrics and report included.
 
     python -m benchmarks.long_run [MOST]
 

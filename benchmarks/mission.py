@@ -1,4 +1,4 @@
-"""How fast the delivery mission flies: real-time factor with a process for each service, and with one for all.
+"""Real-time factor of the delivery mission in several processes and in one.
 
     python -m benchmarks.mission [REPEATS]
 

@@ -1,4 +1,4 @@
-"""How long the report of the delivery mission takes to write after the flight, and how large it is.
+"""Time to write the report of the delivery mission after the flight, and its size.
 
     python -m benchmarks.report [REPEATS]
 

@@ -1,4 +1,4 @@
-"""Whether a long flight stays as it began: memory, open files, threads, speed and the growth of the log.
+"""Long flight: growth of memory, open files, threads and log, and change of speed.
 
     python -m benchmarks.soak [--minutes M | --hours H]
 
@@ -48,7 +48,7 @@ class Sampler(Silent):
     """Takes samples of the flight and of this process, and ends it after so many minutes of wall time, if any."""
 
     def __init__(self, log: Path, minutes: float = 0.0, hours: float = 0.0):
-        """Of a flight of so many minutes of wall time, or of so many simulated hours."""
+        """Start a flight of so many minutes of wall time, or of so many simulated hours."""
         self._log, self._minutes = log, minutes
         self._period = (60.0 * minutes or 3600.0 * hours) / LINES
         self._began, self._next = time.monotonic(), 0.0

@@ -1,4 +1,4 @@
-"""What a command takes from its start to its end where all kernels are on the disk.
+"""Run time of short commands with all kernels in the cache.
 
 python -m benchmarks.startup_time [REPEATS]
 """

@@ -1,4 +1,4 @@
-"""What a user waits for, in turn with the first version of Lapwing on the same machine: machines differ, ratios less.
+"""Waiting times compared with the first version of Lapwing on the same machine.
 
     python -m benchmarks.version_comparison [REPEATS]
 
@@ -28,7 +28,7 @@ FAILED = 4  # of a run: its flight ended otherwise than it should, as one of a t
 
 
 class Version(NamedTuple):
-    """How one version of the program is used."""
+    """Commands of one version of the program."""
 
     folder: Path
     lapwing: list[str]

@@ -47,7 +47,7 @@ class Policy(GaussianMixin, Model):
 
 
 class Value(DeterministicMixin, Model):
-    """What is to be expected from an observation on."""
+    """Value network: expected return of an observation."""
 
     def __init__(self, observation_space, action_space, **options):
         Model.__init__(self, observation_space=observation_space, action_space=action_space, **options)
@@ -105,7 +105,7 @@ def way(observed):
 
 
 def judged(agent, environments, way=way, seed=10**6):
-    """Of one episode of each vehicle with the mean actions: mean return, distance at its end [m] and actions in it."""
+    """Return mean return, final distance [m] and final actions of one episode of each vehicle with the mean actions."""
     observed, _ = environments.reset(seed=seed)
     n = environments.num_envs
     total, away, flown, over = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)

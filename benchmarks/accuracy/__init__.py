@@ -1,4 +1,4 @@
-"""The same work in Lapwing and in others: wall time for every error, side by side (docs/explanation/accuracy.md)."""
+"""Work-precision comparison of Lapwing with other simulators (docs/explanation/accuracy.md)."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def best(points: list[Point], level: float) -> Point | None:
 
 
 def simulator(point: Point) -> str:
-    """Whose a point is: ours, or the other simulator's name, with which its methods' names begin."""
+    """Return the simulator of a point: "Lapwing", or the first word of its method's name."""
     return point.way.split()[0] if " " in point.way else "Lapwing"
 
 
@@ -50,7 +50,7 @@ def table(title: str, points: list[Point]) -> None:
 
 
 def draw(found: dict[str, list[Point]]) -> None:
-    """Of each, the fastest at every error."""
+    """Plot the fastest method of each simulator at every error."""
     with styled():
         figure = Figure(figsize=(13.0, 4.6), layout="constrained")
         all_axes = figure.subplots(1, len(found), sharey=True)

@@ -1,1 +1,1 @@
-"""What the simulator is used to find out."""
+"""Studies: accuracy, effects, stability, campaigns, tuning, reports."""

@@ -42,7 +42,7 @@ SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which outcome, events,
 
 
 class FlightData(FlightTopics):
-    """What was said in a flight, topic by topic, and what that comes to.
+    """Recorded topics of a flight, and the metrics derived from them.
 
     `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
 
@@ -56,7 +56,7 @@ class FlightData(FlightTopics):
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
-        """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        """Create a flight from topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
         self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
@@ -180,7 +180,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def armed(self) -> np.ndarray:
-        """Whether the motors are armed, at the times of `reference`, shape (n,) of bool."""
+        """True where the motors are armed, at the times of `reference`, shape (n,)."""
         n = self._tracked
         return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
 
@@ -216,7 +216,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def finished(self) -> bool:
-        """Whether the autopilot says that the mission is over."""
+        """True if the autopilot reports the end of the mission."""
         return self.has("status") and bool(self.status.finished[-1])
 
     @cached_property
@@ -237,7 +237,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def events(self) -> list[Event]:
-        """What happened, in order; an `Event` says what kinds there are."""
+        """Events in order of time."""
         if self.has("events"):
             said = self.topic("events")
             return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
@@ -255,7 +255,7 @@ class FlightData(FlightTopics):
 
 
 def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
-    """Of the names in a log those of the topics that are wanted."""
+    """Return the names in a log that belong to the requested topics."""
     if only is None:
         return names
     wanted = {topic.key(name) for topic in only for name in fleet}

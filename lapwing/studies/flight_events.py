@@ -1,4 +1,4 @@
-"""What happened in a flight, as a list: arming, modes, phases, failsafes, faults, slack links, saturation, contact."""
+"""Events of a flight: arming, modes, phases, failsafes, faults, slack links, saturation, contact."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Where a flight comes from: the set-up that was flown, and what its log says about itself."""
+"""Provenance of a flight: run configuration and log metadata."""
 
 import json
 from collections.abc import Mapping
@@ -43,7 +43,7 @@ class Origin:
 
     @cached_property
     def setup(self) -> RunConfig:
-        """What was flown.
+        """Run configuration of the flight.
 
         Raises:
             ValueError: the log carries no set-up, or one that this version cannot read.

@@ -1,4 +1,4 @@
-"""What was said in a flight, topic by topic."""
+"""Recorded topics of a flight."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -22,13 +22,13 @@ class FlightTopics:
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin):
-        """Of topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        """Create from topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
         self.origin, self.vehicle = origin, origin.vehicle
         self._topics = dict(topics)
 
     @property
     def setup(self) -> RunConfig:
-        """What was flown.
+        """Run configuration of the flight.
 
         Raises:
             ValueError: the log carries no set-up, or one that this version cannot read.
@@ -37,7 +37,7 @@ class FlightTopics:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the log says about its making: scene, seed, mode, version, digest and more."""
+        """Metadata of the log: scene, seed, mode, version, digest and more."""
         return self.origin.metadata
 
     @cached_property
@@ -60,22 +60,22 @@ class FlightTopics:
 
     @property
     def setpoint(self) -> TopicView:
-        """Where the vehicle ought to be, as the autopilot follows it: position, velocity, acceleration, yaw, phase."""
+        """Setpoint that the autopilot follows: position, velocity, acceleration, yaw, phase."""
         return self.topic("setpoint")
 
     @property
     def actuators(self) -> TopicView:
-        """What the autopilot commands: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
+        """Commands of the autopilot: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
         return self.topic("actuators")
 
     @property
     def estimate(self) -> TopicView:
-        """What the estimator tells, and its standard deviations: position, position_std, velocity, ..."""
+        """State estimate and its standard deviations: position, position_std, velocity, ..."""
         return self.topic("estimate")
 
     @property
     def status(self) -> TopicView:
-        """What the autopilot is doing: phase, armed, landed, finished, warnings."""
+        """Status of the autopilot: phase, armed, landed, finished, warnings."""
         return self.topic("status")
 
     @property
@@ -94,7 +94,7 @@ class FlightTopics:
         return self._topics[name]
 
     def has(self, topic: str) -> bool:
-        """Whether there is this topic."""
+        """Return True if the flight has this topic."""
         return topic in self._topics
 
     def times(self, topic: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""When a vehicle touches the ground, how hard, and when it leaves it."""
+"""Ground contacts of a vehicle: times and touch-down speeds."""
 
 from typing import NamedTuple
 

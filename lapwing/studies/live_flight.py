@@ -21,13 +21,13 @@ class LiveFlight:
     """Takes the messages of a run as its services hand them over, in whatever order they come."""
 
     def __init__(self, setup: RunConfig):
-        """Of a run that is about to begin; of a fleet the set-up of one vehicle
+        """Create from the run configuration before the run; of a fleet that of one vehicle
         (`lapwing.cosim.diagram.multi_vehicle.members`)."""
         self._setup = setup
         self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
 
     def take(self, pages: Iterable[RecordBatch]) -> None:
-        """What a service has handed over."""
+        """Add log packets of a service."""
         interval = self._setup.interval_ns
         for page in pages:
             topic = of_all(page.topic)
@@ -36,7 +36,7 @@ class LiveFlight:
                 self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
 
     def step(self, until_ns: int) -> FlightData | None:
-        """What has come up to an instant since the step before, begun with the newest message before it.
+        """Return the new samples up to an instant, starting with the newest sample before them.
 
         None where the truth tells nothing new.
         """
@@ -54,5 +54,5 @@ class LiveFlight:
 
 
 def new_events(flight: FlightData, after: float) -> list[Event]:
-    """What happened in a step after the time `after` [s]."""
+    """Return the events of a step after the time `after` [s]."""
     return [event for event in flight.events if event.time > after and not KINDS[event.kind].afterwards]

@@ -24,7 +24,7 @@ LANDING_RADIUS = 5.0  # [m] horizontally from the target of the mission, for sat
 
 
 class FlightOutcome(NamedTuple):
-    """How a flight ended, when and where.
+    """Outcome of a flight: kind, time and place.
 
     - "landed": the mission is finished; the vehicle is upright and at rest within 5 m of the mission's target.
     - "completed": the flight reached its end without a landing to make: no autopilot, no mission, a trajectory that

@@ -29,7 +29,7 @@ class Row(NamedTuple):
 
 
 def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Rotor) -> float:
-    """With the rotor lost whose loss leaves least, by the autopilot's allocation in hover (theory.md, eq. (4.27)).
+    """Return the performance after the worst rotor loss, by the allocation in hover (theory.md, eq. (4.27)).
 
     Raises:
         ValueError: the rotors cannot lose one.

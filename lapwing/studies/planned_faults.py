@@ -1,4 +1,4 @@
-"""What a scene has planned to go wrong: damage of rotors, broken propellers, faults of sensors."""
+"""Planned faults of a scene: rotor damage, broken propellers, sensor faults."""
 
 import math
 from typing import Any

@@ -36,14 +36,13 @@ def columns_of(
 
 
 class PortColumns(Mapping[str, Any]):
-    """The same mapping as the `TopicColumns` of the topic's messages, which are encoded only when that is asked
-    for more.
+    """Columns of a topic with the interface of `TopicColumns`; messages are encoded only when needed.
 
-    Encoding takes half as long as flying; who looks at many flights wants numbers that stand in the rows anyhow.
+    Encoding takes half as long as flying, and studies of many flights need only numbers that the samples hold.
     """
 
     def __init__(self, graph: BlockDiagram, wire: TopicEncoder):
-        """Of a topic of a graph that has come to its end and has kept all rows of its port."""
+        """Create from a topic of a finished block diagram with the full history of its port."""
         self._graph, self._wire = graph, wire
         self.ticks = due_ticks(0, graph.tick, wire.period)
         self._rows = graph.all_rows(wire.port, wire.period)
@@ -56,7 +55,7 @@ class PortColumns(Mapping[str, Any]):
 
     @cached_property
     def _names(self) -> dict[str, None]:
-        """What every message has, of one with each of the texts that occur."""
+        """Return the fields of every message that do not depend on its texts."""
         keys = _distinct(self._texts) if self._texts else [()]
         shapes = [_shapes(self._wire.topic.message, self._wire.sample(*key).encode()) for key in keys]
         return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))

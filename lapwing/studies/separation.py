@@ -1,4 +1,4 @@
-"""How near the vehicles of a fleet come to one another."""
+"""Least separation of the vehicles of a fleet."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -17,7 +17,7 @@ class Separation(NamedTuple):
     vehicles: tuple[str, str]
 
     def __str__(self) -> str:
-        """As a sentence without its full stop."""
+        """Return the separation as a sentence without its full stop."""
         return f"Nearest: {' and '.join(self.vehicles)}, {self.distance:.2f} m apart at {self.time:.2f} s"
 
 

@@ -28,7 +28,7 @@ Point = tuple[float, float]
 
 
 class Arrow(NamedTuple):
-    """What goes one way between two boxes."""
+    """Data that flows one way between two boxes."""
 
     start: Point
     end: Point
@@ -112,7 +112,7 @@ def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:
 
 
 def _edge(middle: Point, at: Point, way: Point) -> Point:
-    """Where a line from `at`, counted from the middle of a service, leaves it along `way`."""
+    """Return the point at which a line from `at`, relative to the middle of a service, leaves it along `way`."""
     shares = [(half * math.copysign(1.0, d) - p) / d for half, p, d in zip(HALF, at, way, strict=True) if abs(d) > 1e-9]
     share = min(shares)
     return middle[0] + at[0] + share * way[0], middle[1] + at[1] + share * way[1]

@@ -1,4 +1,4 @@
-"""Where people are shown what was found."""
+"""Console for results."""
 
 from rich.console import Console
 

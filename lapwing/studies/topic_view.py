@@ -18,7 +18,7 @@ class TopicView:
     """
 
     def __init__(self, times_ns: np.ndarray, columns: Mapping[str, Any]):
-        """Of simulation times [ns], int64, shape (n,), and columns by dotted field name (messages/topic_columns.py)."""
+        """Create from simulation times [ns], int64, shape (n,), and columns by dotted field name."""
         self._times_ns, self._columns = times_ns, columns
         self._texts: dict[str, np.ndarray] = {}  # read once: each is made text by text
 

@@ -1,4 +1,4 @@
-"""How far a flight is from what was asked: errors of the six axes while the motors are armed."""
+"""Tracking errors of the six axes while the motors are armed."""
 
 import math
 from typing import Any, NamedTuple
@@ -57,12 +57,12 @@ def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, ar
 
 
 def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
-    """The same array laid out so that one compiled version serves all; a copy where it is not."""
+    """Return the array contiguous, so that one compiled version serves all; a copy if it is not."""
     return np.require(values, kind, ("C", "W"))
 
 
 def strided(values: np.ndarray) -> np.ndarray:
-    """The same numbers, to be read only, laid out with gaps between rows as they lie in the rows of ports, so that one
+    """Return a read-only view with gaps between rows, as rows of ports have them, so that one
     compiled version serves all; a copy where they lie otherwise."""
     found = np.asarray(values, float)
     if found.flags.contiguous or not found.flags.aligned:
@@ -92,7 +92,7 @@ def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any
 
 
 class Reference(NamedTuple):
-    """Where the vehicle ought to be at n times."""
+    """Reference of the six axes at n times."""
 
     position: np.ndarray  # x, y, z [m], shape (n, 3)
     roll_pitch: np.ndarray  # [rad], shape (n, 2) or more
@@ -127,7 +127,7 @@ def _mean_squares(
 
 
 def reach(wanted: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
-    """Of positions while the motors are armed: greatest distance from those wanted [m], and how far they go beyond the
+    """Return the largest distance of armed positions from their reference [m], and the overshoot beyond the
     extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
     return _reach(strided(wanted), strided(position), plain(armed, bool))
 
@@ -163,7 +163,7 @@ def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
 
 @always_inline
 def _beyond(known: Extremes) -> float:
-    """How far what was flown reaches beyond what was wanted."""
+    """Return the overshoot of the flown positions beyond the reference."""
     return _greater(known[0] - known[2], known[1] - known[3])
 
 

@@ -28,7 +28,7 @@ MODULES = {"free_rigid_body": free_rigid_body, "heavy_top": heavy_top, "gyrostat
 
 
 def inertia(mass: float, place: list[float], about_place: tuple) -> SpatialInertia:
-    """Of principal moments about the body's origin; `place` of the centre of mass [m]."""
+    """Return the inertia from principal moments about the body's origin; `place` of the centre of mass [m]."""
     return SpatialInertia(mass, place, UnitInertia(*(i / mass for i in about_place)))
 
 

@@ -18,7 +18,7 @@ def set_down(axis: int, angle: float) -> tuple[float, tuple[float, float, float,
 
 
 def toppled(axis: int, R_world_body_33: float) -> bool:
-    """Whether it leans over the edge of its feet."""
+    """Return True if it leans over the edge of its feet."""
     return R_world_body_33 < math.cos(toppling.edge(axis))
 
 

@@ -1,4 +1,4 @@
-"""What every other simulator measures that can march a free rigid body with equal steps."""
+"""Free rigid bodies under any simulator that can integrate them with equal steps."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -132,7 +132,7 @@ def sliding() -> Errors:
 
 
 def falls(axis: int, angle: float) -> bool:
-    """Whether a vehicle that is set down leaning topples."""
+    """Return True if a vehicle that is set down leaning topples."""
     model = vehicle(0.0, slopes.STATIC)
     height, attitude = _ball_feet.set_down(axis, angle)
     model.joint.SetTranslation(model.context, [0.0, 0.0, height])

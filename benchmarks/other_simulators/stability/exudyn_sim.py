@@ -10,7 +10,7 @@ from benchmarks.other_simulators.stability import _free_bodies
 
 
 def settings(duration: float, steps: int, samples: int) -> Any:
-    """Of a run with equal steps, of which so many are kept."""
+    """Return the settings of a run with equal steps that keeps `samples` of them."""
     s: Any = exu.SimulationSettings()
     s.timeIntegration.endTime, s.timeIntegration.numberOfSteps = duration, steps
     s.timeIntegration.automaticStepSize = False

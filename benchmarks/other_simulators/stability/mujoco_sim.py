@@ -81,7 +81,7 @@ def sliding() -> Errors:
 
 
 def falls(axis: int, angle: float) -> bool:
-    """Whether a vehicle that is set down leaning topples."""
+    """Return True if a vehicle that is set down leaning topples."""
     model, data = vehicle(0.0, slopes.STATIC)
     data.qpos[2], data.qpos[3:7] = _ball_feet.set_down(axis, angle)
     data = run_on(model, data, toppling.SECONDS)

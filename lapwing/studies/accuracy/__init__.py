@@ -1,4 +1,4 @@
-"""What accuracy costs: every integrator over its steps or tolerances, on systems whose answer is known.
+"""Work-precision study: every integrator over its steps or tolerances, on systems with a known solution.
 
 `lapwing accuracy TARGET`; a target is a problem of `systems/`, or a scene's file.
 """

@@ -23,7 +23,7 @@ SLOW = 3.0  # [s] after which the user is told why
 
 
 class Study(NamedTuple):
-    """What `lapwing accuracy` has found of a target: a system by name, or a scene."""
+    """Result of `lapwing accuracy` for a system or a scene."""
 
     target: str
     problem: Problem

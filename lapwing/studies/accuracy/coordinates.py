@@ -47,7 +47,7 @@ def of_state(x: Any) -> np.ndarray:
 
 
 def defect(x: Any, row: np.ndarray) -> float:
-    """How far the state with the stored numbers `row` is off its manifold."""
+    """Return the distance of the state with the stored numbers `row` from its manifold."""
     state = unflatten(x, tuple(map(float, row)))
     return float(np.abs(np.array(flatten(normalise(state))) - row).max())
 

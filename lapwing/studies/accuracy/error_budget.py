@@ -1,4 +1,4 @@
-"""What a flight loses to the plant's step, to its contact with the ground, to the exchange interval, to the coupling.
+"""Error budget of a flight: solver step, ground contact, communication step, coupling.
 
 The scene is flown in memory, closed loop, each time with one of the four changed. Sensors and random winds would hide
 what is looked for: the autopilot gets the true state, and winds their mean.
@@ -91,7 +91,7 @@ def scene_integrator(scene: Scene) -> str:
 
 
 def touches(scene: Scene) -> bool:
-    """Whether the scene's vehicle can touch the ground."""
+    """Return True if the scene's vehicle can touch the ground."""
     return "ground_contact" in scene.tables("effects")
 
 

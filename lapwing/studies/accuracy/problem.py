@@ -1,4 +1,4 @@
-"""What a system offers to the study: a problem with a known answer, and the ways to solve it."""
+"""Problems with a known solution, and the methods that solve them."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class SolverRun(NamedTuple):
-    """What one run of a way gives."""
+    """Result of one run of a method."""
 
     times: np.ndarray  # of the samples, shape (k,), the first the start, the last the end
     samples: np.ndarray  # coordinates (lapwing/studies/accuracy/coordinates.py) at these times, shape (k, n)

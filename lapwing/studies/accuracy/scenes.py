@@ -20,7 +20,7 @@ FINEST = 64  # steps in an exchange interval, of the reference
 
 
 def problem(scene: Scene) -> Problem:
-    """What integrators are compared on for a scene.
+    """Return the problem on which integrators are compared for a scene.
 
     Raises:
         ValueError: its model is none that this study knows how to integrate.

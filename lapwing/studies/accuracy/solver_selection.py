@@ -20,7 +20,7 @@ from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
 
 
 def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
-    """What is to be set so that the scene's accuracy is met at the least cost; nothing where a step is given.
+    """Return the overrides that meet the scene's accuracy at the least cost; none if it sets a step.
 
     Args:
         scene: any scene.
@@ -62,7 +62,7 @@ def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
 
 
 def _read(path: Path) -> list[Point]:
-    """What has been measured before; nothing where it is not there or damaged."""
+    """Return cached measurements; none if the file is missing or damaged."""
     with suppress(OSError, ValueError, TypeError):
         return [Point(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
     return []

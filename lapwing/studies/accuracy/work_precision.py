@@ -58,7 +58,7 @@ def _refine(problem: Problem, way: SolverMethod, exact: np.ndarray, longest: flo
 
 
 def _exhausted(errors: list[float]) -> bool:
-    """Whether refining any further is in vain."""
+    """Return True if further refinement is useless."""
     if not errors:
         return False
     best = min(errors)
@@ -102,7 +102,7 @@ def cheapest(points: list[Point], target: float) -> Point:
 
 
 def telling(points: list[Point], levels: list[float]) -> list[Point]:
-    """Of each way the fastest point at each of these errors."""
+    """Return the fastest point of each method at each of these errors."""
     kept: list[Point] = []
     for way in dict.fromkeys(p.way for p in points):
         own = [p for p in points if p.way == way]

@@ -27,7 +27,7 @@ class Difference(NamedTuple):
 
     @property
     def sure(self) -> bool:
-        """Whether the interval leaves no doubt about the sign."""
+        """True if the interval excludes 0."""
         return self.difference.low > 0.0 or self.difference.high < 0.0
 
 

@@ -1,4 +1,4 @@
-"""What a campaign looks at in a flight."""
+"""Run configuration of a campaign's flights."""
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene

@@ -78,7 +78,7 @@ def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
 
 
 def touchdown(found: Results) -> Plot:
-    """Where the vehicles touch down; of one also the ellipses of a normal distribution."""
+    """Plot the touch-down points; of one vehicle with the ellipses of a normal distribution."""
     if found.vehicles:
         return _touchdowns(found)
     points = np.column_stack([found["touchdown.x"], found["touchdown.y"]])
@@ -103,7 +103,7 @@ def touchdown(found: Results) -> Plot:
 
 
 def _touchdowns(found: Results) -> Plot:
-    """Those of each vehicle of a fleet."""
+    """Plot the touch-down points of each vehicle of a fleet."""
     marks = []
     for (vehicle, x, colour), (_, y, _) in zip(_each(found, "touchdown.x"), _each(found, "touchdown.y"), strict=True):
         there = np.isfinite(x) & np.isfinite(y)
@@ -137,7 +137,7 @@ def success(found: Results) -> Plot:
 
 
 def matters(found: Results) -> Plot:
-    """Which parameter matters: rank correlations, and Sobol indices where they can be had."""
+    """Plot sensitivities: rank correlations, and Sobol indices if SALib is installed."""
     keys = _parameters(found)
     aims = ["success"] if np.ptp(found["success"].astype(float)) > 0.0 else []
     aims += [name for name in MATTERS if name in found.figures]

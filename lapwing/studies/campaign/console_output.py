@@ -61,7 +61,7 @@ def _vehicles(console: Console, found: Results) -> None:
 
 
 def vehicle_cells(found: Results) -> dict[str, list[str]]:
-    """What `VEHICLE_COLUMNS` say of each vehicle of a fleet."""
+    """Return the cells of `VEHICLE_COLUMNS` for each vehicle of a fleet."""
     return {vehicle: _cells(found, vehicle) for vehicle in found.vehicles}
 
 
@@ -72,7 +72,7 @@ def _cells(found: Results, vehicle: str) -> list[str]:
 
 
 def nearest_of(found: Results) -> str:
-    """How near two vehicles of a fleet came to one another."""
+    """Return the least separation of two vehicles of a fleet as text."""
     least = found.spread(NEAREST)
     if least is None:
         return "unknown"

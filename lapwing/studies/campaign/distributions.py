@@ -1,4 +1,4 @@
-"""How a key of a scene varies from run to run: distributions given by their quantile functions."""
+"""Distributions of varied scene keys, given by their quantile functions."""
 
 import re
 import sys

@@ -120,7 +120,7 @@ class Folder:
 
 
 def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
-    """What a campaign is, as plain data."""
+    """Return the manifest of a campaign as plain data."""
     scene = scene_of(plan)
     said: dict[str, Any] = {
         "scene": scene.name,
@@ -136,7 +136,7 @@ def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
 
 
 def default_path(about: dict[str, Any]) -> Path:
-    """Where a campaign goes if nobody says: the same for the same command."""
+    """Return the default folder of a campaign; equal for equal commands."""
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=4).hexdigest()
     return Path("campaigns") / f"{about['scene']}_{digest}"
 
@@ -169,7 +169,7 @@ def _make(path: Path, about: dict[str, Any]) -> None:
 
 
 def _begun(file: Path) -> bool:
-    """Whether a file may be that of a campaign which another machine begins at this moment."""
+    """Return True if a file may belong to a campaign that another machine is starting."""
     return file.name in ("shards", MANIFEST) or file.name.startswith(f".{MANIFEST}.")
 
 

@@ -17,7 +17,7 @@ def here(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int
 
 
 def processes(count: int) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
-    """The same in so many processes, each result as soon as it is there; they end with the loop."""
+    """Run calls in `count` processes and yield each result when it is ready; the processes end with the loop."""
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
         with workers(count) as pool:

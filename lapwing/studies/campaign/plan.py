@@ -25,7 +25,7 @@ MOST = 10_000_000  # runs of a campaign
 
 
 class Plan(NamedTuple):
-    """What is flown."""
+    """Plan of a campaign: scene, runs and what varies."""
 
     path: str  # of the scene, or its name
     overrides: tuple[str, ...]
@@ -51,12 +51,12 @@ class Plan(NamedTuple):
         return (self.seed - 1) * APART + run + 1
 
     def anywhere(self) -> "Plan":
-        """The same for workers whose working directory is another."""
+        """Return the plan with absolute paths, for workers with another working directory."""
         path = Path(self.path)
         return self._replace(path=str(path.absolute())) if path.is_file() else self
 
     def values(self, run: int) -> dict[str, Any]:
-        """What a run draws, by key."""
+        """Return the drawn values of a run by key."""
         places = _PLACES[self.design](self, run)
         drawn = {key: distribution.at(u) for (key, distribution), u in zip(self.vary, places, strict=True)}
         return drawn | (self.sweep[run % len(self.sweep)] if self.sweep else {})

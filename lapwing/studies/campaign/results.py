@@ -35,7 +35,7 @@ class Results:
         self.refused = {name: values[~taken] for name, values in everything.items()}
 
     def __len__(self) -> int:
-        """How many runs were flown."""
+        """Number of runs that were flown."""
         return len(self.columns["run"])
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -59,7 +59,7 @@ class Results:
 
     @property
     def source(self) -> str:
-        """Where they are from."""
+        """Source of the published metrics."""
         return str(self.folder.about["published"].get("source", "published"))
 
     @cached_property
@@ -81,11 +81,11 @@ class Results:
 
     @property
     def on_estimate(self) -> bool:
-        """Whether the autopilot flew on something else than the truth."""
+        """True if the autopilot flew on an estimate."""
         return any(not np.array_equal(self[f"rmse.{a}"], self[f"rmse_estimate.{a}"], equal_nan=True) for a in AXES)
 
     def spread(self, name: str) -> Spread | None:
-        """How a figure is distributed."""
+        """Return the distribution of a metric."""
         return spread(self[name], self["run"], least=name in LEAST_IS_WORST)
 
     def of_vehicles(self, name: str) -> dict[str, np.ndarray]:

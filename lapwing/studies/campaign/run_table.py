@@ -14,7 +14,7 @@ Row = Mapping[str, Any]
 
 
 def has_parquet() -> bool:
-    """Whether Parquet can be written here."""
+    """Return True if pyarrow is installed."""
     return find_spec("pyarrow") is not None
 
 

@@ -36,7 +36,7 @@ Row = dict[str, Any]  # values by column
 
 
 class Reference(NamedTuple):
-    """What a worker has to agree on before it flies."""
+    """Versions and end state that every worker has to reproduce."""
 
     versions: dict[str, str]
     run: int
@@ -45,7 +45,7 @@ class Reference(NamedTuple):
 
 @cache
 def versions() -> dict[str, str]:
-    """What the numbers of a flight depend on."""
+    """Return the versions on which the numbers of a flight depend."""
     folder, digest = Path(lapwing.services.__file__).parents[1], hashlib.blake2b(digest_size=8)
     for path in sorted(path for name in _OURS for path in (folder / name).rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
@@ -87,7 +87,7 @@ def first_setup(plan: Plan) -> tuple[int, RunConfig]:
 
 
 def reference(run: int, setup: RunConfig) -> Reference:
-    """What a run comes to here; flies it."""
+    """Fly a run and return its reference."""
     return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
 
 
@@ -131,7 +131,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
 
 
 def _refusal(error: SceneError) -> str:
-    """What was refused, in the same words wherever Lapwing's own files lie: the table is the same for all workers."""
+    """Return the error text without folders, so that the table is equal for all workers."""
     source = error.source
     if source.path is not None:
         source = source._replace(path=Path(source.path.name))
@@ -159,7 +159,7 @@ def setup_of(plan: Plan, run: int) -> RunConfig:
 
 @contextlib.contextmanager
 def located(plan: Plan) -> Iterator[None]:
-    """What is found wrong with a key that a run draws is told with the option that lets it vary."""
+    """Name the option that varies a key in errors about its value."""
     try:
         yield
     except SceneError as error:

@@ -14,7 +14,7 @@ Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, An
 
 
 class Count(NamedTuple):
-    """What some runs came to."""
+    """Number of runs by outcome."""
 
     runs: int = 0
     successes: int = 0
@@ -45,7 +45,7 @@ class Count(NamedTuple):
 
 
 def count(rows: Iterable[Row]) -> Count:
-    """Of some rows."""
+    """Return the counts of some rows."""
     kept = list(rows)
     kinds = Counter(row["outcome"] for row in kept)
     return Count() + Count(len(kept), sum(row["success"] for row in kept), tuple(kinds.items()))
@@ -101,7 +101,7 @@ def campaign(
 
 
 class Ending:
-    """When enough is known: at the first shard up to which, all before it being done, it is.
+    """Stopping rule: the first shard up to which the failure probability is known well enough.
 
     Attributes:
         shard: this one, or the next to be looked at; each is looked at once.
@@ -114,7 +114,7 @@ class Ending:
         self._until, self._reached = until, False
 
     def reached(self, done: Mapping[int, Count]) -> bool:
-        """Whether enough is known by these shards."""
+        """Return True if these shards suffice."""
         while self._until is not None and not self._reached and self.shard in done:
             self.total += done[self.shard]
             self._reached = self.total.flown > 0 and self.total.failure.half_width <= self._until

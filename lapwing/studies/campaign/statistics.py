@@ -18,12 +18,12 @@ class Interval(NamedTuple):
 
     @property
     def half_width(self) -> float:
-        """How far the farther end is from the estimate."""
+        """Larger distance of an end of the interval from the estimate."""
         return max(self.high - self.value, self.value - self.low)
 
 
 class Spread(NamedTuple):
-    """How a figure is distributed over the runs."""
+    """Distribution of a metric over the runs."""
 
     median: float
     low: float  # 5 % of the runs are below
@@ -72,7 +72,7 @@ def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
 
 
 def has_sobol() -> bool:
-    """Whether Sobol indices can be computed here."""
+    """Return True if SALib is installed."""
     return find_spec("SALib") is not None
 
 

@@ -1,4 +1,4 @@
-"""What the plant's step costs with a set of effects, in the air and standing."""
+"""Cost of the plant's step with a set of effects, in the air and on the ground."""
 
 import math
 import time

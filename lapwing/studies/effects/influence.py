@@ -1,4 +1,4 @@
-"""How much a flight changes when an effect is left out or added."""
+"""Change of a flight when an effect is left out or added."""
 
 from typing import NamedTuple
 

@@ -27,7 +27,7 @@ class Row(NamedTuple):
 
 
 class Study(NamedTuple):
-    """What `lapwing effects` has found."""
+    """Result of `lapwing effects`."""
 
     scene: str
     within: float  # [m]

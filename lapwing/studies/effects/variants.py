@@ -1,4 +1,4 @@
-"""The same scene with other effects, flown on as many cores as there are."""
+"""Variants of a scene with other effects, flown on all cores."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +24,7 @@ def variant(scene: Scene, tables: Tables) -> Scene:
 
 
 def refusal(scene: Scene, tables: Tables) -> str:
-    """Why a scene cannot have these effects, "" if it can."""
+    """Return the reason why a scene cannot have these effects; "" if it can."""
     try:
         effects.from_scene(tables, airframe(scene), environment(scene))
     except ValueError as error:

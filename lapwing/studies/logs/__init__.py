@@ -1,1 +1,1 @@
-"""What a log holds, where two logs differ, and a log as tables for other programs."""
+"""Contents of a log, differences of two logs, and export to tables."""

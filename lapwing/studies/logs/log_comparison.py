@@ -1,4 +1,4 @@
-"""Where two logs begin to differ, and how the difference grows from there."""
+"""First difference of two logs, and its growth."""
 
 from collections.abc import Iterator
 from itertools import groupby
@@ -16,7 +16,7 @@ ABOUT = ("scene", "seed", "setup", "version", "commit")  # of the metadata: why 
 
 
 class Growth(NamedTuple):
-    """How far a field of two logs is apart, some time after the first difference."""
+    """Difference of a field of two logs some time after their first difference."""
 
     after: float  # [s]
     apart: float  # Euclidean distance of the two values
@@ -34,7 +34,7 @@ class Difference(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What two logs have in common and what not."""
+    """Comparison of two logs."""
 
     about: dict[str, tuple[str, str]]  # what they say of themselves, where that differs
     only: tuple[tuple[str, ...], tuple[str, ...]]  # topics that one of them has alone
@@ -42,7 +42,7 @@ class Comparison(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether they hold the same deterministic messages."""
+        """True if both hold the same deterministic messages."""
         return self.first is None and not any(self.only)
 
 
@@ -101,7 +101,7 @@ def _difference(
 
 
 def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -> tuple[Growth, ...]:
-    """Of the whole vector that the field is a part of, wherever both logs have a message at the same time."""
+    """Return the distance of the vector that holds the field, at times that both logs have."""
     times, apart = _apart(a, b, topic, (field.rpartition(".")[0], field))
     if not len(times):
         return ()

@@ -1,4 +1,4 @@
-"""What a log holds: its making, its topics with counts, rates and sizes, and where messages are missing."""
+"""Summary of a log: provenance, topics with counts, rates and sizes, and gaps."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Topic(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a log holds."""
+    """Summary of a log."""
 
     path: Path
     size: int  # [bytes] of the file
@@ -39,7 +39,7 @@ class Info(NamedTuple):
 
     @property
     def missing(self) -> dict[str, str]:
-        """What cannot be done with the log, and what it lacks for that."""
+        """Commands that cannot use the log, with what it lacks for each."""
         found = {}
         if not any(topic.name.endswith("/truth") for topic in self.topics):
             found["report"] = "a topic /NAME/truth"

@@ -1,4 +1,4 @@
-"""Of a long line only what can be seen: the extremes of short stretches, so no peak is lost."""
+"""Downsampling of long lines to what a screen shows; the extremes of short intervals are kept."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What flew, for the head of the page."""
+"""Header of the flight report."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +11,7 @@ MANY = 12  # keys in which two scenes differ that are listed
 
 
 def facts(flight: FlightData) -> dict[str, str]:
-    """What flew, and how it was computed, by name; what the log does not say is left out."""
+    """Return facts on the vehicle and its simulation by name; those that the log lacks are left out."""
     said, scene = flight.metadata, flight.origin.scene
     t = flight.truth.times
     vehicle, autopilot = scene.get("vehicle", {}), scene.get("autopilot", {})

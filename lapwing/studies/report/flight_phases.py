@@ -1,4 +1,4 @@
-"""What every plot takes of a flight: its span, its phases, what it followed."""
+"""Time span, phases and setpoint of a flight, shared by all report plots."""
 
 import numpy as np
 

@@ -182,6 +182,6 @@ def _over_time(axes: Axes, plot: Plot, panel: Panel) -> None:
 
 
 def _fits(text: str, lasts: float, plot: Plot, panel: Panel) -> bool:
-    """Whether there is room for a text over a stretch of time: about 115 letters a figure."""
+    """Return True if a text fits over an interval of time: about 115 letters a figure."""
     start, end = plot.span or (0.0, lasts)
     return len(text) <= 115 * panel.columns / len(plot.widths) * lasts / (end - start)

@@ -73,7 +73,7 @@ class Motion(NamedTuple):
 
 
 def motion(flight: FlightData) -> Motion:
-    """What moves in a flight: as the shape of its vehicle's model has it, else three axes."""
+    """Return the moving bodies of a flight, in the shape of its vehicle model, otherwise three axes."""
     model = flight.origin.scene.get("vehicle", {}).get("model", "reduced")
     for module in shapes.modules():
         if model in module.MODELS:
@@ -120,7 +120,7 @@ def to_json(flights: Sequence[FlightData]) -> str:
 
 
 def steps_to_json(steps: Sequence[FlightData], events: Sequence[Sequence[Event]], first: bool) -> str:
-    """What is new of the vehicles of a run that goes on, and what happened to each, for the browser; surfaces in the
+    """Return new samples and events of the vehicles of a live run for the browser; surfaces in the
     first step."""
     frames = max(LEAST, STEP_FRAMES // len(steps))
     tables = [_table(step, step.vehicle, _colour(i), frames, later=True) for i, step in enumerate(steps)]
@@ -137,7 +137,7 @@ def steps_to_json(steps: Sequence[FlightData], events: Sequence[Sequence[Event]]
 
 
 def _colour(place: int) -> str:
-    """Of the vehicle at this place of a fleet."""
+    """Return the colour of the vehicle at this place of a fleet."""
     return COLOURS[place % len(COLOURS)]
 
 

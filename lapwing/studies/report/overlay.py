@@ -53,7 +53,7 @@ def _both(panel: Panel, other: Panel, labels: tuple[str, str]) -> Panel:
 
 
 def _same(one: Mark, other: Mark) -> bool:
-    """Whether two marks show the same: limits, a reference that both followed."""
+    """Return True if two marks show the same: limits, or a reference that both followed."""
     return type(one) is type(other) and all(
         np.array_equal(a, b) if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) else a is b or a == b
         for a, b in zip(one, other, strict=True)

@@ -1,4 +1,4 @@
-"""What a plot of the report is: data, labels with units, and where each panel stands; `browser` and `paper` draw it."""
+"""Plots of the report: data, labels with units and layout, drawn by plotly or matplotlib."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class Line(NamedTuple):
 
 
 class Band(NamedTuple):
-    """What lies between two curves, shape (n,) each."""
+    """Area between two curves, shape (n,) each."""
 
     x: np.ndarray
     low: np.ndarray

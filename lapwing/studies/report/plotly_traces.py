@@ -114,5 +114,5 @@ def _array(values: np.ndarray) -> dict[str, str]:
 
 
 def text_of(text: str) -> str:
-    """As plotly.js shows it letter by letter; it would take < and & for markup."""
+    """Return a text escaped for plotly.js, which would read < and & as markup."""
     return html.escape(text, quote=False).replace("\n", "<br>")

@@ -74,5 +74,5 @@ def _section(module: ModuleType, flights: Sequence[FlightData]) -> Section:
 
 
 def long(flights: Sequence[FlightData]) -> bool:
-    """Whether time is told in hours."""
+    """Return True if time is shown in hours."""
     return bool(max(flight.truth.times[-1] for flight in flights) > LONG)

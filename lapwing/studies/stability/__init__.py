@@ -1,4 +1,4 @@
-"""What stays numerically stable and what would have broken: hard cases, each beside a naive method that fails it.
+"""Stability study: hard cases with bounds, each with a baseline method that fails it.
 
 `lapwing stability [CASE]`; a case is a file of `cases/`.
 """

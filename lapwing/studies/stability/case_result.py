@@ -1,4 +1,4 @@
-"""What a case gives: rows of figures beside their bounds, a plot, and where each method breaks as it gets harder."""
+"""Result of a stability case: rows with bounds, a plot, and the sweep of its difficulty."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -39,12 +39,12 @@ class Row(NamedTuple):
 
     @property
     def passes(self) -> bool:
-        """Whether our method keeps the bound; NaN does not."""
+        """True if our method keeps the bound; NaN does not."""
         return bool(self.measured <= self.bound)
 
     @property
     def naive_passes(self) -> bool:
-        """Whether the naive method keeps it: then the row shows nothing."""
+        """True if the baseline method keeps it: then the row proves nothing."""
         return bool(self.naive_measured <= self.bound)
 
     @property
@@ -54,14 +54,14 @@ class Row(NamedTuple):
 
 
 class CaseResult(NamedTuple):
-    """What a case came to."""
+    """Result of a case."""
 
     rows: Sequence[Row]
     plot: Plot
 
 
 class Sweep(NamedTuple):
-    """How far each method goes: an error over the difficulty, which grows from left to right."""
+    """Error of each method over the difficulty, which grows from left to right."""
 
     difficulty: str  # with its unit
     error: str

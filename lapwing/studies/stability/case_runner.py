@@ -24,7 +24,7 @@ class Result(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether every row does."""
+        """True if every row is conclusive."""
         return all(row.stands for row in self.found.rows)
 
 

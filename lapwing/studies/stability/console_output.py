@@ -19,12 +19,12 @@ def figure(value: float) -> str:
 
 
 def verdict(passes: bool) -> str:
-    """How a row has done in one word, "pass" or "fail", as it is printed and as JSON has it."""
+    """Return "pass" or "fail", as printed and in JSON."""
     return "pass" if passes else "fail"
 
 
 def distance(bound: float, measured: float) -> str:
-    """How far a figure is from its bound: as a factor."""
+    """Return the distance of a figure from its bound as a factor."""
     if bound == 0.0 or not math.isfinite(measured):
         return ""
     if measured == 0.0:
@@ -63,7 +63,7 @@ def _coloured(passes: bool, wanted: bool | None = None) -> str:
 
 
 def sweeps(console: Console, results: Sequence[Result]) -> None:
-    """Where each method breaks."""
+    """Print the difficulty at which each method breaks."""
     for result in results:
         if result.sweep is None:
             continue

@@ -22,6 +22,6 @@ def flown(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> 
 
 
 def finite(flight: FlightData) -> bool:
-    """Whether all that is told of the motion is."""
+    """Return True if all recorded motion is finite."""
     told = flight.truth
     return all(np.isfinite(a).all() for a in (told.position, told.orientation, told.velocity, told.angular_velocity))

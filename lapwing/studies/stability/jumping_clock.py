@@ -18,7 +18,7 @@ def wall(seconds: float) -> int:
 
 
 def forward(seconds: float) -> int:
-    """What a monotonic clock has leapt ahead by at that time [s]."""
+    """Return the jump of a monotonic clock at that time [s]."""
     return AHEAD * int(seconds / RARELY)
 
 

@@ -1,10 +1,10 @@
-"""What `lapwing tune` is asked for."""
+"""Requested bandwidths of `lapwing tune`."""
 
 from typing import NamedTuple
 
 
 class Bandwidths(NamedTuple):
-    """What each loop is to reach: gain of its derivative term over the effect, nearly its crossover [rad/s]."""
+    """Bandwidth of each loop: derivative gain over the effect, nearly its crossover [rad/s]."""
 
     altitude: float = 13.0
     yaw: float = 17.4

@@ -55,7 +55,7 @@ def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
 
 
 def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
-    """What is wrong with each loop that is unstable, has too small a margin, or is unstable at a corner."""
+    """Return the fault of each loop that is unstable, has too small a margin, or is unstable at a corner."""
     found = {}
     for name, response in loops.items():
         m = margins(response)

@@ -34,7 +34,7 @@ AT_ALL = 1e-6  # [m], [rad]: an axis that errs less, since nothing moves it, is 
 
 
 class Polished(NamedTuple):
-    """What the search has found."""
+    """Result of the search."""
 
     gains: GainSet
     bandwidths: Bandwidths

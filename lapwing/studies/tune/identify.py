@@ -24,7 +24,7 @@ LOOPS = ("altitude", "roll", "pitch", "yaw")
 
 
 class Identified(NamedTuple):
-    """What a flight tells of the plant."""
+    """Plant identified from a flight."""
 
     model: Hover
     fit: dict[str, float]  # [%] of each loop: 100 (1 - |y - model| / |y - mean|), filtered
@@ -59,7 +59,7 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
     for k, name in enumerate(LOOPS):
         moved = float(signals.demand[signals.used, k].std())
         if moved < QUIET * hovering:
-            raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly excitation.toml and give its log")
+            raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly the scene excitation and use its log")
     found = minimize_scalar(
         lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
         bounds=np.log(LAGS),
@@ -75,7 +75,7 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
         if fit[name] < LEAST_FIT:
             raise ValueError(
                 f"{log}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
-                "fly excitation.toml in less wind and give its log"
+                "fly the scene excitation in less wind and use its log"
             )
     return Identified(guess._replace(lag=lag, **gains), fit)
 

@@ -40,7 +40,7 @@ STILL = (0.0, 0.0, 0.0)
 
 
 def gap(p: Any, x: Any) -> float:
-    """How far the state is off its constraints [m, -]."""
+    """Return the violation of the constraints [m, -]."""
     raise NotImplementedError("compiled code only")
 
 

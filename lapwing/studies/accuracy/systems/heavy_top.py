@@ -32,7 +32,7 @@ class HeavyTopParameters(NamedTuple):
 
     @property
     def torque_without_rate(self) -> bool:
-        """That of the weight is one of attitude."""
+        """Return the torque of the weight at an attitude."""
         return True
 
 

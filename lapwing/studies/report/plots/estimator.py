@@ -1,4 +1,4 @@
-"""What the estimator believes, against the truth."""
+"""Estimation errors and their standard deviations."""
 
 from collections import Counter
 
@@ -64,7 +64,7 @@ def errors(flight: FlightData) -> np.ndarray:
 
 
 def refusals(flight: FlightData) -> str:
-    """How often the measurements of each source were refused, as a sentence."""
+    """Return the share of rejected measurements of each source as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected for source in sources)
     said = ", ".join(f"{source} {times}" for source, times in count.most_common())
     return f"Measurements refused: {said or 'none'}."

@@ -30,7 +30,7 @@ def space(flight: FlightData) -> Panel:
 
 
 def plan(flight: FlightData) -> Panel:
-    """What is seen from above."""
+    """Return the path from above."""
     x, y, _ = flight.truth.position.T
     marks = [Line(x, y, "flown", width=2.0)]
     if len(flight.reference):

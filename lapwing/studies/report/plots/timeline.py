@@ -1,4 +1,4 @@
-"""What the autopilot was doing, as it said itself: phases, modes, arming, failsafes."""
+"""Autopilot timeline: phases, modes, arming, failsafes."""
 
 import numpy as np
 

@@ -69,7 +69,7 @@ def _frame(airframe: dict, hubs: np.ndarray, origin: np.ndarray) -> tuple[Stroke
 
 
 def _angles(flight: FlightData, count: int) -> np.ndarray:
-    """How far each rotor has turned [rad] by the times of the truth, shape (count, n)."""
+    """Return the angle of each rotor [rad] at the times of the truth, shape (count, n)."""
     speed = flight.truth.rotor_speed
     if speed.ndim != 2 or speed.shape[1] != count:
         return np.zeros((count, len(flight.truth)))

@@ -48,7 +48,7 @@ class Steady:
 
 
 def of_parameters(value: float, key: str) -> str:
-    """What becomes of a scene with an absurd parameter: "refused", "reported", "flown" or "silent"."""
+    """Return the reaction to an absurd parameter: "refused", "reported", "flown" or "silent"."""
     try:
         flight = flown("hover", [f"{key}={value!r}", *SHORT])
     except ValueError:
@@ -61,7 +61,7 @@ def of_parameters(value: float, key: str) -> str:
 
 
 def of_states() -> dict[str, int]:
-    """What becomes of every number of states and parameters of three systems, replaced by what is none."""
+    """Replace every number of states and parameters of three systems by NaN; return the reactions."""
     found = {"refused": 0, "silent": 0}
     systems: list[tuple[Any, Any]] = [
         (FreeBodyParameters((1.0, 1.6, 2.1)), RigidBody((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3))),  # type: ignore[arg-type]

@@ -40,7 +40,7 @@ def defects(way: int) -> np.ndarray:
 
 
 def of_plant(stabilisation: str, seconds: float) -> float:
-    """How far the hinges of the plant's five bodies are apart [m, rad] after so long, tumbling under RK4 at 2 ms."""
+    """Return the hinge errors of five tumbling bodies [m, rad] after so long under RK4 at 2 ms."""
     frame = load_airframe(AIRFRAME)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     p = multirotor_multibody.parameters(frame, (), "speed", stabilisation)

@@ -68,7 +68,7 @@ def ours(name: str, method: str = "rkmk4", steps: int = STEPS) -> tuple[np.ndarr
 
 
 def energy_drift(load: float, velocity: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Of three masses with velocities (3, k, 3) and heights (3, k): relative to their kinetic energy at first, (k,)."""
+    """Return the energy of three masses, velocities (3, k, 3), heights (3, k), over the initial kinetic one, (k,)."""
     mass = np.array([load, QUAD, QUAD])
     kinetic = 0.5 * np.einsum("b,bkc->k", mass, velocity**2)
     total = kinetic + G * mass @ height

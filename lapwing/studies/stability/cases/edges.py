@@ -50,7 +50,7 @@ def gained(distance: float, rise: float, speed: float = SPEED, step: float = STE
 
 
 def naive_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """As `gained`, of a point mass on a height field: beyond the riser it is as deep as the step is high."""
+    """Return the `gained` energy of a point mass on a height field, at most one step deep beyond the riser."""
     mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
     highest = 0.0
     for _ in range(round(1.0 / step)):

@@ -44,7 +44,7 @@ def late(found: RunConfig, delay: int) -> RunConfig:
 
 
 def flies(rate: int, delay: int) -> bool:
-    """Whether the push has died away in flight."""
+    """Return True if the push has died away in flight."""
     flight: FlightData = fly(late(resolve(scene(rate)), delay), (TRUTH,))
     t, turning = flight.truth.times, np.linalg.norm(flight.truth.angular_velocity, axis=1)
     left = turning[(t > 10.0) & (t < 13.0)]  # nothing of a flight that has crashed
@@ -52,7 +52,7 @@ def flies(rate: int, delay: int) -> bool:
 
 
 def predicted(rate: int, delay: int) -> bool:
-    """Whether Nyquist's criterion calls every loop stable."""
+    """Return True if Nyquist's criterion calls every loop stable."""
     of = scene(rate)
     frame = known_airframe(of)
     found = open_loops(build(of[GainSet].plain(), frame), frame, of[Communication].interval, delay)

@@ -76,19 +76,19 @@ def errors(step: float, exact: np.ndarray, way: Any) -> float:
 
 
 def exact_restitution() -> np.ndarray:
-    """Of each speed and phase, shape (k, n), under a tolerance far below what is measured."""
+    """Return the result for each speed and phase, shape (k, n), with a tolerance far below what is measured."""
     return np.array([[restitution(v, phase, STEP, 1e-10) for phase in PHASES] for v in SPEEDS])
 
 
 def rest_place(phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> np.ndarray:
-    """Where a vehicle comes to rest [m], shape (3,), that touches down leaning, turning aside and sinking at 1 m/s."""
+    """Return the rest position [m], shape (3,), after a leaning, yawing touch-down at 1 m/s."""
     p, state = standing(0.05 + phase * STEP, 1.0)
     m = state.motion._replace(attitude=exp((0.1, -0.06, 0.2)), velocity_world=(0.5, -0.3, -1.0))
     return np.array(run_on(p._replace(tolerance=tolerance), state._replace(motion=m), 4.0, step).motion.position_world)
 
 
 def naive_rest_place(phase: float, step: float) -> float:
-    """How far a mass slides [m] that touches down at the same speeds, forward Euler, friction against the slip."""
+    """Return the slide [m] of a mass at the same speeds, forward Euler, friction against the slip."""
     mass, x, z, u, v = DRONE.mass.total, 0.0, 0.05 + phase * STEP, math.hypot(0.5, 0.3), -1.0
     for _ in range(round(4.0 / step)):
         force = max(-STIFFNESS * z - DAMPING * v, 0.0) if z < 0.0 else 0.0
@@ -104,7 +104,7 @@ def settled(angle: float = 0.0) -> tuple[Any, Any]:
 
 
 def naive_rest() -> float:
-    """How far the naive contact still moves [m] after it was set down, over its last second of ten."""
+    """Return the motion [m] of the baseline contact in the last of ten seconds after it was set down."""
     mass, z, v, h = DRONE.mass.total, -DRONE.mass.total * G / STIFFNESS, -1e-3, STEP
     low, high = 0.0, -1.0
     for i in range(10_000):

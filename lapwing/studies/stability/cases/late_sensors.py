@@ -27,7 +27,7 @@ WHY = "as in the case `estimator`"
 
 
 def refused(override: str) -> bool:
-    """Whether a scene with it is."""
+    """Return True if a scene with it is stable."""
     try:
         load("delivery_mission", [override])
     except ValueError:

@@ -102,7 +102,7 @@ def slack_at() -> float:
 
 
 def silent() -> tuple[float, float]:
-    """Of a flight whose links push: 1 if that is not told, and if watching the length of the links does not."""
+    """Return 1 for each flight with a pushing link that the event, or watching the length, does not report."""
     flight = flown("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
     told = any(event.kind == "slack" for event in flight.events)
     place, length = flight.topic("bodies").position, np.array(flight.origin.scene["cooperative_load"]["link_length"])

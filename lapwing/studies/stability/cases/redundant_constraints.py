@@ -91,7 +91,7 @@ def off_by(size: float) -> tuple[float, float]:
 
 
 def tips(t: np.ndarray, n: int) -> np.ndarray:
-    """Where the first crank's tip of n four-bars is at times t [s], from one equation of motion [m], shape (k, 3)."""
+    """Return the first crank's tip of n four-bars at times t [s], from one equation of motion [m], shape (k, 3)."""
     inertia, weight = (n + 1) * (1.0 / 12.0 + 0.25) + n, GRAVITY * ((n + 1) * 0.5 + n)
     theta = solve_ivp(
         lambda t, y: [y[1], weight / inertia * math.sin(y[0])],

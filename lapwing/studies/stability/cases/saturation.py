@@ -72,7 +72,7 @@ def rebound(gains: str) -> float:
 
 
 def tumbling() -> tuple[float, float]:
-    """How far the attitude's quaternion is from unit length with a motor out: in flight, and stepped from its rates."""
+    """Return the norm error of the attitude quaternion with a motor out: in flight, and stepped from its rates."""
     truth = flown("hover", OUT).truth
     q = np.array([1.0, 0.0, 0.0, 0.0])
     for wx, wy, wz in truth.angular_velocity:

@@ -30,7 +30,7 @@ def together(steps: int) -> np.ndarray:
 
 @cache
 def apart(rate: int, coupling: str) -> np.ndarray:
-    """As `together`, with plant and control in two processes that exchange at a rate [Hz]; NaN after the run's end."""
+    """Return the positions with plant and control in two processes that exchange at a rate [Hz]; NaN after the end."""
     slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "operator")]
     interval = 1.0 / rate
     solver = f"solver.step={interval / round(interval / STEP)!r}"

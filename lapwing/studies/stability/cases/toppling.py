@@ -44,7 +44,7 @@ def unit(axis: int) -> tuple[float, float, float]:
 
 
 def toppled(state: Any, axis: int) -> bool:
-    """Whether it leans over its edge."""
+    """Return True if it leans over its edge."""
     return rotation_matrix(state.motion.attitude)[8] < math.cos(edge(axis))
 
 
@@ -55,7 +55,7 @@ def leaning(axis: int, angle: float) -> tuple[Any, Any]:
 
 
 def falls(axis: int, angle: float, step: float = STEP) -> bool:
-    """Whether a vehicle that is set down leaning topples."""
+    """Return True if a vehicle that is set down leaning topples."""
     p, state = leaning(axis, angle)
     return toppled(run_on(p, state, SECONDS, step), axis)
 
@@ -77,7 +77,7 @@ def settled() -> tuple[Any, Any]:
 
 
 def pushed(axis: int, rest: tuple[Any, Any], rate: float) -> bool:
-    """Whether a standing vehicle that is pushed about the edge of its feet topples."""
+    """Return True if a standing vehicle that is pushed about the edge of its feet topples."""
     p, state = rest
     omega = scale(rate, unit(axis))
     arm = (0.0, base(axis), HEIGHT) if axis == 0 else (-base(axis), 0.0, HEIGHT)  # from the edge to the middle
@@ -87,7 +87,7 @@ def pushed(axis: int, rest: tuple[Any, Any], rate: float) -> bool:
 
 
 def threshold(topples: Callable[[float], bool], low: float, high: float, parts: int) -> float:
-    """Where it begins to topple between two values, by halving."""
+    """Return the value between two others at which it begins to topple, by bisection."""
     for _ in range(parts):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if topples(middle) else (middle, high)
@@ -121,7 +121,7 @@ def naive(axis: int, angle: float, rate: float = 0.0, step: float = STEP, fricti
 
 
 def naive_falls(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> bool:
-    """Whether it topples under the naive way."""
+    """Return True if it topples under the baseline method."""
     return bool(abs(naive(axis, angle, rate, step, friction)[-1, 0]) > edge(axis))
 
 

@@ -20,7 +20,7 @@ TAKEN = 4.9  # [s] just before somebody takes it away
 
 @cache
 def end(step: float, *more: str) -> np.ndarray:
-    """Where the pack lies before it is taken away [m], NaN where the run ended before that; shape (3,)."""
+    """Return the pack's position before removal [m], NaN if the run ended before; shape (3,)."""
     flight = flown("unload", [f"solver.step={step!r}", f"run.duration={TAKEN!r}", *more])
     return np.full(3, np.nan) if flight.failure else flight.truth.position[-1]
 
@@ -31,7 +31,7 @@ def off(step: float) -> float:
 
 
 def naive(step: float) -> float:
-    """As `off`, of steps whose error nobody controls; infinite where the run ends with an error."""
+    """Return the position error of steps without error control; infinite if the run ends with an error."""
     p, start = unloading.system(load("unload"))
     try:
         _, rows = integrators.simulate(integrators.get("rk4_renormalised"), p, start, step, round(TAKEN / step), 100)
