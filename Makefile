@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test test-all check stability bench docs wheel release sbom audit docker-build docker-test clean
+.PHONY: mission test test-all check stability fuzz bench docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints.
@@ -48,6 +48,12 @@ check: $(VENV)/.installed
 
 stability: $(VENV)/.installed
 	$(BIN)/lapwing stability
+
+# Mutated input for every parser, the same for the same SEED.
+SECONDS ?= 60
+SEED ?= 1
+fuzz: $(VENV)/.installed
+	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(PINNED) ".[bench]"

@@ -30,3 +30,10 @@ def test_links_resolve(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if not target.startswith(("http", "#")) and Path(target).name.partition("#")[0] not in GENERATED:
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+def test_threat_model_names_existing_tests():
+    page = (DOCS / "explanation/security.md").read_text()
+    names = set(re.findall(r"`(tests/[\w/]+\.py)`", page))
+    assert len(names) >= 10
+    assert [name for name in sorted(names) if not (DOCS.parent / name).exists()] == []

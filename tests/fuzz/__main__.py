@@ -1,8 +1,8 @@
 """Damaged bytes for everything that reads bytes from outside.
 
-    python -m tests.fuzz --inputs N [--seed S] [TARGET ...]
+    python -m tests.fuzz [--inputs N | --seconds S] [--seed S] [TARGET ...]
 
-Exit code 1 where something else than a ValueError came of an input, or one took longer than a second of processor time.
+Exit code 1 if an input raises another exception than ValueError, or takes longer than a second of processor time.
 """
 
 import argparse
@@ -20,6 +20,7 @@ def main() -> None:
     """Try, and count."""
     parser = argparse.ArgumentParser(description="Damaged bytes for everything that reads bytes from outside.")
     parser.add_argument("--inputs", type=int, default=1000, help="for each target")
+    parser.add_argument("--seconds", type=float, help="of processor time for each target, instead of --inputs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
     given = parser.parse_args()
@@ -31,7 +32,9 @@ def main() -> None:
         refused, slowest = 0, 0.0
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         begun = started = time.process_time()
-        for number in range(given.inputs):
+        number = 0
+        while (time.process_time() - begun < given.seconds) if given.seconds else number < given.inputs:
+            number += 1
             data = mutated(chance, target.seeds)
             try:
                 target.read(data)
@@ -43,9 +46,9 @@ def main() -> None:
             slowest, started = max(slowest, (now := time.process_time()) - started), now
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
         wrong += slowest > SLOW
-        rate = given.inputs / (started - begun)
-        shares = f"{refused} refused, {given.inputs - refused} taken"
-        print(f"{name}: {given.inputs} inputs, {shares}, slowest {1e3 * slowest:.0f} ms, +{grown:.0f} MB, {rate:.0f}/s")
+        rate = number / (started - begun)
+        shares = f"{refused} refused, {number - refused} taken"
+        print(f"{name}: {number} inputs, {shares}, slowest {1e3 * slowest:.0f} ms, +{grown:.0f} MB, {rate:.0f}/s")
     raise SystemExit(wrong > 0)
 
 
