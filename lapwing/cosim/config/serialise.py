@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.config.class_aliases import present_name
+
 TAG = "$"
 DTYPES = ("bool", "float64", "int64")  # of arrays
 SCALARS = ("bool", "float64", "int64", "uint64")
@@ -189,6 +191,8 @@ def _name_of(cls: type) -> str:
 
 
 def _class_of(name: str, modules: Collection[str]) -> type:
+    if name.partition(":")[0] not in modules:  # a declared module may have the name of a former package
+        name = present_name(name)
     module, _, path = name.partition(":")
     if module.partition(".")[0] not in OWN and module not in sys.modules and module not in modules:
         raise ValueError(f"{name}: no such class; expected one of {', '.join(OWN)} or of a declared module")
