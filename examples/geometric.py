@@ -9,26 +9,27 @@ Control Conference, 2013). The attitude that is commanded turns as fast as the l
 import math
 from typing import NamedTuple
 
-from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.lie.so3 import vee
-from lapwing.dynamics.vector import (
+from lapwing.plugins import (
     ZERO,
     Mat3,
+    ThrustAndMoments,
     Vec3,
+    VehicleModel,
     add,
     apply,
     apply_transposed,
     cross,
     dot,
+    kernel,
     matmul,
     multiply,
     norm,
+    rotation_matrix,
     scale,
     subtract,
     transpose,
+    vee,
 )
-from lapwing.kernels import kernel
-from lapwing.services.common.controller_api import ThrustAndMoments, VehicleModel
 
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
 
-from lapwing.services.common.controller_api import Reference, StateEstimate, ThrustAndMoments, VehicleModel
+from lapwing.plugins import Reference, StateEstimate, ThrustAndMoments, VehicleModel
 
 
 class Lqr:

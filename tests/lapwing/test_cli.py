@@ -28,6 +28,7 @@ BAD = {
     "step": ([HOVER, "--set", "solver.step=0.003"], "expected a step that divides the exchange interval"),
     "integrator": ([HOVER, "--set", "solver.integrator=rk5"], "unknown integrator 'rk5'; did you mean rk"),
     "effect": ([HOVER, "--set", "effects.gravty={}"], "effects.gravty: unknown effect 'gravty'; did you"),
+    "own effect": ([HOVER, "--set", "effects.gravty={}"], 'an effect of your own needs `module = "FILE"`'),
     "effect's key": ([HOVER, "--set", "effects.gravity.g=3"], "effects.gravity.g"),
     "vehicle": ([HOVER, "--set", "vehicle.airframe=x"], "vehicle.airframe: unknown airframe 'x'; expected one of"),
     "gain set": ([HOVER, "--set", "autopilot.gains=x"], "unknown gain set 'x'; expected one of"),

@@ -1,12 +1,13 @@
-"""`lapwing new effect`: what it writes works, in every mode, and overwrites nothing."""
+"""`lapwing new`: the created files work in every mode, and no file is overwritten."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from lapwing.cli.new_command import write_effect
+from lapwing.cli.new_command import write_module
 from lapwing.cosim.log import LogReader
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.multi_process_run import fly_processes
@@ -24,31 +25,47 @@ NAME = "tether_drag"
 @pytest.fixture
 def scene(tmp_path):
     """Loads the hover scene with a new effect beside it."""
-    write_effect(NAME, tmp_path)
+    write_module("effect", NAME, tmp_path)
     path = tmp_path / "hover.toml"
-    path.write_text(Path("scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
+    path.write_text(Path("lapwing/scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
     return lambda *overrides: load(path, ["run.duration=1.5", *overrides])
 
 
-def test_the_test_that_is_written_passes(tmp_path):
-    write_effect(NAME, tmp_path)
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stdout
-    assert "3 passed" in run.stdout
+def run(folder, *command):
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    return subprocess.run(
+        [sys.executable, "-m", *command], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
-def test_nothing_is_overwritten(tmp_path):
+@pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator"])
+def test_created_module_passes_its_test(tmp_path, kind):
+    created = run(tmp_path, "lapwing", "new", kind, f"my_{kind}")
+    assert (created.returncode, created.stderr) == (0, "")
+    assert created.stdout.split() == [f"my_{kind}.py", f"test_my_{kind}.py"]
+    result = run(tmp_path, "pytest", "-q", "-p", "no:cacheprovider", ".")
+    assert result.returncode == 0, result.stdout
+
+
+def test_created_scene_flies(tmp_path):
+    assert run(tmp_path, "lapwing", "new", "scene", "my_flight").stdout == "my_flight.toml\n"
+    result = run(tmp_path, "lapwing", "run", "my_flight.toml", "--mode", "single-process")
+    assert result.returncode == 0, result.stderr
+    again = run(tmp_path, "lapwing", "new", "scene", "my_flight")
+    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+
+
+def test_existing_file_is_kept(tmp_path):
     (tmp_path / f"test_{NAME}.py").write_text("mine")
-    with pytest.raises(ValueError, match="is there already"):
-        write_effect(NAME, tmp_path)
+    with pytest.raises(ValueError, match="exists already"):
+        write_module("effect", NAME, tmp_path)
     assert not (tmp_path / f"{NAME}.py").exists()
 
 
 @pytest.mark.parametrize("name", ["Tether", "tether-drag", "gravity", "numpy", "3d"])
 def test_other_names_are_refused(tmp_path, name):
     with pytest.raises(ValueError, match="NAME"):
-        write_effect(name, tmp_path)
+        write_module("effect", name, tmp_path)
     assert not any(tmp_path.iterdir())
 
 

@@ -42,7 +42,9 @@ def get(name: str, module: str | None = None) -> ModuleType:
             raise ConfigError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
         return importlib.import_module(module)
     if name not in names():
-        raise ConfigError.unknown(f"effects.{name}", "effect", name, names())
+        error = ConfigError.unknown(f"effects.{name}", "effect", name, names())
+        expected = f'{error.expected}; an effect of your own needs `module = "FILE"` (lapwing new effect {name})'
+        raise ConfigError(error.key, error.message, expected)
     return importlib.import_module(f"{__name__}.{name}")
 
 

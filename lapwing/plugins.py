@@ -1,0 +1,55 @@
+"""Interface for extensions: everything that a user's own module imports, besides `lapwing` itself.
+
+- controllers: `VehicleModel`, `StateEstimate`, `Reference`, `ThrustAndMoments`, `MotorVoltages`
+- estimators: `VehicleModel`, `StateEstimate` and the readings of the sensors
+- effects: the hooks (`wrench`, `air`, `loads`, ...), `EffectInputs`, `Motion`, `Air`, ...
+- sensors: `TrueState`, random numbers (`normal`, `uniform`)
+- compiled code: `kernel`, `python_function`, vectors and rotations
+
+A name is imported when it is first used, so an effect does not import the controller interface.
+"""
+
+import importlib
+from typing import Any
+
+_MODULES = {
+    "lapwing.dynamics.effects._types": (
+        "Air",
+        "EffectInputs",
+        "Factors",
+        "Loads",
+        "MassProperties",
+        "Motion",
+        "Rotors",
+    ),
+    "lapwing.dynamics.lie.quaternion": ("rotation_matrix",),
+    "lapwing.dynamics.lie.so3": ("vee",),
+    "lapwing.dynamics.noise": ("normal", "normal3", "uniform"),
+    "lapwing.dynamics.vector": (
+        *("ZERO", "Mat3", "Vec3", "add", "apply", "apply_transposed", "cross", "divide", "dot", "matmul", "multiply"),
+        *("norm", "scale", "subtract", "transpose"),
+    ),
+    "lapwing.kernels": ("kernel", "python_function"),
+    "lapwing.services.common.controller_api": ("MotorVoltages", "ThrustAndMoments", "VehicleModel"),
+    "lapwing.services.common.ports": (
+        *("AirspeedReading", "BarometerReading", "BatteryReading", "DistanceReading", "GpsReading", "ImuReading"),
+        *("MagnetometerReading", "OpticalFlowReading", "Reference", "StateEstimate", "TrueState"),
+    ),
+}
+_HOOKS = "lapwing.dynamics.effects._hooks"
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of the interface. Raise AttributeError for any other."""
+    if name in _MODULE_OF:
+        return getattr(importlib.import_module(_MODULE_OF[name]), name)
+    if not name.startswith("_"):
+        hooks = importlib.import_module(_HOOKS)
+        if name in hooks.HOOKS:
+            return getattr(hooks, name)
+    raise AttributeError(f"module 'lapwing.plugins' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*_MODULE_OF, *importlib.import_module(_HOOKS).HOOKS])
