@@ -1,14 +1,14 @@
 """Events of a flight: arming, modes, phases, failsafes, faults, slack links, saturation, contact."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lapwing.services.common.event_kinds import KINDS
-from lapwing.studies.ground_contacts import touches
+from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.model_validity import validity_warnings
-from lapwing.studies.planned_faults import planned
 from lapwing.studies.saturation import intervals, saturation
 from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
@@ -38,7 +38,7 @@ def events(
         scene: tables of the scene.
     """
     end = float(truth.times[-1]) if len(truth) else 0.0
-    found = [Event(time, "fault", text) for time, text in planned(scene) if time <= end]
+    found = [Event(time, "fault", text) for time, text in planned_faults(scene) if time <= end]
     if status is not None and len(status):
         found += _status_events(status)
         found += _contacts(truth)
@@ -72,6 +72,24 @@ def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[E
         for push in pushes(bodies.times[: len(forces)], forces[:, k]):
             text = f"link {k + 1} pushes until {push.stop:.3f} s with up to {push.most:.3g} N: a cable would be slack"
             found.append(Event(round(push.start, 9), "slack", text))
+    return sorted(found)
+
+
+def planned_faults(scene: dict[str, Any]) -> list[tuple[float, str]]:
+    """Return time [s] and description of each planned fault of a scene, in order."""
+    found: list[tuple[float, str]] = []
+    damage = scene.get("effects", {}).get("rotor_damage")
+    if damage is not None:
+        left = damage.get("remaining_thrust", 0.0)
+        found.append((damage.get("time", 0.0), f"rotor {damage.get('rotor')} keeps {100.0 * left:g} % of its thrust"))
+    for event in scene.get("multibody", {}).get("event", ()):
+        found.append((event["time"], f"propeller {event['propeller']} becomes {event['becomes'].replace('_', ' ')}"))
+    for sensor, table in scene.get("sensors", {}).items():
+        for fault in table.get("faults", ()) if isinstance(table, dict) else ():
+            start, stop = fault.get("start", 0.0), fault.get("stop", math.inf)
+            which = "" if fault.get("channel", "all") == "all" else f" of {fault['channel']}"
+            until = f" until {stop:g} s" if stop < math.inf else ""
+            found.append((start, f"{sensor}: {fault['kind']}{which}{until}"))
     return sorted(found)
 
 
@@ -110,7 +128,7 @@ def _status_events(status: TopicView) -> Iterator[Event]:
 
 def _contacts(truth: TopicView) -> Iterator[Event]:
     t = truth.times
-    for touch in touches(truth):
+    for touch in ground_contacts(truth):
         if touch.start > 0:
             yield Event(float(t[touch.start]), "contact", f"touches the ground at {touch.speed:.2f} m/s")
         if touch.stop < len(t):

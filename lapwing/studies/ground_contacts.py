@@ -17,8 +17,8 @@ class Touch(NamedTuple):
     speed: float  # [m/s] downwards just before the hardest contact; 0 where the vehicle stands there from the beginning
 
 
-def touches(truth: TopicView) -> list[Touch]:
-    """All stretches on the ground, in order; empty for a plant that tells of no contact."""
+def ground_contacts(truth: TopicView) -> list[Touch]:
+    """Return all intervals on the ground in order; none for a plant without contact information."""
     contact = truth.ground_contact
     changed = (np.flatnonzero(contact[1:] != contact[:-1]) + 1).tolist()
     edges = [0] * bool(contact[0]) + changed + [len(contact)] * bool(contact[-1]) if len(contact) else []

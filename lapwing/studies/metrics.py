@@ -11,7 +11,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.kernels import kernel
 from lapwing.services.common.success_criteria import Success
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.ground_contacts import touches
+from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.saturation import limits, saturation
 from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided, total
 
@@ -58,7 +58,7 @@ def metrics(flight: FlightData) -> dict[str, Any]:
         value = getattr(outcome, name)
         found[name] = math.nan if value is None else value
     found |= {"max_tilt": _tilt(truth.tilt_cosine.min()), "energy": flight.energy}
-    last = max((touch.start for touch in touches(truth)), default=0)
+    last = max((touch.start for touch in ground_contacts(truth)), default=0)
     if last:
         x, y, _ = map(float, truth.position[last])
         found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": _tilt(truth.tilt_cosine[last])}

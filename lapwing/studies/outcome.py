@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from lapwing.studies.ground_contacts import Touch, touches
+from lapwing.studies.ground_contacts import Touch, ground_contacts
 from lapwing.studies.mission import Mission
 from lapwing.studies.topic_view import TopicView
 
@@ -74,7 +74,7 @@ def classify(
         mission: mission of the autopilot; None without one.
     """
     end, cosine = float(truth.times[-1]), truth.tilt_cosine
-    contacts = touches(truth) if status is not None else []
+    contacts = ground_contacts(truth) if status is not None else []
     x, y, z = map(float, truth.position[-1])
     tilt = math.acos(max(-1.0, min(1.0, float(cosine[-1]))))
     distance = None

@@ -41,7 +41,7 @@ def test_simulators_measure_rows_of_cases(name, package):
     assert set(simulator.CASES) <= set(cases.names())
     loops = simulator.CASES["looping"]()["momentum"]
     assert loops
-    assert max(loops.values()) < 1e-5  # three digits below the naive method: the same body, turning the same way
+    assert max(loops.values()) < 1e-5  # three digits below the baseline method: the same body, turning the same way
 
 
 def test_drake_four_bars_follow_the_equation_of_motion():

@@ -1,4 +1,4 @@
-"""What `benchmarks.soak` makes of its samples."""
+"""Evaluation of samples by `benchmarks.soak`."""
 
 import pytest
 

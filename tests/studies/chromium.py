@@ -41,7 +41,7 @@ class Browser:
         os.close(self._from)
 
     def run(self, body: str):
-        """What the body of an asynchronous function returns in the page, as JSON has it."""
+        """Run the body of an asynchronous function in the page and return its result."""
         given = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
         found = self._call("Runtime.evaluate", **given)
         assert "exceptionDetails" not in found, found

@@ -18,7 +18,7 @@ STEP = 50_000_000  # [ns]
 
 @pytest.fixture(scope="module")
 def steps():
-    """Of the first seconds of a mission, whose services hand over at different times."""
+    """Return the first seconds of a mission whose services hand over at different times."""
     setup = resolve(load("hover", {"run.duration": 4.0}))
     graph = BlockDiagram(setup, create_all(setup), PAGE)
     live, found, held = LiveFlight(setup), [], []

@@ -29,7 +29,7 @@ from lapwing.messages import (
     header,
 )
 from lapwing.studies.flight_data import AXES, FlightData
-from lapwing.studies.report import overview_image, plotly_figure, plots, write
+from lapwing.studies.report import plotly_figure, plots, write
 from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_header import MANY, differences
 from lapwing.studies.report.flight_phases import phases
@@ -120,7 +120,7 @@ def log(tmp_path_factory):
 
 
 class Page(HTMLParser):
-    """What a browser would find: texts, plots, addresses; unclosed elements are an error."""
+    """Parser of texts, plots and addresses of a page; unclosed elements are an error."""
 
     def __init__(self, path):
         super().__init__()
@@ -431,11 +431,6 @@ def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
     copy.with_suffix(".html").mkdir()
     with pytest.raises(ValueError, match=r"a\.html: cannot write the report: "):
         report(copy)
-
-
-def test_the_picture_of_a_mission_is_a_png(log, tmp_path):
-    overview_image.draw(FlightData.read(log), tmp_path / "mission.png")
-    assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 
 @pytest.mark.parametrize("count", [POINTS, POINTS + 1, 17051])

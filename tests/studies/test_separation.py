@@ -1,4 +1,4 @@
-"""How near vehicles come, against positions whose distances are known."""
+"""Separation of vehicles at known distances."""
 
 import numpy as np
 import pytest

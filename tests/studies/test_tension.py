@@ -11,7 +11,7 @@ MASS = np.array([0.4, 0.7, 0.9])
 
 
 def multipliers(r, v, force):
-    """Of |r_i - r_0| = L_i, free particles: tension of each link [N], without the solution along the links."""
+    """Return the link tensions [N] as Lagrange multipliers of |r_i - r_0| = L_i, free particles."""
     d, dv = r[1:] - r[0], v[1:] - v[0]
     jacobian = np.zeros((2, 9))
     for i in range(2):

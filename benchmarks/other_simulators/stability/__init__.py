@@ -31,7 +31,7 @@ def main(names: Sequence[str] = ()) -> None:
         with np.errstate(all="ignore"):
             rows, others = cases.get(name).run().rows, errors(name)
         for row in rows:
-            results = {"Lapwing": row.measured, row.naive: row.naive_measured, **others.get(row.name, {})}
+            results = {"Lapwing": row.measured, row.baseline: row.baseline_measured, **others.get(row.name, {})}
             print(f"{name}.{row.name}: {row.invariant}, bound {row.bound:.2g}")
             for method, value in results.items() if row.name in others else ():
                 print(f"  {method:<40} {value:.2g}")

@@ -26,7 +26,7 @@ class Plot(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One figure of a case: what must stay below a bound, by our method and by a naive one on the same case."""
+    """One figure of a case: what must stay below a bound, by our method and by a baseline one on the same case."""
 
     name: str
     method: str
@@ -34,8 +34,8 @@ class Row(NamedTuple):
     bound: float
     why: str  # it is this bound
     measured: float
-    naive: str  # the naive method
-    naive_measured: float
+    baseline: str  # the baseline method
+    baseline_measured: float
 
     @property
     def passes(self) -> bool:
@@ -43,14 +43,14 @@ class Row(NamedTuple):
         return bool(self.measured <= self.bound)
 
     @property
-    def naive_passes(self) -> bool:
+    def baseline_passes(self) -> bool:
         """True if the baseline method keeps it: then the row proves nothing."""
-        return bool(self.naive_measured <= self.bound)
+        return bool(self.baseline_measured <= self.bound)
 
     @property
-    def stands(self) -> bool:
-        """Ours keeps the bound, and the naive method does not."""
-        return self.passes and not self.naive_passes
+    def is_conclusive(self) -> bool:
+        """Ours keeps the bound, and the baseline method does not."""
+        return self.passes and not self.baseline_passes
 
 
 class CaseResult(NamedTuple):

@@ -23,9 +23,9 @@ class Result(NamedTuple):
     seconds: float  # of wall time
 
     @property
-    def stands(self) -> bool:
+    def is_conclusive(self) -> bool:
         """True if every row is conclusive."""
-        return all(row.stands for row in self.found.rows)
+        return all(row.is_conclusive for row in self.found.rows)
 
 
 def chosen(case: str | None, long: bool, sweep: bool) -> list[str]:

@@ -34,7 +34,7 @@ def distance(bound: float, measured: float) -> str:
 
 COLUMNS = {  # name: share of the width, None where it is as wide as its figures
     "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
-    "naive method": 5, "its result": None,
+    "baseline method": 5, "its result": None,
 }  # fmt: skip
 FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}  # letters
 
@@ -51,8 +51,8 @@ def table(console: Console, results: Sequence[Result]) -> None:
         for row in result.found.rows:
             shown.add_row(
                 row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
-                distance(row.bound, row.measured), _coloured(row.passes), escape(row.naive),
-                f"{figure(row.naive_measured)} {_coloured(row.naive_passes, not row.naive_passes)}",
+                distance(row.bound, row.measured), _coloured(row.passes), escape(row.baseline),
+                f"{figure(row.baseline_measured)} {_coloured(row.baseline_passes, not row.baseline_passes)}",
             )  # fmt: skip
         console.print(shown)
 
@@ -85,8 +85,8 @@ def as_json(results: Sequence[Result]) -> dict[str, Any]:
                 "bound": _finite(row.bound),
                 "measured": _finite(row.measured),
                 "verdict": verdict(row.passes),
-                "naive_measured": _finite(row.naive_measured),
-                "naive_verdict": verdict(row.naive_passes),
+                "baseline_measured": _finite(row.baseline_measured),
+                "baseline_verdict": verdict(row.baseline_passes),
             }
             for result in results
             for row in result.found.rows

@@ -36,7 +36,7 @@ def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Pa
         console_output.write_json(json, results)
     if report:
         stability_page.write(report, results)
-    short = [result.case for result in results if not result.stands]
+    short = [result.case for result in results if not result.is_conclusive]
     if short:
         console.print(f"\nfalls short: {', '.join(short)}", highlight=False)
     return not short

@@ -1,17 +1,17 @@
-"""The results as one HTML page that needs nothing else."""
+"""Page of `lapwing stability`: rows, plots, and the difficulty at which each method breaks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader
+import numpy as np
 
+from lapwing.studies.report import plot as report
+from lapwing.studies.report.page import render
+from lapwing.studies.report.sections import Section
+from lapwing.studies.report.style import COLOURS
+from lapwing.studies.stability.case_result import Plot, Sweep
 from lapwing.studies.stability.case_runner import Result
-from lapwing.studies.stability.chart import chart
 from lapwing.studies.stability.console_output import distance, figure, verdict
-
-_TEMPLATES = Environment(
-    loader=FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
-)
 
 
 def write(path: Path, results: Sequence[Result]) -> None:
@@ -20,10 +20,42 @@ def write(path: Path, results: Sequence[Result]) -> None:
     Raises:
         ValueError: it cannot be written.
     """
-    text = _TEMPLATES.get_template("page.html").render(
-        results=results, chart=chart, figure=figure, verdict=verdict, distance=distance
+    text = render(
+        "stability.html",
+        list(_sections(results)),
+        results={result.case: result for result in results},
+        figure=figure,
+        verdict=verdict,
+        distance=distance,
     )
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as fault:
         raise ValueError(f"{path}: cannot write the page: {fault.strerror or fault}") from None
+
+
+def _sections(results: Sequence[Result]) -> Iterator[Section]:
+    for result in results:
+        yield Section(result.case, result.case, _plot(result.found.plot))
+        if result.sweep:
+            title = f"{result.case}: difficulty at which each method breaks"
+            yield Section(f"{result.case}_sweep", title, _plot(result.sweep.plot(), _breaks(result.sweep)))
+
+
+def _breaks(sweep: Sweep) -> str:
+    texts = [
+        f"{name}: {'nowhere in the sweep' if at is None else f'at {sweep.difficulty} = {figure(at)}'}"
+        for name, at in sweep.breaks().items()
+    ]
+    return "; ".join(texts) + "."
+
+
+def _plot(plot: Plot, caption: str = "") -> report.Plot:
+    marks: list[report.Mark] = [
+        report.Line(np.asarray(x, float), np.asarray(y, float), name, COLOURS[k % len(COLOURS)])
+        for k, (name, x, y) in enumerate(plot.curves)
+    ]
+    if plot.bound is not None and not (plot.log_y and plot.bound <= 0.0):
+        marks.append(report.Level(plot.bound, f"bound {plot.bound:.2g}"))
+    panel = report.Panel(tuple(marks), plot.y_label, plot.x_label, timed=False, log_x=plot.log_x, log_y=plot.log_y)
+    return report.Plot((panel,), caption, 3.4)

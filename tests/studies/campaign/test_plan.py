@@ -1,4 +1,4 @@
-"""What the runs of a campaign draw."""
+"""Drawn values of the runs of a campaign."""
 
 import re
 

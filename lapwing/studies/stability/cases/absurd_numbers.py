@@ -104,8 +104,8 @@ def of_commands(value: float) -> tuple[str, float]:
     return ("flown" if math.isfinite(told) else "silent"), float(told)
 
 
-def naive_step(mass: float, volts: float) -> float:
-    """The naive way: a falling point under a thrust, stepped with whatever comes; its height after a second."""
+def baseline_step(mass: float, volts: float) -> float:
+    """The baseline way: a falling point under a thrust, stepped with whatever comes; its height after a second."""
     with np.errstate(all="ignore"):
         m, v, z = np.float64(mass), np.float64(0.0), np.float64(0.0)
         for _ in range(10):
@@ -127,9 +127,9 @@ def run() -> CaseResult:
     parameters = [of_parameters(value, key) for key in KEYS for value in ABSURD]
     states = of_states()
     commands = [of_commands(value) for value in ABSURD]
-    naive = "stepped with whatever comes"
-    by_mass = _no_numbers([naive_step(v, 33.0) for v in ABSURD])
-    by_number, by_voltage = (_no_numbers([naive_step(10.0, v) for v in values]) for values in (NOT, ABSURD))
+    baseline = "stepped with whatever comes"
+    by_mass = _no_numbers([baseline_step(v, 33.0) for v in ABSURD])
+    by_number, by_voltage = (_no_numbers([baseline_step(10.0, v) for v in values]) for values in (NOT, ABSURD))
     why = "none: a number that is none must not go on its way"
     rows = [
         Row(
@@ -139,7 +139,7 @@ def run() -> CaseResult:
             0.0,
             why,
             _count(parameters, "silent"),
-            naive,
+            baseline,
             by_mass,
         ),
         Row(
@@ -149,7 +149,7 @@ def run() -> CaseResult:
             0.0,
             why,
             float(states["silent"]),
-            naive,
+            baseline,
             by_number,
         ),
         Row(
@@ -159,7 +159,7 @@ def run() -> CaseResult:
             0.0,
             why,
             _count([c for c, _ in commands], "silent"),
-            naive,
+            baseline,
             by_voltage,
         ),
         Row(

@@ -34,7 +34,7 @@ HELD_WHY = "round-off: the constraint is part of the state space"
 ENERGY_WHY = "the method's own error at 4e-3 rad of the fastest link a step, fourth power, for 20 000 steps"
 LIGHT_WHY = "a tolerance of 1e-12 in each of 16 000 steps, times six"
 ADAPTIVE, TOLERANCE = "rkmk54", 1e-12
-SPRING = 1e5  # [N/m] of the naive way
+SPRING = 1e5  # [N/m] of the baseline way
 
 
 def start(name: str) -> tuple[Any, CooperativeLoadState]:
@@ -75,8 +75,8 @@ def energy_drift(load: float, velocity: np.ndarray, height: np.ndarray) -> np.nd
     return np.abs(total - total[0]) / kinetic[0]
 
 
-def naive(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """The naive way: each link a stiff spring, RK4 at the same step; as `ours`."""
+def baseline(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
+    """The baseline way: each link a stiff spring, RK4 at the same step; as `ours`."""
     p, x = start(name)
     q, omega = (np.array([getattr(s, field) for s in x.link]) for field in ("direction", "omega"))
     length, mass = np.array(LENGTH)[:, None], np.array([[p.load_mass], [QUAD], [QUAD]])
@@ -116,16 +116,16 @@ def run() -> CaseResult:
         light = name == "light_load"
         method = f"{ADAPTIVE} on TS^2, tolerance {TOLERANCE:g}" if light else "rkmk4 on TS^2, 0.5 ms"
         bound, why = (LIGHT, LIGHT_WHY) if light else (ENERGY, ENERGY_WHY)
-        (off, energy), (naive_off, naive_energy) = (
+        (off, energy), (baseline_off, baseline_energy) = (
             ours(name, ADAPTIVE if light else "rkmk4"),
-            naive(name, STEPS // 10),
+            baseline(name, STEPS // 10),
         )
         links, change = "length of the links, relative", "change of the energy, over the kinetic energy at first"
         found += [
-            Row(f"{name}.links", method, links, HELD, HELD_WHY, float(off.max()), spring, lost(naive_off)),
-            Row(f"{name}.energy", method, change, bound, why, float(energy.max()), spring, lost(naive_energy)),
+            Row(f"{name}.links", method, links, HELD, HELD_WHY, float(off.max()), spring, lost(baseline_off)),
+            Row(f"{name}.energy", method, change, bound, why, float(energy.max()), spring, lost(baseline_energy)),
         ]
-        curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, naive_energy)]
+        curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, baseline_energy)]
     return CaseResult(found, Plot("time [s]", "change of the energy", curves, ENERGY))
 
 
@@ -142,7 +142,7 @@ def sweep() -> Sweep:
     for load in loads:
         CASES["light_load"] = (float(load), *whole[1:])
         curves["rkmk4 on TS^2"].append(float(ours("light_load", steps=steps)[1].max()))
-        curves["links as springs"].append(lost(naive("light_load", steps)[1]))
+        curves["links as springs"].append(lost(baseline("light_load", steps)[1]))
     CASES["light_load"] = whole
     found = [Curve(name, loads, np.array(values)) for name, values in curves.items()]
     return Sweep("mass of the load [kg]", "change of the energy", 1e-3, found, falling=True)

@@ -36,7 +36,7 @@ def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
 
 
 def appending() -> float:
-    """The naive way to keep a history: time of the last thousand rows over that of the first, less one."""
+    """The baseline way to keep a history: time of the last thousand rows over that of the first, less one."""
     history, seconds = np.zeros(0), []
     for _ in range(20):
         started = time.process_time()

@@ -49,7 +49,7 @@ def gained(distance: float, rise: float, speed: float = SPEED, step: float = STE
     return (highest - first) / (0.5 * p.body.mass * speed**2)
 
 
-def naive_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
+def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
     """Return the `gained` energy of a point mass on a height field, at most one step deep beyond the riser."""
     mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
     highest = 0.0
@@ -88,9 +88,9 @@ def run() -> CaseResult:
     unloaded = G * (math.sin(ANGLE) - DYNAMIC * math.cos(ANGLE))
     rows = [
         Row("step", faces, "energy gained at a step of 10 cm, over the kinetic", 1e-9, none,
-            gained(0.4, RISER), field, naive_gained(0.4, RISER)),
+            gained(0.4, RISER), field, baseline_gained(0.4, RISER)),
         Row("edge", faces, "energy gained over an edge of 40 cm, over the kinetic", 1e-9, none,
-            gained(0.4, -DROP), "forward Euler on spring and damper, upright", naive_fall()),
+            gained(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
         Row("take_off", "anchored feet, RK4 at 1 ms", newton, 1e-3, slid,
             abs(lifted(LIGHT) / exact(LIGHT) - 1.0),
             "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
@@ -98,7 +98,7 @@ def run() -> CaseResult:
     return CaseResult(rows, sweep().plot())
 
 
-def naive_fall() -> float:
+def baseline_fall() -> float:
     """Energy gained [over the kinetic of the slide] by a fall of the drop, forward Euler at the plant's step."""
     mass, z, v = DRONE.mass.total, DROP, 0.0
     highest = 0.0
@@ -112,7 +112,7 @@ def naive_fall() -> float:
 def sweep() -> Sweep:
     """Faster and faster into a step."""
     speeds = np.array([1.0, 2.0, 4.0, 8.0])
-    ways = {"faces": gained, "height field": naive_gained}
+    ways = {"faces": gained, "height field": baseline_gained}
     curves = [
         Curve(name, speeds, np.maximum([way(0.4, RISER, float(v)) for v in speeds], 1e-17))
         for name, way in ways.items()

@@ -99,7 +99,7 @@ def definite(covariance: np.ndarray) -> float:
 
 
 def textbook() -> float:
-    """The naive update P = (1 - K H) P, of sharp measurements of nearly the same thing; its least eigenvalue."""
+    """The baseline update P = (1 - K H) P, of sharp measurements of nearly the same thing; its least eigenvalue."""
     P, rng = np.diag([1e6] * 3), np.random.default_rng(1)
     least = 1.0
     for _ in range(30):
@@ -117,11 +117,11 @@ def run() -> CaseResult:
     for name, o in outcomes.items():
         before = np.flatnonzero(o.t < START)[-1]
         trusting = np.maximum(o.position / o.position_std[before], o.angle / o.angle_std[before])
-        naive, said = "its last word before the fault", float(trusting[o.t >= START].max())
+        baseline, said = "its last word before the fault", float(trusting[o.t >= START].max())
         if name == "gyro_bias":
-            naive, said = "the gyro integrated", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
+            baseline, said = "the gyro integrated", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
         if name == "magnetometer":
-            naive, said = "the compass taken at its word", np.pi / o.angle_std[before]
+            baseline, said = "the compass taken at its word", np.pi / o.angle_std[before]
         what = "largest error over the claimed deviation, while it says that it is well"
         rows.append(
             Row(
@@ -131,7 +131,7 @@ def run() -> CaseResult:
                 SIGMAS,
                 WHY,
                 float(o.ratio[o.well].max()),
-                naive,
+                baseline,
                 said,
             )
         )

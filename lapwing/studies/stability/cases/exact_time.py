@@ -20,7 +20,7 @@ def run() -> CaseResult:
     exact = [Fraction(int(tick) * setup.interval_ns, 1_000_000_000) for tick in ticks]
     ours = np.array([abs(float(Fraction(float(t * setup.interval)) - e)) for t, e in zip(ticks, exact, strict=True)])
     summed = np.add.accumulate(np.full(ticks[-1], setup.interval))[ticks - 1]
-    naive = np.array([abs(float(Fraction(float(t)) - e)) for t, e in zip(summed, exact, strict=True)])
+    baseline = np.array([abs(float(Fraction(float(t)) - e)) for t, e in zip(summed, exact, strict=True)])
     row = Row(
         "clock",
         "integer ticks of integer nanoseconds",
@@ -29,8 +29,8 @@ def run() -> CaseResult:
         "half a unit in the last place of 86 400 s, as a float; stamps are integers and exact",
         float(ours.max()),
         "a sum of intervals",
-        float(naive.max()),
+        float(baseline.max()),
     )
     hours = np.arange(1.0, HOURS + 1)
-    curves = [Curve("ticks", hours, np.maximum(ours, 1e-17)), Curve("sum", hours, naive)]
+    curves = [Curve("ticks", hours, np.maximum(ours, 1e-17)), Curve("sum", hours, baseline)]
     return CaseResult([row], Plot("simulated time [h]", "error of the clock [s]", curves, row.bound))

@@ -69,9 +69,9 @@ def run() -> CaseResult:
     """The longest interval of each delay, in flight and by analysis."""
     flown = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
     linear = np.array([longest([predicted(rate, d) for rate in RATES]) for d in DELAYS])
-    naive = np.full(len(DELAYS), 1.0 / RATES[-1])
+    baseline = np.full(len(DELAYS), 1.0 / RATES[-1])
     ratio = np.maximum(flown / linear, linear / flown)
-    blind = np.maximum(flown / naive, naive / flown)
+    blind = np.maximum(flown / baseline, baseline / flown)
     row = Row(
         "interval",
         "Nyquist with the delay and half a tick of hold",
@@ -86,6 +86,6 @@ def run() -> CaseResult:
     curves = [
         Curve("in flight", x, 1e3 * flown),
         Curve("by analysis", x, 1e3 * linear),
-        Curve("no delay", x, 1e3 * naive),
+        Curve("no delay", x, 1e3 * baseline),
     ]
     return CaseResult([row], Plot("delay [exchanges]", "longest stable interval [ms]", curves))

@@ -25,7 +25,7 @@ def defect(R: np.ndarray) -> np.ndarray:
 
 
 def on_entries() -> np.ndarray:
-    """The naive way: forward Euler on the nine entries of the matrix, under the true rates, shape (SAMPLES + 1, 9)."""
+    """Integrate the matrix entries by forward Euler (baseline), under the true rates, shape (SAMPLES + 1, 9)."""
     omega = marched("rkmk4", SPINNING, START, DURATION, STEPS, STEPS)[:, 9:]
     R, h, found = np.eye(3).ravel(), DURATION / STEPS, []
     for i in range(STEPS + 1):
@@ -54,9 +54,9 @@ def accumulated() -> np.ndarray:
 def run() -> CaseResult:
     """Orthogonality, order, and the same bits however the run is recorded."""
     ours = marched("rkmk4", SPINNING, START, DURATION, STEPS, SAMPLES)
-    naive = on_entries()
+    baseline = on_entries()
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
-    off, naive_off = defect(ours[:, :9]), defect(naive)
+    off, baseline_off = defect(ours[:, :9]), defect(baseline)
     ends = [rows("rkmk4", SPINNING, START, DURATION, STEPS, n)[-1] for n in (1, 60)]
     figures = [
         Row(
@@ -67,7 +67,7 @@ def run() -> CaseResult:
             "round-off: a few units in the last place, which must not add up over 60 000 steps",
             worst(off),
             "forward Euler on the matrix entries",
-            worst(naive_off),
+            worst(baseline_off),
         ),
         Row(
             "order",
@@ -90,5 +90,5 @@ def run() -> CaseResult:
             worst(accumulated() - ends[0]),
         ),
     ]
-    curves = [Curve("rkmk4", t, np.maximum(off, 1e-17)), Curve("Euler on entries", t, naive_off)]
+    curves = [Curve("rkmk4", t, np.maximum(off, 1e-17)), Curve("Euler on entries", t, baseline_off)]
     return CaseResult(figures, Plot("time [min]", "largest entry of R^T R - 1", curves, DIGITS))

@@ -56,9 +56,9 @@ def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.
 def run() -> CaseResult:
     """The rates against the closed form, and both invariants."""
     off, energy, momentum = figures("rigid_splitting", EPSILON, STEPS)
-    naive_off, naive_energy, naive_momentum = figures("lie_euler", EPSILON, STEPS)
+    baseline_off, baseline_energy, baseline_momentum = figures("lie_euler", EPSILON, STEPS)
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
-    method, naive = "rigid_splitting, 5 ms", "Lie-Euler, 5 ms"
+    method, baseline = "rigid_splitting, 5 ms", "Lie-Euler, 5 ms"
     rows = [
         Row(
             "rates",
@@ -68,8 +68,8 @@ def run() -> CaseResult:
             "round-off of the energy, 1e-14, times the sensitivity of the period beside the separatrix, 1 / epsilon^2, "
             "times the thousand radians of the run",
             float(off.max()),
-            naive,
-            float(naive_off.max()),
+            baseline,
+            float(baseline_off.max()),
         ),
         Row(
             "energy",
@@ -78,8 +78,8 @@ def run() -> CaseResult:
             SMALL,
             "round-off of 200 000 steps: 2e-16 times their number, were it always of one sign",
             float(energy.max()),
-            naive,
-            float(naive_energy.max()),
+            baseline,
+            float(baseline_energy.max()),
         ),
         Row(
             "momentum",
@@ -88,11 +88,11 @@ def run() -> CaseResult:
             SMALL,
             "as of the energy",
             float(momentum.max()),
-            naive,
-            float(naive_momentum.max()),
+            baseline,
+            float(baseline_momentum.max()),
         ),
     ]
-    curves = [Curve("rigid_splitting", t, off), Curve("Lie-Euler", t, naive_off)]
+    curves = [Curve("rigid_splitting", t, off), Curve("Lie-Euler", t, baseline_off)]
     return CaseResult(rows, Plot("time [s]", "largest error of the rates so far [rad/s]", curves, 1e-7))
 
 

@@ -58,8 +58,8 @@ def restitution(speed: float, phase: float, step: float, tolerance: float = mult
     )
 
 
-def naive_restitution(speed: float, phase: float, step: float) -> float:
-    """The naive way: forward Euler on spring and damper at the plant's step."""
+def baseline_restitution(speed: float, phase: float, step: float) -> float:
+    """The baseline way: forward Euler on spring and damper at the plant's step."""
     mass = DRONE.mass.total
     z = start = speed * (2e-3 + phase * STEP)
     v = -speed
@@ -87,7 +87,7 @@ def rest_place(phase: float, step: float, tolerance: float = multirotor.CONTACT_
     return np.array(run_on(p._replace(tolerance=tolerance), state._replace(motion=m), 4.0, step).motion.position_world)
 
 
-def naive_rest_place(phase: float, step: float) -> float:
+def baseline_rest_place(phase: float, step: float) -> float:
     """Return the slide [m] of a mass at the same speeds, forward Euler, friction against the slip."""
     mass, x, z, u, v = DRONE.mass.total, 0.0, 0.05 + phase * STEP, math.hypot(0.5, 0.3), -1.0
     for _ in range(round(4.0 / step)):
@@ -103,7 +103,7 @@ def settled(angle: float = 0.0) -> tuple[Any, Any]:
     return p, run_on(p, state, 3.0)
 
 
-def naive_rest() -> float:
+def baseline_rest() -> float:
     """Return the motion [m] of the baseline contact in the last of ten seconds after it was set down."""
     mass, z, v, h = DRONE.mass.total, -DRONE.mass.total * G / STIFFNESS, -1e-3, STEP
     low, high = 0.0, -1.0
@@ -150,7 +150,7 @@ def run() -> CaseResult:
     places = [
         np.linalg.norm(rest_place(f, k * STEP) - rest_place(f, STEP, 1e-10)) for f in FEW for k in (0.25, 0.5, 1.0)
     ]
-    naive_places = [abs(naive_rest_place(f, STEP) - naive_rest_place(f, STEP / 32.0)) for f in FEW]
+    baseline_places = [abs(baseline_rest_place(f, STEP) - baseline_rest_place(f, STEP / 32.0)) for f in FEW]
     every = "error of the restitution, 4 speeds at 8 phases of a step"
     rows = [
         Row(
@@ -161,7 +161,7 @@ def run() -> CaseResult:
             "ten times the tolerance of a part of a step: a bounce takes twenty parts and more",
             errors(STEP, exact, restitution),
             f"{euler}, 1 ms",
-            errors(STEP, exact, naive_restitution),
+            errors(STEP, exact, baseline_restitution),
         ),
         Row(
             "rest_place",
@@ -171,7 +171,7 @@ def run() -> CaseResult:
             "ten times the tolerance of a part of a step, as of the restitution",
             float(max(places)),
             f"{euler}, 1 ms against 1/32 ms",
-            max(naive_places),
+            max(baseline_places),
         ),
         Row(
             "rest",
@@ -181,7 +181,7 @@ def run() -> CaseResult:
             "a hundredth of the depth by which round-off of a position of metres shows",
             resting(3600.0, 0.0),
             f"{euler}, 1 ms, over a second",
-            naive_rest(),
+            baseline_rest(),
         ),
         Row(
             "creep",
@@ -211,6 +211,6 @@ def sweep() -> Sweep:
     """Longer and longer steps: the error of the restitution."""
     steps = STEP / np.array([16.0, 8.0, 4.0, 2.0, 1.0])
     exact = exact_restitution()
-    ways = {"RK4, feet of the plant": restitution, "forward Euler": naive_restitution}
+    ways = {"RK4, feet of the plant": restitution, "forward Euler": baseline_restitution}
     curves = [Curve(name, steps, np.array([errors(h, exact, way) for h in steps])) for name, way in ways.items()]
     return Sweep("step [s]", "error of the restitution", 1e-4, curves)

@@ -54,7 +54,7 @@ def run() -> CaseResult:
     quiet = sum(silent(name, BEYOND * h) for name, h in zip(names, edges, strict=True))
     widest = float(edges.max())
     with np.errstate(over="ignore"):
-        naive = np.abs(1.0 - INSIDE * widest) ** 100.0
+        baseline = np.abs(1.0 - INSIDE * widest) ** 100.0
         unchecked = sum(np.isinf(np.float64(BEYOND * h) ** GROWN) for h in edges)
     found = [
         Row(
@@ -65,7 +65,7 @@ def run() -> CaseResult:
             "inside of its stability region a method damps what is damped",
             float(inside.max()),
             f"forward Euler at the widest of these steps, {INSIDE * widest:.3g}, 100 of them",
-            float(naive),
+            float(baseline),
         ),
         Row(
             "beyond",

@@ -36,7 +36,7 @@ def refused(override: str) -> bool:
 
 
 def by_remainder(period: int, ticks: int) -> int:
-    """The naive schedule, float time modulo the period below an interval: messages missed or sent twice."""
+    """The baseline schedule, float time modulo the period below an interval: messages missed or sent twice."""
     interval = 0.004
     time = np.add.accumulate(np.full(ticks, interval)) - interval
     sent = np.mod(time, period * interval) < interval
@@ -69,7 +69,7 @@ def with_jumping_clock() -> int:
 
 
 def by_own_clock(ticks: int, interval: float) -> int:
-    """The naive controller, which takes its interval from its clock: intervals that are others than a tick."""
+    """The baseline controller, which takes its interval from its clock: intervals that are others than a tick."""
     read = [t + jumping_clock.wall(t) for t in interval * np.arange(ticks + 1)]
     return int((np.abs(np.diff(read) - interval) > 1e-3 * interval).sum())
 
@@ -82,7 +82,7 @@ def worst(found: Outcome) -> float:
 def run() -> CaseResult:
     """Errors against what is claimed, and what is refused."""
     what = "largest error over the claimed deviation, while it says that it is well"
-    ours, naive = "corrected at the time of the fix", "a fix counts as measured when it arrives; the whole flight"
+    ours, baseline = "corrected at the time of the fix", "a fix counts as measured when it arrives; the whole flight"
     outcomes = {name: flown({}, more) for name, more in CASES}
     rows = [
         Row(
@@ -92,7 +92,7 @@ def run() -> CaseResult:
             SIGMAS,
             WHY,
             worst(outcomes[name]),
-            naive,
+            baseline,
             float(flown({}, more, as_if_on_time=True).ratio.max()),
         )
         for name, more in CASES
@@ -130,10 +130,10 @@ def sweep() -> Sweep:
     late = np.arange(1, 8)
     more = [[RARE, f"sensors.gps.latency_samples={n}"] for n in late.tolist()]
     ours = np.array([worst(flown({}, m)) for m in more])
-    naive = np.array([flown({}, m, as_if_on_time=True).ratio.max() for m in more])
+    baseline = np.array([flown({}, m, as_if_on_time=True).ratio.max() for m in more])
     curves = [
         Curve("corrected at the time of the fix", 0.1 * late, ours),
-        Curve("as measured when it arrives; the whole flight", 0.1 * late, naive),
+        Curve("as measured when it arrives; the whole flight", 0.1 * late, baseline),
     ]
     what = "largest error over the claimed deviation, while it says that it is well"
     return Sweep("fixes late by [s]", what, SIGMAS, curves, log_x=False)

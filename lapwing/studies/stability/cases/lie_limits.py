@@ -36,14 +36,14 @@ def exact(v: tuple[float, ...]) -> float:
         return float((1 - half * series(half, Decimal(1), 0) / series(half, half, 1)) / square)
 
 
-def naive_ratio(v: tuple[float, ...]) -> float:
+def baseline_ratio(v: tuple[float, ...]) -> float:
     """The formula as it stands in books."""
     a = np.float64(np.linalg.norm(v))
     with np.errstate(all="ignore"):
         return float((1.0 - 0.5 * a / np.tan(0.5 * a)) / (a * a))
 
 
-def naive_log(m: np.ndarray) -> np.ndarray:
+def baseline_log(m: np.ndarray) -> np.ndarray:
     """The formula as it stands in books: angle by the arc cosine, axis by the skew part."""
     R = m.reshape(3, 3)
     with np.errstate(all="ignore"):
@@ -53,20 +53,22 @@ def naive_log(m: np.ndarray) -> np.ndarray:
 
 
 def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Relative errors of ours and of the naive ratio at these angles [rad], (k,) each."""
+    """Relative errors of ours and of the baseline ratio at these angles [rad], (k,) each."""
     vectors = [tuple(float(c) for c in a * AXIS) for a in angles]
     true = np.array([exact(v) for v in vectors])
-    ours, naive = (np.array([f(v) for v in vectors]) for f in (python_function(ratios.cotangent_ratio), naive_ratio))
-    return np.abs(ours / true - 1.0), np.abs(naive / true - 1.0)
+    ours, baseline = (
+        np.array([f(v) for v in vectors]) for f in (python_function(ratios.cotangent_ratio), baseline_ratio)
+    )
+    return np.abs(ours / true - 1.0), np.abs(baseline / true - 1.0)
 
 
 def log_errors(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Errors [rad] of ours and of the naive logarithm of rotations by pi less these gaps, (k,) each."""
+    """Errors [rad] of ours and of the baseline logarithm of rotations by pi less these gaps, (k,) each."""
     vectors = [(math.pi - gap) * AXIS for gap in gaps]
     matrices = [np.array(so3.exp(tuple(float(c) for c in v))) for v in vectors]
     ours = [np.abs(np.array(so3.log(tuple(m.tolist()))) - v).max() for m, v in zip(matrices, vectors, strict=True)]
-    naive = [np.abs(naive_log(m) - v).max() for m, v in zip(matrices, vectors, strict=True)]
-    return np.array(ours), np.array(naive)
+    baseline = [np.abs(baseline_log(m) - v).max() for m, v in zip(matrices, vectors, strict=True)]
+    return np.array(ours), np.array(baseline)
 
 
 def run() -> CaseResult:
@@ -109,6 +111,6 @@ def run() -> CaseResult:
     curves = [
         Curve(f"{name}{where}", gaps, np.maximum(values, 1e-17))
         for where, both in ((" at 0", small), (" at 2 pi", at_pole), (" log at pi", at_pi))
-        for name, values in zip(("ours", "naive"), both, strict=True)
+        for name, values in zip(("ours", "baseline"), both, strict=True)
     ]
     return CaseResult(rows, Plot("distance from the singular angle [rad]", "error", curves, BOUND, log_x=True))

@@ -56,7 +56,7 @@ def accounts(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
 
 
 def let_go() -> tuple[float, float, float, float]:
-    """Change of the accounts at the release, and distance [m] from free fall after it; ours and naive of each."""
+    """Change of the accounts at the release, and distance [m] from free fall after it; ours and baseline of each."""
     p, x = formation(LENGTH, (0.6, -0.5), (5.0, -4.0))
     steps = round(SWUNG / STEP) * 5
     y = rows("rkmk4", p, x, SWUNG, steps, steps // 5)

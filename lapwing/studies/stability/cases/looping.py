@@ -31,12 +31,12 @@ def momentum(y: np.ndarray) -> np.ndarray:
 
 
 def euler_angles(aside: float, steps: int, samples: int) -> np.ndarray:
-    """The naive way: RK4 on roll, pitch and yaw with 1/cos of the pitch; coordinates, shape (samples + 1, 12)."""
+    """The baseline way: RK4 on roll, pitch and yaw with 1/cos of the pitch; coordinates, shape (samples + 1, 12)."""
     A, B, C = INERTIA
 
     def rate(y: tuple[float, ...]) -> tuple[float, ...]:
         roll, pitch, _, p, q, r = y
-        cosine = math.cos(pitch) or 1e-300  # all that the naive way looks at is that it does not divide by zero
+        cosine = math.cos(pitch) or 1e-300  # all that the baseline way looks at is that it does not divide by zero
         turn = q * math.sin(roll) + r * math.cos(roll)
         return (
             p + turn * math.sin(pitch) / cosine, q * math.cos(roll) - r * math.sin(roll), turn / cosine,
@@ -68,7 +68,7 @@ def _coordinates(y: tuple[float, ...]) -> list[float]:
 def run() -> CaseResult:
     """Angular momentum in the world, which no torque changes."""
     ours = drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES)))
-    naive = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
+    baseline = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     row = Row(
         "momentum",
@@ -78,10 +78,11 @@ def run() -> CaseResult:
         WHY,
         float(ours.max()),
         "RK4 on Euler angles, 4 ms",
-        float(naive.max()),
+        float(baseline.max()),
     )
     return CaseResult(
-        [row], Plot("time [s]", "change of momentum", [Curve("rkmk4", t, ours), Curve("Euler angles", t, naive)], BOUND)
+        [row],
+        Plot("time [s]", "change of momentum", [Curve("rkmk4", t, ours), Curve("Euler angles", t, baseline)], BOUND),
     )
 
 
@@ -92,6 +93,6 @@ def sweep() -> Sweep:
         drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(a), DURATION, STEPS, 60))).max()
         for a in asides
     ]
-    naive = [drift(momentum(euler_angles(a, STEPS // 6, 100))).max() for a in asides]
-    curves = [Curve("rkmk4 on SO(3)", asides, np.array(ours)), Curve("RK4 on Euler angles", asides, np.array(naive))]
+    baseline = [drift(momentum(euler_angles(a, STEPS // 6, 100))).max() for a in asides]
+    curves = [Curve("rkmk4 on SO(3)", asides, np.array(ours)), Curve("RK4 on Euler angles", asides, np.array(baseline))]
     return Sweep("roll and yaw rate beside the loop [rad/s]", "change of momentum", 1e-3, curves, falling=True)

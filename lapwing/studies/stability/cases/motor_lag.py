@@ -22,7 +22,7 @@ def lagging(lag: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unsplit(lag: float, steps: int) -> np.ndarray:
-    """The naive way: RK4 at the plant's step on w' = (1 - w) / lag; distance from 1 after each step."""
+    """The baseline way: RK4 at the plant's step on w' = (1 - w) / lag; distance from 1 after each step."""
     z = -STEP / lag
     factor = 1.0 + z + z * z / 2.0 + z**3 / 6.0 + z**4 / 24.0
     with np.errstate(over="ignore"):
@@ -41,7 +41,7 @@ def accepted(lag: float) -> float:
 def run() -> CaseResult:
     """A flight with stiff motors, and motors without any lag."""
     t, off = lagging(STIFF)
-    naive = unsplit(STIFF, round(INTERVAL / STEP))
+    baseline = unsplit(STIFF, round(INTERVAL / STEP))
     with np.errstate(divide="ignore", invalid="ignore"):
         endless = np.float64(1.0) / np.float64(0.0) * np.float64(0.0)  # lag rate times a speed that is reached
     rows = [
@@ -53,7 +53,7 @@ def run() -> CaseResult:
             "400 time constants go by in an exchange: what is left is round-off and the order of the last step",
             float(off.max()),
             "RK4 at 1 ms, one exchange",
-            float(naive[-1]),
+            float(baseline[-1]),
         ),
         Row(
             "zero",
@@ -66,13 +66,13 @@ def run() -> CaseResult:
             float(np.isnan(endless)),
         ),
     ]
-    curves = [Curve("split", t, np.maximum(off, 1e-17)), Curve("RK4 at 1 ms", STEP * np.arange(1, 5), naive)]
+    curves = [Curve("split", t, np.maximum(off, 1e-17)), Curve("RK4 at 1 ms", STEP * np.arange(1, 5), baseline)]
     return CaseResult(rows, Plot("time [s]", "rotor speed off its voltage's, relative", curves, ALLOWED))
 
 
 def sweep() -> Sweep:
     """Faster and faster motors: the distance at the end of a flight."""
     ours = np.array([lagging(float(lag))[1][-1] for lag in LAGS])
-    naive = np.array([unsplit(float(lag), 1000)[-1] for lag in LAGS])
-    curves = [Curve("split", LAGS, ours), Curve("RK4 at 1 ms", LAGS, naive)]
+    baseline = np.array([unsplit(float(lag), 1000)[-1] for lag in LAGS])
+    curves = [Curve("split", LAGS, ours), Curve("RK4 at 1 ms", LAGS, baseline)]
     return Sweep("lag [s]", "rotor speed off its voltage's", 1.0, curves, falling=True)

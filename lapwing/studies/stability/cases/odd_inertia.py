@@ -18,7 +18,7 @@ BODIES = {
 ASKEW = exp((0.3, -0.5, 0.2))
 SPHERICAL, ALMOST = (1.0, 1.0 + 1e-9, 1.0 + 2e-9), (1.0, 2.0, 5.0)
 DURATION, STEPS, SAMPLES = 100.0, 100_000, 200
-METHOD, NAIVE = "rigid_splitting", "rk4"
+METHOD, BASELINE = "rigid_splitting", "rk4"
 BOUND = 2e-11
 WHY = "2e-16 for each of 100 000 steps, were every rounding of one sign"
 
@@ -52,8 +52,8 @@ def nearly_spherical() -> tuple[float, float]:
     exact = o + DURATION * first + 0.5 * DURATION**2 * second
     start = RigidBody(ASKEW, ALMOST)
     ours = marched(METHOD, FreeBodyParameters(SPHERICAL), start, DURATION, STEPS, SAMPLES)[-1, 9:12]
-    naive = closed_form(SPHERICAL, start, DURATION)[9:12]
-    return float(np.abs(ours - exact).max()), float(np.abs(naive - exact).max())
+    baseline = closed_form(SPHERICAL, start, DURATION)[9:12]
+    return float(np.abs(ours - exact).max()), float(np.abs(baseline - exact).max())
 
 
 def run() -> CaseResult:
@@ -61,7 +61,7 @@ def run() -> CaseResult:
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     rows, curves = [], []
     for body in BODIES:
-        ours, naive = drifts(METHOD, body, STEPS), drifts(NAIVE, body, STEPS)
+        ours, baseline = drifts(METHOD, body, STEPS), drifts(BASELINE, body, STEPS)
         rows.append(
             Row(
                 body,
@@ -71,11 +71,11 @@ def run() -> CaseResult:
                 WHY,
                 float(ours.max()),
                 "RK4 on the quaternion's numbers",
-                float(naive.max()),
+                float(baseline.max()),
             )
         )
-        curves += [Curve(f"{body}", t, ours), Curve(f"{body}, naive", t, naive)]
-    off, naive_off = nearly_spherical()
+        curves += [Curve(f"{body}", t, ours), Curve(f"{body}, baseline", t, baseline)]
+    off, baseline_off = nearly_spherical()
     rows.append(
         Row(
             "nearly_spherical",
@@ -85,7 +85,7 @@ def run() -> CaseResult:
             "as above, for 5 rad/s",
             off,
             "Jacobi's functions as in books: differences of moments cancel",
-            naive_off,
+            baseline_off,
         )
     )
     return CaseResult(rows, Plot("time [s]", "change of energy and momentum", curves, BOUND))

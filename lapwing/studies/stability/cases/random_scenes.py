@@ -59,7 +59,7 @@ def run() -> CaseResult:
     pairs = [pair for seed in range(COUNT) if (pair := flights(seed))]
     broken = [bool(first.failure) or not finite(first) for first, _ in pairs]
     unlike = [first.digest != second.digest for first, second in pairs]
-    generator = np.random.default_rng(1)  # the naive way: one generator with a state for all that is random
+    generator = np.random.default_rng(1)  # the baseline way: one generator with a state for all that is random
     again = [generator.normal(size=3).tobytes() != generator.normal(size=3).tobytes() for _ in pairs]
     unsplit = [1.0 / float(lag) * float(step) > 2.0 for lag, step in map(_lag_and_step, range(COUNT))]
     rows = [

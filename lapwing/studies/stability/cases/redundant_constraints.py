@@ -33,7 +33,7 @@ GUESSES = np.geomspace(1e-9, 1e-2, 8)
 
 
 def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """The naive way: one LU of the assembled matrix of masses and constraints, the accelerations (6 n,)."""
+    """The baseline way: one LU of the assembled matrix of masses and constraints, the accelerations (6 n,)."""
     p, e = rows(system.arrays, q, v, drive)
     root, rotational = mass_roots(system.arrays, p)
     J = e.jacobian_t.T
@@ -58,7 +58,7 @@ def violated(system, q, v, drive, a) -> float:  # type: ignore[no-untyped-def]
 
 
 def redundant() -> tuple[float, float]:
-    """The drone with its propellers at imposed speeds, ours and the naive way, the worst of 20 random states."""
+    """The drone with its propellers at imposed speeds, ours and the baseline way, the worst of 20 random states."""
     rng, worst = np.random.default_rng(5), np.zeros(2)
     drone = delivery_drone(**PAPER, driven="speed")
     system = drone_system(drone)
@@ -101,14 +101,14 @@ def tips(t: np.ndarray, n: int) -> np.ndarray:
 
 
 def singular_position() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(times, error of the first crank's tip [m], the same by the naive way) of two four-bars that turn over."""
+    """(times, error of the first crank's tip [m], the same by the baseline way) of two four-bars that turn over."""
     n = 2
     system, q, v = four_bars(n)
     motion = simulate(system, q, v, END / STEPS, STEPS, record_every=LOOKS)
     tip = tips(motion.time, n)
     off = np.abs(2.0 * motion.configuration[:, 0, :3] - tip).max(axis=1)
-    naive = simulate(system, q, v, END / STEPS, STEPS, "none", record_every=LOOKS)
-    return motion.time, off, np.abs(2.0 * naive.configuration[:, 0, :3] - tip).max(axis=1)
+    baseline = simulate(system, q, v, END / STEPS, STEPS, "none", record_every=LOOKS)
+    return motion.time, off, np.abs(2.0 * baseline.configuration[:, 0, :3] - tip).max(axis=1)
 
 
 def inconsistent() -> tuple[float, float]:
@@ -122,7 +122,7 @@ def inconsistent() -> tuple[float, float]:
 
 def run() -> CaseResult:
     """Rank, redundancy off the constraints, a singular position and an inconsistent start."""
-    t, off, naive_off = singular_position()
+    t, off, baseline_off = singular_position()
     ours_off, fresh = off_by(1e-6)
     figures = [
         Row(
@@ -153,7 +153,7 @@ def run() -> CaseResult:
             "a thousandth of the benchmark's own 1e-3 (IFToMM A02)",
             float(off.max()),
             "RK4 without stabilisation, 2 ms",
-            float(np.nanmax(naive_off)),
+            float(np.nanmax(baseline_off)),
         ),
         Row(
             "start",
@@ -166,7 +166,7 @@ def run() -> CaseResult:
             inconsistent()[1],
         ),
     ]
-    curves = [Curve("projection", t, off), Curve("no stabilisation", t, naive_off)]
+    curves = [Curve("projection", t, off), Curve("no stabilisation", t, baseline_off)]
     return CaseResult(figures, Plot("time [s]", "error of the crank's tip [m]", curves, POSITION))
 
 

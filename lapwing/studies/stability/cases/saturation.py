@@ -84,7 +84,7 @@ def tumbling() -> tuple[float, float]:
 def run() -> CaseResult:
     """Overshoot after a loss of thrust, the path of a drop in wind, the attitude of a vehicle that turns over."""
     t, ours = height(True, LOSS)
-    _, naive = height(False, LOSS)
+    _, baseline = height(False, LOSS)
     unit, stepped = tumbling()
     rows = [
         Row(
@@ -95,7 +95,7 @@ def run() -> CaseResult:
             "less than the 2.5 m by which it falls: it comes back, and does not go on",
             float(ours.max()),
             "integral that goes on",
-            float(naive.max()),
+            float(baseline.max()),
         ),
         Row(
             "gust",
@@ -128,7 +128,7 @@ def run() -> CaseResult:
             stepped,
         ),
     ]
-    curves = [Curve("integral held", t, ours), Curve("integral goes on", t, naive)]
+    curves = [Curve("integral held", t, ours), Curve("integral goes on", t, baseline)]
     return CaseResult(rows, Plot("time [s]", "height over the setpoint [m]", curves, OVERSHOOT, log_y=False))
 
 

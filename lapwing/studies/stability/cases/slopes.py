@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, multiply
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
-from lapwing.studies.stability.cases.landing import STEP, G, naive_restitution, run_on, standing
+from lapwing.studies.stability.cases.landing import STEP, G, baseline_restitution, run_on, standing
 
 HARD = "slopes up to where feet that are loaded unevenly let go, and beyond; bumps; a touch with one foot first"
 
@@ -30,7 +30,7 @@ def way(degrees: float, seconds: float = 60.0) -> float:
 
 
 def chattering(degrees: float, seconds: float = 60.0) -> float:
-    """The naive way: friction against the sign of the slip, forward Euler at the plant's step; distance [m]."""
+    """The baseline way: friction against the sign of the slip, forward Euler at the plant's step; distance [m]."""
     a, x, v = math.radians(degrees), 0.0, 0.0
     for _ in range(round(seconds / STEP)):
         v += STEP * G * (math.sin(a) - STATIC * math.cos(a) * math.copysign(1.0, v))
@@ -83,18 +83,18 @@ def run() -> CaseResult:
     exact = G * (math.sin(a) - DYNAMIC * math.cos(a))
     one_coefficient = G * (math.sin(a) - STATIC * math.cos(a))
     sign, anchored = "friction against the sign of the slip", "anchored feet, RK4 at 1 ms"
-    gain = max(naive_restitution(1.0, phase / 8, STEP) for phase in range(8)) ** 2 - 1.0
+    gain = max(baseline_restitution(1.0, phase / 8, STEP) for phase in range(8)) ** 2 - 1.0
     stuck, slid = "a thousandth of a millimetre: it sticks", "what the feet's springs still swing after 0.3 s"
     steep, gained = f"way [m] in a minute at {below:.1f} degrees", "energy gained in a landing on one foot, relative"
     against, on_bumps = (
         "acceleration on 30 degrees, relative to g (sin - mu cos)",
         "way [m] in a minute on bumps of 2 cm",
     )
-    off, naive_off = abs(sliding(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
+    off, baseline_off = abs(sliding(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
     none, euler = "none but round-off: the ground gives nothing", "forward Euler on spring and damper, upright"
     rows = [
         Row("below", anchored, steep, STILL, stuck, way(below), sign, chattering(below)),
-        Row("beyond", anchored, against, SLIDES, slid, off, "one coefficient for both", naive_off),
+        Row("beyond", anchored, against, SLIDES, slid, off, "one coefficient for both", baseline_off),
         Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
         Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chattering(5.0)),
     ]

@@ -94,8 +94,8 @@ def threshold(topples: Callable[[float], bool], low: float, high: float, parts: 
     return 0.5 * (low + high)
 
 
-def naive(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> np.ndarray:
-    """The naive way: forward Euler on spring, damper and friction against the slip, in the plane of the fall.
+def baseline(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> np.ndarray:
+    """The baseline way: forward Euler on spring, damper and friction against the slip, in the plane of the fall.
 
     Rows of (angle [rad], energy [J]), shape (n, 2); `rate` [rad/s] is that about the edge.
     """
@@ -120,9 +120,9 @@ def naive(axis: int, angle: float, rate: float = 0.0, step: float = STEP, fricti
     return np.array(found)
 
 
-def naive_falls(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> bool:
+def baseline_falls(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> bool:
     """Return True if it topples under the baseline method."""
-    return bool(abs(naive(axis, angle, rate, step, friction)[-1, 0]) > edge(axis))
+    return bool(abs(baseline(axis, angle, rate, step, friction)[-1, 0]) > edge(axis))
 
 
 def gained(axis: int, angle: float) -> float:
@@ -157,17 +157,17 @@ def run() -> CaseResult:
     ours, euler = "anchored feet, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
     rest = settled()
     rate = max(push_error(i, partial(pushed, i, rest), 20) for i in AXES)
-    naive_rate = max(push_error(i, partial(naive_falls, i, 0.0, friction=GRIP), 16) for i in AXES)
+    baseline_rate = max(push_error(i, partial(baseline_falls, i, 0.0, friction=GRIP), 16) for i in AXES)
     beside = [(i, edge(i) + side) for i in AXES for side in (-NEAR, NEAR)]
-    kicked = max(float(np.ptp(np.maximum(e[:, 1], e[0, 1]))) / lift(i) for i, a in beside for e in (naive(i, a),))
+    kicked = max(float(np.ptp(np.maximum(e[:, 1], e[0, 1]))) / lift(i) for i, a in beside for e in (baseline(i, a),))
     rows = [
         Row("leaning", ours, "angle at which it topples, set down at rest, less atan(base / height) [rad]", EXACT,
             "what grows to a tenth of a radian in 5 s; the depth of the feet does not enter: their force goes "
             "through the centre of mass",
-            max(error(i, STEP, falls, 34) for i in AXES), euler, max(error(i, STEP, naive_falls, 16) for i in AXES)),
+            max(error(i, STEP, falls, 34) for i in AXES), euler, max(error(i, STEP, baseline_falls, 16) for i in AXES)),
         Row("pushed", ours, "rate at which it topples, standing, relative to that of equal energies", PUSHED,
             "the energy of the feet's springs and of the depth to which it stands, 5 of 8000 mJ",
-            rate, euler, naive_rate),
+            rate, euler, baseline_rate),
         Row("energy", ours, f"energy gained, set down {NEAR:g} rad to either side, over that of the edge", GAINED,
             "none but round-off: the ground gives nothing",
             max(gained(i, a) for i, a in beside), euler, kicked),
@@ -185,7 +185,7 @@ def course() -> Plot:
         for _ in t[1:]:
             state = run_on(p, state, 0.02)
             angles.append(2.0 * math.atan2(state.motion.attitude[1], state.motion.attitude[0]))
-        plain = naive(0, edge(0) + off)[:, 0][::20]
+        plain = baseline(0, edge(0) + off)[:, 0][::20]
         curves += [Curve(name, t, np.array(angles)), Curve(f"{name}, Euler", t[: len(plain)], plain)]
     return Plot("time [s]", "roll [rad]", curves, log_y=False)
 
@@ -195,6 +195,6 @@ def sweep() -> Sweep:
     steps = STEP * np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
     curves = [
         Curve("RK4, feet of the plant", steps, np.array([error(1, h, falls, 34) for h in steps])),
-        Curve("forward Euler", steps, np.array([error(1, h, naive_falls, 16) for h in steps])),
+        Curve("forward Euler", steps, np.array([error(1, h, baseline_falls, 16) for h in steps])),
     ]
     return Sweep("step [s]", "error of the angle at which it topples [rad]", EXACT, curves)

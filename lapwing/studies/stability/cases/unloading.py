@@ -13,7 +13,7 @@ from lapwing.studies.stability.flights import flown
 HARD = "a pack that rollers push over a door that falls open: contacts that begin, slide, stick and end"
 
 STEPS = (0.25e-3, 0.5e-3, 1e-3, 2e-3)  # [s]
-NAIVE = 0.5e-3  # [s]
+BASELINE = 0.5e-3  # [s]
 BOUND = 1e-5  # [m]
 TAKEN = 4.9  # [s] just before somebody takes it away
 
@@ -30,7 +30,7 @@ def off(step: float) -> float:
     return float(np.linalg.norm(end(step) - end(STEPS[0], "solver.accuracy=1e-8")))
 
 
-def naive(step: float) -> float:
+def baseline(step: float) -> float:
     """Return the position error of steps without error control; infinite if the run ends with an error."""
     p, start = unloading.system(load("unload"))
     try:
@@ -50,7 +50,7 @@ def run() -> CaseResult:
         "the tolerance of a part of a step",
         max(off(step) for step in STEPS),
         "RK4 at 0.5 ms as it is",
-        naive(NAIVE),
+        baseline(BASELINE),
     )
     return CaseResult([row], sweep().plot())
 
@@ -60,6 +60,6 @@ def sweep() -> Sweep:
     steps = np.array(STEPS)
     curves = [
         Curve("RK4, error controlled", steps, np.array([off(float(step)) for step in steps])),
-        Curve("RK4 as it is", steps, np.array([naive(float(step)) for step in steps])),
+        Curve("RK4 as it is", steps, np.array([baseline(float(step)) for step in steps])),
     ]
     return Sweep("step [s]", "distance from the end at an accuracy of 1e-8 [m]", BOUND, curves)
