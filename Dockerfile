@@ -49,7 +49,7 @@ CMD ["lapwing", "--help"]
 
 FROM packages AS built
 # The command, which finds the sources in /app.
-COPY pyproject.toml README.md ./
+COPY pyproject.toml README.md LICENSE ./
 RUN pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps --no-build-isolation --no-index \
         --no-cache-dir --no-warn-script-location --config-settings editable_mode=compat --editable . && \
     mkdir -p /image/app && cp -rp /image/opt/lapwing/. /opt/lapwing/

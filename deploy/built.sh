@@ -2,7 +2,7 @@
 # Build step of the Dockerfile: all that images have besides packages, to /image: sources, command, kernels.
 set -eu
 
-for name in pyproject.toml README.md messages services lapwing; do
+for name in pyproject.toml README.md LICENSE messages services lapwing; do
     cp -rp "/build/$name" /image/app/
 done
 mkdir -p /image/app/recordings "/image$LAPWING_CACHE"
