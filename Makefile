@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test test-all check stability fuzz bench docs wheel release sbom audit docker-build docker-test clean
+.PHONY: mission test test-all check stability compatibility fuzz bench docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints.
@@ -45,6 +45,10 @@ check: $(VENV)/.installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest tests/contracts/test_imports.py
+
+# Flies scene hover with the oldest and the newest dependencies that pyproject.toml allows.
+compatibility:
+	$(PYTHON) deploy/compatibility.py --python $(PYTHON)
 
 stability: $(VENV)/.installed
 	$(BIN)/lapwing stability
