@@ -20,7 +20,7 @@ from lapwing.studies.campaign.runs import row_of
 from lapwing.studies.flight_data import FlightData
 
 SCENE = "delivery_mission"
-VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.wind_random.mean.0": parse("uniform(0, 12)")}
+VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.random_wind_force.mean.0": parse("uniform(0, 12)")}
 FLIGHT = "flight"
 PARTS = {
     "scene and set-up": (campaign_runs, "setup_of"),

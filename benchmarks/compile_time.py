@@ -8,7 +8,7 @@ import sys
 
 from benchmarks._targets import Row, empty_cache, show
 
-DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.wind_random.beside_drag": True}
+DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.random_wind_force.allow_body_drag": True}
 EULER = {"vehicle.model": "multibody", "multibody.coordinates": "euler", "run.duration": 0.1}
 # What is flown: the function of `lapwing` and its arguments, and the bar [s]; those of one group share a cache.
 GROUPS = (

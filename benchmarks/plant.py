@@ -37,22 +37,22 @@ BARE = {"gravity": {}, "rotor_thrust": {}}
 MISSION = BARE | {
     "air_density": {},
     "gyroscopic_torque": {},
-    "wind_random": {"mean": [3.0, 1.0, 0.0]},
+    "random_wind_force": {"mean": [3.0, 1.0, 0.0]},
     "ground_contact": {},
 }
 EXCLUDED = (  # another one of their kind is among the rest, or the drone cannot have them
-    "battery_thevenin", "coaxial_wash", "gravity", "induced_velocity", "rotor_quadratic", "rotor_table",
+    "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "rotor_quadratic", "rotor_table",
     "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
 ALL = {name: {} for name in effects.names() if name not in EXCLUDED} | {
-    "carried_load": {"mass": 2.0, "length": 3.0},
+    "shared_slung_load": {"mass": 2.0, "length": 3.0},
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_boundary_layer": {"speed": 5.0},
-    "wind_random": {"beside_drag": True},
+    "random_wind_force": {"allow_body_drag": True},
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 1.0, "duration": 1.0},
     "wind_dryden": {"wind_speed": 5.0, "airspeed": 5.0},
-    "payload": {"release_time": 1.0},
-    "rotor_damage": {"rotor": 1, "time": 1.0, "remaining_thrust": 0.95, "torque_left": 0.95},
+    "payload_release": {"release_time": 1.0},
+    "rotor_damage": {"rotor": 1, "time": 1.0, "remaining_thrust": 0.95, "remaining_torque": 0.95},
 }
 
 

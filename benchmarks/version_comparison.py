@@ -107,10 +107,11 @@ def versions(folder):
     subprocess.run(["git", "checkout", "--quiet", FIRST], cwd=first, check=True)
     subprocess.run(["make", "--silent", ".venv/.installed"], cwd=first, check=True)
     drag = ["--set", "effects.body_drag.area=[0.06,0.06,0.06]"]
+    beside = ["--set", "effects.random_wind_force.allow_body_drag=true"]
     return (
         Version(first, [str(first / ".venv/bin/lapwing")], ["--space", "benchmark"], drag, ["--seeds", "1"],
                 ("single", "processes")),
-        Version(ROOT, LAPWING, ["--key-prefix", "benchmark"], [*drag, "--set", "effects.wind_random.beside_drag=true"],
+        Version(ROOT, LAPWING, ["--key-prefix", "benchmark"], [*drag, *beside],
                 ["--runs", "1", "--workers", "1", "--out", "{folder}/campaign"],
                 ("single-process", "multi-process")),
     )  # fmt: skip

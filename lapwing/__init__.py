@@ -3,7 +3,7 @@
 ```python
 import lapwing
 
-scene = lapwing.load_scene("delivery_mission", {"effects.wind_random.mean": (3.0, 1.0, 0.0)})
+scene = lapwing.load_scene("delivery_mission", {"effects.random_wind_force.mean": (3.0, 1.0, 0.0)})
 flight = lapwing.fly(scene, seed=7)
 flight.rmse, flight.truth.position, flight.report("flight.html")
 ```

@@ -23,8 +23,8 @@ def load_scene(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
 
     Args:
         scene: path of its TOML file, or the name of one that ships: "hover"; or a loaded one, to override more of it.
-        overrides: values by dotted key, {"effects.wind_random.mean": (3.0, 1.0, 0.0)}, or texts "KEY=VALUE"; of any key
-            that the scene resolves to, "airframe.rotors.inertia" too. Units are those of the scene reference: SI.
+        overrides: values by dotted key, {"effects.random_wind_force.mean": (3.0, 1.0, 0.0)}, or texts "KEY=VALUE"; of
+            any key that the scene resolves to, "airframe.rotors.inertia" too. Units: SI.
 
     Raises:
         SceneError: what is wrong with which key, and what would be right.

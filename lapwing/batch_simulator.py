@@ -229,7 +229,9 @@ def _plant(scene: Scene) -> PlantSetup:
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
         raise SceneError("vehicle.model", f"got {plant.model!r}", '"reduced", the only one that batches step')
     if plant.others:
-        raise SceneError("effects.carried_load", "batches step vehicles without what they carry", "a scene without it")
+        raise SceneError(
+            "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"
+        )
     return plant
 
 

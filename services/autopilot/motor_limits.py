@@ -9,12 +9,12 @@ from lapwing.services.common.vehicle_schema import Effects, airframe
 
 
 def check(scene: Scene, known: Airframe) -> None:
-    """Check current, power and voltage of a motor in hover if `motor_electrics` is active (theory.md, eq. (2.9)).
+    """Check current, power and voltage of a motor in hover if `dc_motor` is active (theory.md, eq. (2.9)).
 
     Raises:
         ConfigError: a limit is exceeded.
     """
-    if "motor_electrics" not in scene[Effects].tables:
+    if "dc_motor" not in scene[Effects].tables:
         return
     frame = airframe(scene)
     motor, constant = frame.motor, frame.motor.rotor_constant

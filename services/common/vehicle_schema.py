@@ -11,7 +11,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import density
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import WakeSlopes
-from lapwing.dynamics.effects.coaxial_wash import CoaxialWash
+from lapwing.dynamics.effects.coaxial_interference import CoaxialInterference
 from lapwing.dynamics.effects.rotor_quadratic import RotorQuadratic
 from lapwing.dynamics.effects.rotor_table import RotorTable
 from lapwing.dynamics.effects.rotor_thrust import RotorThrust
@@ -173,8 +173,8 @@ def thrust_coefficient(scene: Scene) -> float:
 
 
 def wake_slopes(scene: Scene) -> WakeSlopes:
-    """Return the coupling of the rotors' loads by `coaxial_wash`, empty if the scene does not use it."""
-    return next((e.slopes() for e in active(scene) if isinstance(e, CoaxialWash)), WakeSlopes())
+    """Return the coupling of the rotors' loads by `coaxial_interference`, empty if the scene does not use it."""
+    return next((e.slopes() for e in active(scene) if isinstance(e, CoaxialInterference)), WakeSlopes())
 
 
 def gravity(scene: Scene) -> float:

@@ -4,7 +4,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics.atmosphere import FREEZING, temperature
 from lapwing.dynamics.effects import battery
 from lapwing.dynamics.effects.battery_thevenin import BatteryThevenin
-from lapwing.dynamics.effects.payload import Payload
+from lapwing.dynamics.effects.payload_release import PayloadRelease
 from lapwing.kernels import python_function
 from lapwing.services.common.autopilot_parameters import table
 from lapwing.services.common.communication_schema import Communication
@@ -40,7 +40,7 @@ def describe(scene: Scene) -> VehicleDescription:
         ray_deg=_ray(scene) if "rangefinder" in sensors else (0.0, -90.0),
         flow_interval=1.0 / scene.lookup("sensors.optical_flow.rate") if "optical_flow" in sensors else 0.0,
         parameters=tuple(table(scene).values()),
-        gripper=any(isinstance(effect, Payload) for effect in active(scene)),
+        gripper=any(isinstance(effect, PayloadRelease) for effect in active(scene)),
         accepts_commands=scene.lookup("autopilot.operator"),
         tick_ns=scene[Communication].interval_ns,
     )
@@ -56,5 +56,5 @@ def _battery(scene: Scene) -> Battery | None:
         if isinstance(effect, battery.Battery | BatteryThevenin):
             cells = round(effect.cells)
             charged = python_function(battery.open_circuit_voltage)(1.0)
-            return Battery(cells, effect.capacity, effect.resistance, charged, effect.cut_off / cells)
+            return Battery(cells, effect.capacity, effect.resistance, charged, effect.cutoff_voltage / cells)
     return None

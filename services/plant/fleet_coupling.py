@@ -10,8 +10,8 @@ from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._vehicle_interaction import interacts, presence
-from lapwing.dynamics.effects.carried_load import CarriedLoad
 from lapwing.dynamics.effects.collision import Collision
+from lapwing.dynamics.effects.shared_slung_load import SharedSlungLoad
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, norm, subtract
@@ -75,7 +75,7 @@ def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -
 
 
 def _sling(given: ServiceConfig) -> Sling | None:
-    return next((e.sling for e in effects_of(given) if isinstance(e, CarriedLoad)), None)
+    return next((e.sling for e in effects_of(given) if isinstance(e, SharedSlungLoad)), None)
 
 
 def _without_bodies(given: ServiceConfig) -> ServiceConfig:
@@ -96,12 +96,12 @@ def _load(
                                   ("drag_area", first.drag_area, carriers[name].drag_area)):  # fmt: skip
             if ours != theirs:
                 message = f"got {theirs:g}, and {owner} has {ours:g}: they carry the same load"
-                raise ConfigError(f"{keys[name]}effects.carried_load.{key}", message, f"{ours:g}")
+                raise ConfigError(f"{keys[name]}effects.shared_slung_load.{key}", message, f"{ours:g}")
     hooks_world = {name: _hook(shares[name], sling) for name, sling in carriers.items()}
     x, y = (sum(hook[i] for hook in hooks_world.values()) / len(carriers) for i in (0, 1))
     start = LoadMotion((x, y, surface(first.terrain, x, y)[0]), ZERO)
     for name, sling in carriers.items():
-        key, away = f"{keys[name]}effects.carried_load", norm(subtract(hooks_world[name], start.load_position))
+        key, away = f"{keys[name]}effects.shared_slung_load", norm(subtract(hooks_world[name], start.load_position))
         if away > sling.length:
             message = f"got {sling.length:g} m, and the load stands {away:.2f} m away, in the middle of its carriers"
             raise ConfigError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles that stand nearer")

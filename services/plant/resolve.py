@@ -8,7 +8,7 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
-from lapwing.dynamics.effects.carried_load import CarriedLoad
+from lapwing.dynamics.effects.shared_slung_load import SharedSlungLoad
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Rates
@@ -26,9 +26,11 @@ def resolve(scene: Scene) -> ServiceConfig:
     found = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
     if scene[Rates].contact is not None:
         found = _with_contact(scene, found)
-    if any(isinstance(e, CarriedLoad) for e in fleet_coupling.effects_of(found)):
+    if any(isinstance(e, SharedSlungLoad) for e in fleet_coupling.effects_of(found)):
         if any(port.name == ports.BODIES for port in found.ports):
-            raise ConfigError("effects.carried_load", f"the model {model} tells of bodies of its own", "another model")
+            raise ConfigError(
+                "effects.shared_slung_load", f"the model {model} tells of bodies of its own", "another model"
+            )
         plant = found.parameters
         parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
         return ServiceConfig(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))

@@ -30,7 +30,7 @@ NEEDED = {  # the keys that a scene cannot leave out
     "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
     "rotor_damage": {"rotor": 1},
     "rotor_table": {"advance": [0.0, 0.2], "thrust": [[0.1, 0.08]], "power": [[0.04, 0.038]]},
-    "carried_load": {"mass": 2.0, "length": 3.0},
+    "shared_slung_load": {"mass": 2.0, "length": 3.0},
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_dryden": {"wind_speed": 5.0},
     "wind_dryden_rates": {"wind_speed": 5.0},
@@ -39,7 +39,7 @@ NEEDED = {  # the keys that a scene cannot leave out
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 0.0, "duration": 1.0},
 }
 OTHERS = (  # of which another is among them
-    "battery_thevenin", "coaxial_wash", "gravity", "induced_velocity", "rotor_quadratic", "rotor_table",
+    "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "rotor_quadratic", "rotor_table",
     "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
 COAXIAL = DRONE.model_copy(
@@ -49,9 +49,9 @@ COAXIAL = DRONE.model_copy(
         )
     }
 )
-FRAMES = {"coaxial_wash": COAXIAL}  # of effects that the drone cannot have
-BESIDE = {"coaxial_wash": {"rotor_thrust": {}}}  # what an effect goes with
-FREE = {**NEEDED, "wind_random": {"beside_drag": True}}
+FRAMES = {"coaxial_interference": COAXIAL}  # of effects that the drone cannot have
+BESIDE = {"coaxial_interference": {"rotor_thrust": {}}}  # what an effect goes with
+FREE = {**NEEDED, "random_wind_force": {"allow_body_drag": True}}
 ALL = {name: FREE.get(name, {}) for name in effects.names() if name not in OTHERS}
 
 
@@ -117,8 +117,8 @@ def test_says_the_whole_range_whatever_is_wrong_with_a_number():
         (-1.0, "got -1.0"),
     ):
         with pytest.raises(ValueError) as error:
-            effects.from_scene({"battery": {"charge": charge}}, DRONE)
-        assert str(error.value) == f"effects.battery.charge: expected a number above 0 and at most 1, {wrong}"
+            effects.from_scene({"battery": {"initial_charge": charge}}, DRONE)
+        assert str(error.value) == f"effects.battery.initial_charge: expected a number above 0 and at most 1, {wrong}"
     with pytest.raises(ValueError, match=r"start: missing; expected a number at least 0"):
         effects.from_scene({"wind_gust": {"peak": [1.0, 0.0, 0.0]}}, DRONE)
 

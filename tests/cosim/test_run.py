@@ -157,7 +157,7 @@ def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_p
 
 
 def test_another_seed_gives_other_bits(tmp_path):
-    wind = "effects.wind_random={mean=[1.0, 0.0, 0.0], sigma=0.5}"
+    wind = "effects.random_wind_force={mean=[1.0, 0.0, 0.0], sigma=0.5}"
     assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
     with LogReader(tmp_path / "single.mcap") as log:
@@ -166,7 +166,7 @@ def test_another_seed_gives_other_bits(tmp_path):
 
 
 IDLE = [
-    "effects.payload={}",  # kept
+    "effects.payload_release={}",  # kept
     "effects.rotor_damage={rotor=1,time=100.0}",  # after the end
     "effects.wind_gust={peak=[9.0,0.0,0.0],start=100.0,duration=1.0}",
 ]
@@ -174,8 +174,8 @@ IDLE = [
 
 def test_effects_that_have_nothing_to_do_leave_every_recorded_bit(tmp_path):
     """The same log as if they had never been named, the random wind of another effect included."""
-    windy = single(tmp_path, "effects.wind_random={}")
-    assert single(tmp_path, "effects.wind_random={}", *IDLE) == windy
+    windy = single(tmp_path, "effects.random_wind_force={}")
+    assert single(tmp_path, "effects.random_wind_force={}", *IDLE) == windy
     assert single(tmp_path) != windy
 
 

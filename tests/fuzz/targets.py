@@ -29,7 +29,7 @@ trajectory.phase = [{ name = "up", z = { kind = "ramp", to = 1e1, rate = 1 } }]
     b"""run.duration = 2
 [vehicle]
 airframe = "delivery_drone"
-[effects.wind_random]
+[effects.random_wind_force]
 mean = [3.0, 1.0, 0]
 [sensors.imu]
 preset = "mpu6000"

@@ -13,9 +13,9 @@ from lapwing.kernels.row_packing import pack_row
 from lapwing.services.scene_resolver import load, resolve
 
 N = 19  # more than a block, less than two
-LOADED = ["effects.carried_load.mass=1.0", "effects.carried_load.length=1.0"]
+LOADED = ["effects.shared_slung_load.mass=1.0", "effects.shared_slung_load.length=1.0"]
 MISSION = "delivery_mission"  # random wind, ground contact, air density
-VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.wind_random.sigma": lapwing.uniform(0.0, 2.0)}
+VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.random_wind_force.sigma": lapwing.uniform(0.0, 2.0)}
 
 
 @kernel
@@ -94,7 +94,7 @@ def test_body_rates_are_followed_and_thrust_holds_the_weight():
         (lambda b: lapwing.BatchSimulator("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
         (
             lambda b: lapwing.BatchSimulator("hover", 2, overrides=LOADED),
-            "effects.carried_load: .*what they carry",
+            "effects.shared_slung_load: .*what they carry",
         ),
         (lambda b: b.step(), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(thrust=np.zeros(N)), "step: expected motor_voltages, or thrust and body_rates"),

@@ -41,8 +41,8 @@ WRONG = {
     "key": ("run.sed", 1),
     "effect": ("effects.gravty", {}),
     "effect's key": ("effects.gravity.g", 9.81),
-    "effect's bound": ("effects.wind_random.sigma", -1.0),
-    "effect's length": ("effects.wind_random.mean", [1.0, 2.0]),
+    "effect's bound": ("effects.random_wind_force.sigma", -1.0),
+    "effect's length": ("effects.random_wind_force.mean", [1.0, 2.0]),
     "sensor": ("sensors.imuu", {}),
     "preset": ("sensors.imu.preset", "mpu"),
     "sensor's key": ("sensors.imu.gyro", {"noise": 0.1}),
@@ -85,7 +85,7 @@ RIGHT = {
     "a file of parameters": ("autopilot.parameters", "mine.params"),
     "several segments": ("trajectory.phase.0.x", [{"kind": "hold", "duration": 1.0}, {"kind": "step", "to": 0.1}]),
     "a file of points": ("trajectory.phase.0.x", {"kind": "table", "file": "points.csv"}),
-    "whole numbers": ("effects.wind_random.mean", [3, 1, 0]),
+    "whole numbers": ("effects.random_wind_force.mean", [3, 1, 0]),
 }
 
 
@@ -103,7 +103,7 @@ def test_a_misspelt_key_of_an_airframe_or_gain_set_is_invalid():
 
 
 def test_keys_are_explained():
-    keys = VALIDATORS["scene"].schema["properties"]["effects"]["properties"]["wind_random"]["properties"]
+    keys = VALIDATORS["scene"].schema["properties"]["effects"]["properties"]["random_wind_force"]["properties"]
     assert keys["mean"]["description"] == "[m/s] world"
     assert keys["sigma"]["default"] == 1.0
 

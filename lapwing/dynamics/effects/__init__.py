@@ -24,6 +24,19 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 __all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
 
+# Effects are evaluated in the order of these keys, by default their names. Sums round differently in another order, so
+# an effect that is renamed keeps its key.
+_ORDER = {
+    "axial_inflow": "rotor_inflow",
+    "coaxial_interference": "coaxial_wash",
+    "dc_motor": "motor_electrics",
+    "downwash": "rotor_wash",
+    "dynamic_inflow": "induced_velocity",
+    "payload_release": "payload",
+    "random_wind_force": "wind_random",
+    "shared_slung_load": "carried_load",
+}
+
 
 def names() -> list[str]:
     """Every effect's name: its file name."""
@@ -62,7 +75,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
 
 
 def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment: Environment = STANDARD) -> tuple:
-    """The active effects of a scene, sorted by name, from the table of each.
+    """Return the active effects of a scene in the order of evaluation, from the table of each.
 
     Raises:
         KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
@@ -70,7 +83,7 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment:
     """
     active = []
     kinds: dict[str, str] = {}
-    for name in sorted(tables):
+    for name in sorted(tables, key=lambda name: _ORDER.get(name, name)):
         table = dict(tables[name])
         module = table.pop("module", None)
         kind = getattr(get(name, module), "KIND", name)

@@ -22,15 +22,17 @@ Slip = Annotated[float, Ge(1e-6), Le(10)]
 class Settings(NamedTuple):
     """What a scene says."""
 
-    friction: Literal["anchor", "smooth"] = "anchor"  # a spring to where the foot stands, or a function of its slip
+    friction: Literal["stick_slip", "regularised"] = (
+        "stick_slip"  # a spring to where the foot stands, or a function of its slip
+    )
     stiffness: Stiffness = 1.0e6  # [N/m] of one foot
     damping: Annotated[float, Ge(0), Le(1e6)] = 1.0e3  # [N s/m] of one foot
     transition_width: Annotated[float, Ge(1e-7), Le(0.1)] = 1.0e-4  # [m] depth over which the normal force sets in
     friction_static: Coefficient = 0.5  # coefficient of a foot that sticks
     friction_dynamic: Coefficient = 0.3  # coefficient of a foot that slides
-    tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "anchor"
-    stick_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "anchor"
-    critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "smooth"
+    tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "stick_slip"
+    stiction_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "stick_slip"
+    critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "regularised"
 
 
 class GroundContact(NamedTuple):
@@ -51,7 +53,7 @@ class GroundContact(NamedTuple):
     static: float
     dynamic: float
     tangential_stiffness: float  # [N/m]
-    square_stick_velocity: float  # [m^2/s^2]
+    square_stiction_velocity: float  # [m^2/s^2]
     rate_bound: float  # [1/s] of the fastest mode in contact
 
     @classmethod
@@ -67,13 +69,13 @@ class GroundContact(NamedTuple):
             LEVEL, feet, _reach(feet), given.stiffness, given.damping, 1.0 / given.transition_width,
             given.friction_static, given.friction_dynamic,
         )  # fmt: skip
-        if given.friction == "smooth":
+        if given.friction == "regularised":
             rate = _rate_bound(airframe, points.feet, (given.stiffness, 0.0), (given.damping, 0.0))
             return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
         rate = _rate_bound(
             airframe, points.feet, (given.stiffness, given.tangential_stiffness), (given.damping, given.damping)
         )
-        return cls(*common, given.tangential_stiffness, given.stick_velocity**2, rate)
+        return cls(*common, given.tangential_stiffness, given.stiction_velocity**2, rate)
 
     def in_environment(self, environment: Environment) -> "GroundContact":
         """On the ground that is there."""

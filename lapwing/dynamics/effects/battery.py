@@ -20,8 +20,10 @@ KIND = "battery model"
 class Settings(NamedTuple):
     """What a scene says."""
 
-    charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
-    cut_off: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop for good
+    initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
+    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = (
+        3.0  # [V] of one cell, below which the controllers stop for good
+    )
 
 
 class Battery(NamedTuple):
@@ -35,8 +37,8 @@ class Battery(NamedTuple):
     cells: float
     capacity: float  # [A s]
     resistance: float  # [ohm] of all cells
-    charge: float  # at the start
-    cut_off: float  # [V] of all cells
+    initial_charge: float  # fraction
+    cutoff_voltage: float  # [V] of all cells
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
@@ -44,11 +46,13 @@ class Battery(NamedTuple):
         given = checked(Settings, table)
         pack = airframe.battery or cannot("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
-        return cls(float(pack.cells), pack.capacity, resistance, given.charge, pack.cells * given.cut_off)
+        return cls(
+            float(pack.cells), pack.capacity, resistance, given.initial_charge, pack.cells * given.cutoff_voltage
+        )
 
     def initial_memory(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
-        return (self.charge, self.cells * python_function(open_circuit_voltage)(self.charge), 0.0)
+        return (self.initial_charge, self.cells * python_function(open_circuit_voltage)(self.initial_charge), 0.0)
 
 
 @always_inline
@@ -72,7 +76,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     current = total(rotors.power) / voltage
     charge = max(charge - current * interval / e.capacity, 0.0)
     voltage = e.cells * open_circuit_voltage(charge) - e.resistance * current
-    return (charge, voltage if voltage > e.cut_off else 0.0, current)
+    return (charge, voltage if voltage > e.cutoff_voltage else 0.0, current)
 
 
 @supply(Battery)

@@ -30,8 +30,8 @@ Time = Annotated[float, Ge(0.1), Le(1e4)]
 class Settings(NamedTuple):
     """What a scene says."""
 
-    charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
-    cut_off: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop
+    initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
+    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop
     restart: Annotated[float, Ge(2.5), Le(4.2)] | None = None  # [V] above which they start again; never if left out
     transient_resistance: tuple[Resistance, Resistance] | None = None  # [ohm] of a cell; by its ohmic one if left out
     transient_time: tuple[Time, Time] = (32.9, 223.0)  # [s] of the two
@@ -57,8 +57,8 @@ class BatteryThevenin(NamedTuple):
     slow: float  # [ohm] of the second
     fast_time: float  # [s]
     slow_time: float  # [s]
-    charge: float  # at the start
-    cut_off: float  # [V] of all cells
+    initial_charge: float  # fraction
+    cutoff_voltage: float  # [V] of all cells
     restart: float  # [V] of all cells, inf: never
     activation: float  # [K]
     heat_capacity: float  # [J/K]
@@ -72,15 +72,17 @@ class BatteryThevenin(NamedTuple):
         """From the airframe's battery."""
         given = checked(Settings, table)
         pack = airframe.battery or cannot("the vehicle has no [battery]")
-        if given.restart is not None and given.restart <= given.cut_off:
-            raise ConfigError("restart", f"got {given.restart:g} V", f"more than cut_off = {given.cut_off:g} V")
+        if given.restart is not None and given.restart <= given.cutoff_voltage:
+            raise ConfigError(
+                "restart", f"got {given.restart:g} V", f"more than cutoff_voltage = {given.cutoff_voltage:g} V"
+            )
         n, ohmic = pack.cells, pack.cell_resistance
         fast, slow = given.transient_resistance or (0.627 * ohmic, 0.669 * ohmic)
         heat = given.heat_capacity or n * NOMINAL_VOLTAGE * pack.capacity * HEAT_PER_ENERGY
         restart = math.inf if given.restart is None else n * given.restart
         return cls(
-            float(n), pack.capacity, n * ohmic, n * fast, n * slow, *given.transient_time, given.charge,
-            n * given.cut_off, restart, given.activation, heat, given.cooling_time,
+            float(n), pack.capacity, n * ohmic, n * fast, n * slow, *given.transient_time, given.initial_charge,
+            n * given.cutoff_voltage, restart, given.activation, heat, given.cooling_time,
             given.temperature or REFERENCE, given_temperature=given.temperature is not None,
         )  # fmt: skip
 
@@ -91,7 +93,15 @@ class BatteryThevenin(NamedTuple):
 
     def initial_memory(self) -> tuple[float, float, float, float, float, float, float]:
         """(charge, voltage [V], current [A], temperature [K], voltage over each transient [V], 1 while switched on)."""
-        return (self.charge, self.cells * open_circuit_voltage(self.charge), 0.0, self.temperature, 0.0, 0.0, 1.0)
+        return (
+            self.initial_charge,
+            self.cells * open_circuit_voltage(self.initial_charge),
+            0.0,
+            self.temperature,
+            0.0,
+            0.0,
+            1.0,
+        )
 
 
 @sample(BatteryThevenin)
@@ -110,7 +120,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     temperature = settled + cooled * (temperature - settled)
     charge = max(charge - current * interval / e.capacity, 0.0)
     voltage = e.cells * open_circuit_voltage(charge) - ohmic - fast - slow
-    on = 1.0 if voltage > (e.cut_off if on > 0.0 else e.restart) else 0.0
+    on = 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
     return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)
 
 

@@ -187,7 +187,7 @@ def _settled_four(c, feet, memory):
     how = select(over, how, STICKING)
     if any_above(over):
         # a foot that is slowing down is held by the static coefficient, one that breaks away by the dynamic one
-        caught = select(before - e.square_stick_velocity, e.square_stick_velocity, before) - square
+        caught = select(before - e.square_stiction_velocity, e.square_stiction_velocity, before) - square
         spring = _spring(e, anchor, foot)
         pull, limit = sqrt(dot(spring, spring)), select(caught, e.static, e.dynamic) * foot.press
         kept = select(pull - limit, limit / pull, 1.0)

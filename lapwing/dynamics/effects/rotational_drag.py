@@ -25,7 +25,7 @@ class RotationalDrag(NamedTuple):
 
     It lumps the damping of the rotors, whose inflow changes as the vehicle rolls and pitches, and of the fuselage.
     Source: the damping derivatives L_p, M_q, N_r of flight mechanics; identified from flights. Valid for rates at
-    which the inflow stays small beside the induced velocity. Beside `rotor_inflow` it adds to the damping there.
+    which the inflow stays small beside the induced velocity. Beside `axial_inflow` it adds to the damping there.
     """
 
     linear: Vec3  # [N m s/rad]

@@ -21,7 +21,7 @@ class Settings(NamedTuple):
     rotor: Annotated[int, Gt(0)]  # number of the rotor, from 1
     time: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
     remaining_thrust: Annotated[float, Ge(0), Le(1)] = 0.0  # fraction
-    torque_left: Annotated[float, Ge(0), Le(2)] = 0.0  # fraction; a torn blade may drag more
+    remaining_torque: Annotated[float, Ge(0), Le(2)] = 0.0  # fraction; a torn blade may drag more
 
 
 class RotorDamage(NamedTuple):
@@ -33,7 +33,7 @@ class RotorDamage(NamedTuple):
 
     time: float  # [s]
     remaining_thrust: tuple[float, ...]  # fraction of each rotor
-    torque_left: tuple[float, ...]
+    remaining_torque: tuple[float, ...]
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
@@ -46,11 +46,11 @@ class RotorDamage(NamedTuple):
         def only_this(left):
             return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))
 
-        return cls(given.time, only_this(given.remaining_thrust), only_this(given.torque_left))
+        return cls(given.time, only_this(given.remaining_thrust), only_this(given.remaining_torque))
 
     def initial_memory(self) -> tuple[PerRotor, PerRotor]:
         """Fractions of thrust and torque in force."""
-        return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.torque_left)
+        return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.remaining_torque)
 
 
 @always_inline
@@ -61,7 +61,7 @@ def _product(_, a, b):
 @sample(RotorDamage)
 def strike(e, memory, s, rotors, key, tick, interval):
     """The fractions for the next interval."""
-    return (e.remaining_thrust, e.torque_left) if s.t >= e.time else memory
+    return (e.remaining_thrust, e.remaining_torque) if s.t >= e.time else memory
 
 
 @factors(RotorDamage)

@@ -22,7 +22,7 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-INSTEAD_OF = ("rotor_thrust", "rotor_quadratic", "rotor_inflow", "induced_velocity")
+INSTEAD_OF = ("rotor_thrust", "rotor_quadratic", "axial_inflow", "dynamic_inflow")
 WIDEST = 0.25  # of J between two rows
 LEAST_TURNS = 1e-6  # [1/s] below which the advance ratio is that of this speed
 

@@ -24,7 +24,7 @@ class RotorThrust(NamedTuple):
     """Thrust and torque proportional to air density and speed squared (theory.md, eq. (2.28); (1.7) and (1.8)).
 
     Source: Pappalardo et al. 2023, section 2.6. Valid at rest and for advance ratios well below pitch over diameter;
-    add `rotor_inflow` beyond that.
+    add `axial_inflow` beyond that.
     """
 
     thrust_constant: float  # [m^4/rad^2] C_T D^4 / (4 pi^2)

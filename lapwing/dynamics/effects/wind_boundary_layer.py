@@ -19,7 +19,9 @@ class Settings(NamedTuple):
     """What a scene says."""
 
     speed: Annotated[float, Gt(0), Le(60)]  # [m/s] at the reference height
-    heading: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] in which the air goes, 0 to the east
+    direction_to: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = (
+        0.0  # [rad] in which the air goes, 0 to the east
+    )
     height: Annotated[float, Ge(1), Le(200)] = 10.0  # [m] over the ground, of reference
     roughness: Annotated[float, Ge(1e-5), Le(3)] = 0.03  # [m] length: sea 0.0002, mown grass 0.01, crops 0.1, town 1
 
@@ -40,7 +42,7 @@ class WindBoundaryLayer(NamedTuple):
         """Over level ground."""
         given = checked(Settings, table)
         scale = given.speed / math.log1p(given.height / given.roughness)
-        return cls((scale * math.cos(given.heading), scale * math.sin(given.heading)), 1.0 / given.roughness)
+        return cls((scale * math.cos(given.direction_to), scale * math.sin(given.direction_to)), 1.0 / given.roughness)
 
     def in_environment(self, environment: Environment) -> "WindBoundaryLayer":
         """Over the ground that is there."""

@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from lapwing.dynamics import atmosphere
 from lapwing.dynamics.atmosphere import Atmosphere
-from lapwing.dynamics.effects.coaxial_wash import CoaxialWash, stacked
+from lapwing.dynamics.effects.coaxial_interference import CoaxialInterference, stacked
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.airframe_tables import Motor
@@ -57,7 +57,7 @@ class Rotor(NamedTuple):
     pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
     parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
     drag: float = 0.0  # [m^3/rad] across the axis, over density, rotor speed and velocity
-    wash: CoaxialWash | None = None  # what those lose that stand in the wake of others
+    wash: CoaxialInterference | None = None  # what those lose that stand in the wake of others
 
     def constants(self, density: float) -> tuple[float, float]:
         """Thrust and torque over the square of the speed at a density [kg/m^3]."""
@@ -65,7 +65,7 @@ class Rotor(NamedTuple):
         return factor * self.thrust, factor * self.torque
 
     def gains(self, count: int, density: float, speed: float, axial: float = 0.0, across: float = 0.0) -> list[Gain]:
-        """What each of `count` rotors gains in the wake of another one; arguments as of `CoaxialWash.changes`."""
+        """Return the gain of each of `count` rotors in a wake; see `CoaxialInterference.changes` for arguments."""
         changes = self.wash.changes(speed, axial, across) if self.wash else [(0.0, 0.0)] * count
         return [Gain(density * thrust, density * torque) for thrust, torque in changes]
 
@@ -85,7 +85,7 @@ def rotor_of(airframe: Airframe) -> Rotor:
         pitch=propeller.pitch,
         parts=drag_coefficients(propeller),
         drag=h_force_coefficient(propeller),
-        wash=CoaxialWash.from_scene({}, airframe) if stacked(airframe) else None,
+        wash=CoaxialInterference.from_scene({}, airframe) if stacked(airframe) else None,
     )
 
 

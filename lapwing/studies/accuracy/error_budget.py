@@ -105,8 +105,8 @@ def _duration(scene: Scene) -> float:
 def _clean(scene: Scene) -> list[str]:
     """Overrides that take the noise out."""
     found = ["autopilot.estimator=truth"] if scene.has("autopilot") else []
-    if "wind_random" in scene.tables("effects"):
-        found.append("effects.wind_random.sigma=0.0")
+    if "random_wind_force" in scene.tables("effects"):
+        found.append("effects.random_wind_force.sigma=0.0")
     return found
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from numba import types
 
-from lapwing.dynamics.effects.payload import RELEASED, Payload
+from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.kernels.codegen import compile_source, overload_for
 
 
@@ -15,7 +15,7 @@ def let_go(effects: tuple, memory: tuple) -> tuple:
 
 @overload_for(let_go, inline=True)
 def _let_go(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
-    carried = [getattr(kind, "instance_class", None) is Payload for kind in effects]
+    carried = [getattr(kind, "instance_class", None) is PayloadRelease for kind in effects]
     parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
     body = f"return ({parts})" if any(carried) else "return memory"
     return compile_source("let_go(effects, memory)", {"gone": RELEASED}, body)

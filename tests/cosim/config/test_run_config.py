@@ -35,7 +35,7 @@ def test_resolving_a_scene_twice_gives_the_same_and_an_override_another():
 
 
 def test_a_set_up_from_its_text_flies_to_the_same_digest():
-    setup = resolve(load("hover", ["run.duration=0.4", "effects.wind_random.sigma=1.0"]))
+    setup = resolve(load("hover", ["run.duration=0.4", "effects.random_wind_force.sigma=1.0"]))
     assert fly(from_json(to_json(setup))).digest == fly(setup).digest
 
 

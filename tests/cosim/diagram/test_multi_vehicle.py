@@ -21,7 +21,7 @@ from tests.cosim.parts.signals import Signals
 from tests.cosim.small_graph import graph_of
 from tests.cosim.test_agreement import fly_apart
 
-WIND = ["effects.wind_random.sigma=1.0", "effects.wind_random.beside_drag=true"]
+WIND = ["effects.random_wind_force.sigma=1.0", "effects.random_wind_force.allow_body_drag=true"]
 SHORT = ["run.duration=1.0", *WIND]
 COMMON = """
 [run]

@@ -93,9 +93,9 @@ def test_a_whole_number_will_do_for_a_real_one_and_spaces_around_the_sign_do_no_
 
 
 def test_values_by_key_do_as_well_as_texts():
-    texts = ["effects.wind_random.mean=[3, 1, 0]", "vehicle.name=a", "airframe.mass.total=9.5"]
+    texts = ["effects.random_wind_force.mean=[3, 1, 0]", "vehicle.name=a", "airframe.mass.total=9.5"]
     for mean in ((3, 1, 0), [3, 1, 0], np.array([3, 1, 0])):
-        values = {"effects.wind_random.mean": mean, "vehicle.name": "a", "airframe.mass.total": np.float64(9.5)}
+        values = {"effects.random_wind_force.mean": mean, "vehicle.name": "a", "airframe.mass.total": np.float64(9.5)}
         assert load(HOVER, values) == load(HOVER, texts)
 
 
@@ -269,7 +269,7 @@ def test_choices_are_listed():
     assert "rk4" in said(HOVER, "solver.integrator=rk5")
     assert "mpu6000" in said(DELIVERY, "sensors.imu.preset=none")
     assert "barometer" in said(DELIVERY, "sensors.compass={}")
-    assert "wind_random" in said(HOVER, "effects.wind={}")
+    assert "random_wind_force" in said(HOVER, "effects.wind={}")
     assert "paper" in said(HOVER, "autopilot.gains=none")
     assert "delivery_drone" in said(HOVER, "vehicle.airframe=none")
     assert "unloading" in said(HOVER, "vehicle.model=none")

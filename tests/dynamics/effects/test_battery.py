@@ -40,12 +40,14 @@ def test_motors_get_what_they_ask_for_or_what_there_is(drone):
 
 
 def test_cuts_off_for_good(drone, situation, rotors):
-    e = make(drone, charge=0.02, cut_off=3.3)
+    e = make(drone, initial_charge=0.02, cutoff_voltage=3.3)
     memory = discharge.py_func(e, e.initial_memory(), situation(), rotors(current=20.0), (0, 0), 0, 1.0)
     assert memory[1] == 0.0
     assert discharge.py_func(e, memory, situation(), rotors(current=0.0), (0, 0), 1, 1.0)[1] == 0.0
 
 
 def test_charge_out_of_range(drone):
-    with pytest.raises(ValueError, match=r"effects.battery.charge: expected a number above 0 and at most 1, got 1.5"):
-        make(drone, charge=1.5)
+    with pytest.raises(
+        ValueError, match=r"effects.battery.initial_charge: expected a number above 0 and at most 1, got 1.5"
+    ):
+        make(drone, initial_charge=1.5)

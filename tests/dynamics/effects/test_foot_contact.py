@@ -97,7 +97,7 @@ class Foot:
         trial, limit = self.trial(anchor)
         if dot(trial, trial) <= limit * limit:
             return (anchor[0], anchor[1], 0.0, STICKING, square)
-        caught = square < min(e.square_stick_velocity, anchor[4])
+        caught = square < min(e.square_stiction_velocity, anchor[4])
         limit, pull = (e.static if caught else e.dynamic) * self.press, norm(self.spring(anchor))
         kept = limit / pull if pull > limit else 1.0
         dragged = add(self.place, scale(kept, subtract(anchor, self.place)))
@@ -123,14 +123,14 @@ def drawn(rng, e):
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
-@pytest.mark.parametrize("law", ["anchor", "smooth"])
+@pytest.mark.parametrize("law", ["stick_slip", "regularised"])
 def test_each_foot_does_what_it_does_alone(drone, law, ground):
     (e,) = effects.from_scene({"ground_contact": {"friction": law}}, drone)
     e = e._replace(feet=(*e.feet[:4], (0.01, 0.0, -0.3501)), terrain=GROUNDS[ground])
     rng, kinds = np.random.default_rng(1), set()
     for _ in range(300):
         s, memory = drawn(rng, e)
-        (force, torque), points, touches, *settled = (anchored if law == "anchor" else smooth)(e, memory, s)
+        (force, torque), points, touches, *settled = (anchored if law == "stick_slip" else smooth)(e, memory, s)
         feet = [Foot(e, s, foot) for foot in e.feet]
         alone = [foot.force(anchor) for foot, anchor in zip(feet, memory, strict=True)]
         total, moment = ZERO, ZERO
@@ -140,7 +140,7 @@ def test_each_foot_does_what_it_does_alone(drone, law, ground):
         assert torque == apply_transposed(s.R_world_body, moment)
         assert points == tuple((foot.place, push) for foot, push in zip(feet, alone, strict=True))
         assert touches == any(foot.press > 0.0 for foot in feet)
-        if law == "anchor":
+        if law == "stick_slip":
             assert settled == [tuple(foot.settled(anchor) for foot, anchor in zip(feet, memory, strict=True))]
             kinds |= {(before[3], after[3]) for before, after in zip(memory, settled[0], strict=True)}
-    assert law == "smooth" or len(kinds) == 9  # every change between free, sticking and sliding has been seen
+    assert law == "regularised" or len(kinds) == 9  # every change between free, sticking and sliding has been seen

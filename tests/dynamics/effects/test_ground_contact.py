@@ -69,7 +69,7 @@ def test_sticks_on_a_slope_below_the_friction_angle(drone):
 def test_the_smooth_law_creeps_on_the_same_slope(drone):
     """tan 20 deg = mu_s (1.5 x - 0.5 x^3) at x = 0.54 critical velocities of 1 mm/s."""
     _, rest = settled(drone, math.radians(20))
-    p, state = setting(drone, angle=math.radians(20), friction="smooth")
+    p, state = setting(drone, angle=math.radians(20), friction="regularised")
     state = run(p, state._replace(motion=rest.motion), 1.0)
     creep = -np.dot(
         run(p, state, 1.0).motion.velocity_world, (0, math.cos(math.radians(20)), math.sin(math.radians(20)))
@@ -79,7 +79,7 @@ def test_the_smooth_law_creeps_on_the_same_slope(drone):
     assert creep == pytest.approx(0.5e-3, rel=0.1)
 
 
-@pytest.mark.parametrize("friction", ["anchor", "smooth"])
+@pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_slides_above_the_friction_angle_by_the_closed_form(drone, friction):
     """Acceleration g (sin a - mu_d cos a) once it slides."""
     angle = math.radians(30)
@@ -179,7 +179,7 @@ def test_stands_on_bumps(drone):
     assert multirotor.observe(p, 0, 0.004, state, OFF).in_contact
 
 
-@pytest.mark.parametrize("friction", ["anchor", "smooth"])
+@pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_the_splitting_of_steps_does_not_show(drone, friction):
     """A step of 4 ms, split while in contact, ends where steps of 0.25 ms do, after five bounces and a slide."""
     coarse, fine = (
@@ -230,7 +230,7 @@ def test_friction_converges_with_the_tolerance(drone):
             {"stiffness": -1.0},
             "effects.ground_contact.stiffness: expected a number above 0 and at most 1e+09",
         ),
-        ({"friction": "glue"}, "effects.ground_contact.friction: expected 'anchor' or 'smooth', got 'glue'"),
+        ({"friction": "glue"}, "effects.ground_contact.friction: expected 'stick_slip' or 'regularised', got 'glue'"),
         (
             {"friction_dynamic": 0.9},
             "effects.ground_contact.friction_dynamic: expected at most friction_static = 0.5",

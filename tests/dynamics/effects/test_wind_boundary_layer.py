@@ -7,7 +7,7 @@ from lapwing.dynamics.effects.wind_boundary_layer import wind_boundary_layer
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, relief
 
-TABLE = {"speed": 8.0, "height": 10.0, "roughness": 0.1, "heading": math.pi / 2}
+TABLE = {"speed": 8.0, "height": 10.0, "roughness": 0.1, "direction_to": math.pi / 2}
 
 
 HILL, ROOF = relief(slope=(0.1, 0.0)), relief(boxes=[(0.0, 0.0, 500.0, 500.0, 0.0, 3.0)])

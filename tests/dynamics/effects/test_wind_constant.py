@@ -14,7 +14,7 @@ def test_adds_to_the_wind(situation):
 
 def test_every_aerodynamic_effect_feels_the_motion_of_the_air(drone):
     """At rest in a wind is flying against it in still air, for drag, H-force and inflow (Galileo)."""
-    tables = {"rotor_thrust": {}, "rotor_inflow": {}, "body_drag": {}, "h_force": {}}
+    tables = {"rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     wind = (4.0, -2.0, 1.0)
     still = multirotor.parameters(drone, effects.from_scene(tables, drone))
     windy = multirotor.parameters(drone, effects.from_scene({**tables, "wind_constant": {"velocity": wind}}, drone))

@@ -103,6 +103,6 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
 
 def test_heading_turns_the_axes(drone, situation, rotors):
     along = draw(make(drone), make(drone).initial_memory(), situation(), rotors(), KEY, 0, 0.01)[1]
-    e = make(drone, heading=math.pi / 2)
+    e = make(drone, direction_to=math.pi / 2)
     turned = draw(e, e.initial_memory(), situation(), rotors(), KEY, 0, 0.01)[1]
     assert turned == pytest.approx((-along[1], along[0], along[2]))

@@ -12,7 +12,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import wind_dryden
 from lapwing.dynamics.effects._turbulence import intensity
 from lapwing.dynamics.effects._types import Air
-from lapwing.dynamics.effects.rotor_inflow import rotor_inflow
+from lapwing.dynamics.effects.axial_inflow import axial_inflow
 from lapwing.dynamics.effects.wind_dryden_rates import draw, turning, wind_dryden_rates
 from lapwing.dynamics.noise import stream_key
 from lapwing.kernels import kernel
@@ -103,11 +103,11 @@ def test_a_gust_that_rises_as_it_comes_lifts_the_bow(drone, situation, rotors):
 
 
 def test_rotors_feel_the_air_turn_as_they_feel_the_vehicle_turn(drone, situation):
-    (inflow,) = effects.from_scene({"rotor_inflow": {}}, drone)
+    (inflow,) = effects.from_scene({"axial_inflow": {}}, drone)
     s = situation(omega=(0.3, -0.2, 0.1))
     other = situation()
     other = other._replace(air_rate_body=(-0.3, 0.2, -0.1))
-    assert rotor_inflow.py_func(inflow, (), s, NO_FACTORS, NO_LOADS) == rotor_inflow.py_func(
+    assert axial_inflow.py_func(inflow, (), s, NO_FACTORS, NO_LOADS) == axial_inflow.py_func(
         inflow, (), other, NO_FACTORS, NO_LOADS
     )
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import lapwing
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects._types import body_of
-from lapwing.dynamics.effects.payload import RELEASED
+from lapwing.dynamics.effects.payload_release import RELEASED
 from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.noise import stream_key
@@ -135,7 +135,7 @@ def test_a_flight_lets_a_payload_go_that_hangs_ahead():
     flight = lapwing.fly(
         "hover",
         {"airframe.mass.total": 8.0224, "airframe.mass.payload": 0.0, "airframe.payload": box,
-         "effects.payload.release_time": 5.0, "run.duration": 20.0,
+         "effects.payload_release.release_time": 5.0, "run.duration": 20.0,
          "trajectory.phase": [
              {"name": "climb", "z": {"kind": "minimum_jerk", "to": 2.0, "duration": 3.0}},
              {"name": "hover", "duration": 9.0},
@@ -157,7 +157,7 @@ def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
     scene = load(
         "hover",
         {"airframe.mass.total": 8.0224, "airframe.mass.payload": 0.0, "airframe.payload": box,
-         "effects.payload.release_time": 0.1},
+         "effects.payload_release.release_time": 0.1},
     )  # fmt: skip
     batch = lapwing.BatchSimulator(scene, 2)
     for _ in range(50):
@@ -188,8 +188,13 @@ def test_refused_in_a_scene(overrides, message):
     [
         ({"payload": 1.0}, {}, {}, "mass.payload: expected 0, got 1 beside a table"),
         ({}, {"mass": -1.0}, {}, "payload.mass: expected a number above 0 [kg], got -1.0"),
-        ({}, {}, {"mass": 1.0}, "effects.payload.mass: stands beside the table airframe.payload; expected one of them"),
-        ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload.size: stands beside the table airframe.payload"),
+        (
+            {},
+            {},
+            {"mass": 1.0},
+            "effects.payload_release.mass: stands beside the table airframe.payload; expected one of them",
+        ),
+        ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload_release.size: stands beside the table airframe.payload"),
     ],
 )
 def test_refused(tmp_path, mass, payload, table, message):

@@ -27,7 +27,7 @@ def test_hover():
 
 def test_trim_is_where_the_plant_does_not_accelerate():
     """The plant under its own drag, H-force and inflow at the tilt and rotor speed of the card."""
-    tables = {"gravity": {}, "rotor_thrust": {}, "rotor_inflow": {}, "body_drag": {}, "h_force": {}}
+    tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
     for speed in (3.0, 12.0, 20.0):
         t = performance.trim(DRONE, speed)
@@ -128,9 +128,9 @@ def stacked(drone):
 
 @pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
 def test_the_trim_of_rotors_over_one_another_is_the_plants(speed):
-    """Under `coaxial_wash` the plant neither climbs nor sinks at the card's trim, and takes the card's current."""
+    """Under `coaxial_interference` the plant hovers at the card's trim and takes the card's current."""
     frame = stacked(DRONE)
-    tables = {"gravity": {}, "rotor_thrust": {}, "rotor_inflow": {}, "body_drag": {}, "coaxial_wash": {}}
+    tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "coaxial_interference": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     t = performance.trim(frame, speed, rotor=performance.rotor_of(frame)._replace(drag=0.0))
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), exp((0.0, t.tilt, 0.0)), t.rotor_speed, (speed, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Rotors over one another under `coaxial_wash`: what the autopilot takes them for is what the plant does."""
+"""Rotors over one another under `coaxial_interference`: what the autopilot takes them for is what the plant does."""
 
 import json
 import math
@@ -27,14 +27,16 @@ X8 = {
     "airframe.mass.total": 12.0, "airframe.mass.payload": 0.0, "airframe.mass.inertia": [0.54, 0.52, 0.84],
     "airframe.rotors.position": [[*arm, z] for arm in ARMS for z in (0.0, 0.1)],
     "airframe.rotors.spin_direction": SPINS,
-    "effects.coaxial_wash": {},
+    "effects.coaxial_interference": {},
 }  # fmt: skip
 
 
 def wrench(scene, thrust):
     """(force along body z [N], torque [N m]) of the plant at rest in the air, of thrusts that each would have alone."""
     known, frame = known_airframe(scene), airframe(scene)
-    tables = {name: table for name, table in scene[Effects].tables.items() if name in ("rotor_thrust", "coaxial_wash")}
+    tables = {
+        name: table for name, table in scene[Effects].tables.items() if name in ("rotor_thrust", "coaxial_interference")
+    }
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0))
     speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / known.motor.thrust_coefficient)))
@@ -60,7 +62,7 @@ def test_hover_is_balanced_at_one_speed_of_all_rotors():
     force, *torque = wrench(scene, [controller_parameters.hover_thrust(known)] * 8)
     assert force == pytest.approx(known.mass * known.gravity, rel=1e-12)
     assert torque == pytest.approx([0.0] * 3, abs=1e-9)
-    without = {key: value for key, value in X8.items() if key != "effects.coaxial_wash"}
+    without = {key: value for key, value in X8.items() if key != "effects.coaxial_interference"}
     alone = controller_parameters.hover_thrust(known_airframe(load("hover", without)))
     assert controller_parameters.hover_thrust(known) / alone == pytest.approx(1.39, abs=0.01)
 
@@ -77,7 +79,7 @@ def test_which_of_two_rotors_over_one_another_has_failed_is_not_guessed():
 
 def test_a_vehicle_that_only_the_lost_thrust_would_carry_is_refused():
     heavy = {**X8, "airframe.mass.total": 30.0}
-    assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_wash"}))
+    assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_interference"}))
     with pytest.raises(ValueError, match=r"per rotor is below the .* N needed to hover"):
         resolve(load("hover", heavy))
 
@@ -87,7 +89,7 @@ def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
     table = "\n".join(f"{key.removeprefix('airframe.')} = {json.dumps(X8[key])}" for key in X8 if "airframe" in key)
     scene = tmp_path / "x8.toml"
     text = load("hover").path.read_text()
-    scene.write_text(f"{text}\n[effects.coaxial_wash]\n[airframe]\n{table}\n")
+    scene.write_text(f"{text}\n[effects.coaxial_interference]\n[airframe]\n{table}\n")
     known = known_airframe(load(scene))
     assert known == known_airframe(load("hover", X8))
     ideal = python_function(thrust_at)(known.motor, known.voltage_max) / controller_parameters.hover_thrust(known)
@@ -109,6 +111,6 @@ def test_the_tuner_sees_the_plant_that_the_autopilot_is_told_of():
 
 
 def test_a_corner_of_the_tuner_has_more_thrust_of_every_rotor():
-    active = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, airframe(load("hover", X8)))
+    active = effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}}, airframe(load("hover", X8)))
     wash, rotor = (corners._stronger(e, 1.2) for e in active)
     assert wash.thrust_constant == rotor.thrust_constant == pytest.approx(1.2 * active[1].thrust_constant)

@@ -27,7 +27,11 @@ def warnings(flown):
 
 def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
     script = UP | {6: [command("goto", 10.0, 0.0, 3.0)]}
-    small = [airframe(tmp_path, 12000.0), "effects.battery.charge=0.2", "autopilot.parameters.RTL_RETURN_ALT=3.0"]
+    small = [
+        airframe(tmp_path, 12000.0),
+        "effects.battery.initial_charge=0.2",
+        "autopilot.parameters.RTL_RETURN_ALT=3.0",
+    ]
     flown = fly(80, script, *small)
     told = said(flown)
     order = [told.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
@@ -42,7 +46,7 @@ def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
 
 def test_a_nearly_empty_battery_lands_where_it_is(tmp_path):
     script = UP | {6: [command("goto", 30.0, 0.0, 3.0)]}
-    low = [airframe(tmp_path, 4000.0), "effects.battery.charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
+    low = [airframe(tmp_path, 4000.0), "effects.battery.initial_charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
     flown = fly(40, script, *low)
     assert "the battery is nearly empty: land" in said(flown)
     assert place(flown, 40.0)[0] > 5.0
@@ -51,7 +55,7 @@ def test_a_nearly_empty_battery_lands_where_it_is(tmp_path):
 
 def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unknown():
     script = {0.04: [command("arm", id=1)]}
-    flown = fly(0.5, script, "effects.battery.charge=0.06")
+    flown = fly(0.5, script, "effects.battery.initial_charge=0.06")
     assert results(flown)[1] == REJECTED
     assert "arming refused: the battery is low: 6%" in said(flown)
     flown = fly(0.5, script)
@@ -62,7 +66,7 @@ def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unk
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_a_damaged_rotor_is_named_and_the_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
-    damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.torque_left=0.55"]
+    damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.remaining_torque=0.55"]
     flown = fly(20, UP, *damage)
     assert "a motor has failed: land" in said(flown)
     failed = flown.column("status", lambda m: m.failed_motor)
@@ -125,7 +129,11 @@ def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back()
 @pytest.mark.parametrize("wind", [(3.0, 1.0), (8.0, 3.0)])
 def test_sound_motors_raise_no_alarm_in_the_delivery_mission(seed, wind):
     mean, sigma = wind
-    sets = [f"run.seed={seed}", f"effects.wind_random.mean=[{mean}, 1.0, 0.0]", f"effects.wind_random.sigma={sigma}"]
+    sets = [
+        f"run.seed={seed}",
+        f"effects.random_wind_force.mean=[{mean}, 1.0, 0.0]",
+        f"effects.random_wind_force.sigma={sigma}",
+    ]
     flown = memory_log.fly(load("delivery_mission", sets))
     assert set(flown.column("status", lambda m: m.failed_motor)) == {0}
     assert set(flown.column("status", lambda m: m.mode)) == {"mission"}

@@ -267,7 +267,7 @@ def test_a_gripper_lets_the_payload_go():
     items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
              item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
     script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
-    flown = fly(14, script, "effects.payload={}")
+    flown = fly(14, script, "effects.payload_release={}")
     thrust = flown.column("actuators", lambda m: sum(m.thrust))
     times, reached = flown.times("actuators"), flown.column("status", lambda m: m.mission_reached)
     released = flown.times("status")[reached == 2][0]

@@ -199,7 +199,7 @@ def test_a_battery_that_is_wrong_reports_the_charge_that_the_parameter_chooses(l
 
 
 def test_a_battery_that_is_stuck_does_not_warn():
-    emptying = [ENABLED, "effects.battery.charge=0.1502"]
+    emptying = [ENABLED, "effects.battery.initial_charge=0.1502"]
     sound, stuck = fly(12, UP, *emptying), fly(12, UP | {0.1: [inject("battery", STUCK)]}, *emptying)
     assert "the battery is low" in said(sound)
     assert "the battery is low" not in said(stuck)

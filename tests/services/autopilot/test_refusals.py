@@ -9,7 +9,7 @@ from lapwing.services.common.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 
 DRONE = load_airframe(SHIPPED / "vehicles" / "delivery_drone.toml")
-ELECTRIC = {"effects.motor_electrics": {}}
+ELECTRIC = {"effects.dc_motor": {}}
 SENSORS = {"autopilot.estimator": "sensors", "sensors": {"imu": {}, "magnetometer": {}, "gps": {}}}
 
 

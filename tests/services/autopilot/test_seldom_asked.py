@@ -21,9 +21,9 @@ STICKS = {(3.0, 6.0): [command("manual", 0.4, 0.0, 0.1, 0.0)]}
 GPS_LOST = 'sensors.gps.faults=[{kind="dropout", start=3.013, stop=5.5}]'
 DAMAGE = [
     "effects.rotor_damage.rotor=2", "effects.rotor_damage.time=4.0", "effects.rotor_damage.remaining_thrust=0.55",
-    "effects.rotor_damage.torque_left=0.55",
+    "effects.rotor_damage.remaining_torque=0.55",
 ]  # fmt: skip
-BATTERY = ["effects.battery.charge=0.1502", "vehicle.airframe=delivery_drone", "effects.motor_electrics={}"]
+BATTERY = ["effects.battery.initial_charge=0.1502", "vehicle.airframe=delivery_drone", "effects.dc_motor={}"]
 SHORT = [
     'trajectory.phase=[{name="wait", duration=1.0}, {name="climb", z={kind="ramp", to=1.0, rate=1.0}},'
     ' {name="descend", z={kind="ramp", to=0.0, rate=1.0}}, {name="land", duration=2.0}]'

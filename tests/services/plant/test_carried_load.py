@@ -33,7 +33,7 @@ duration = 10.0
 {vehicles}
 """
 CABLE = "mass = 2.0\nlength = 2.0\ndrag_area = 0.05\nhook = [0.1, 0.0, -0.1]\n"
-SHARED = f"[effects.carried_load]\n{CABLE}"
+SHARED = f"[effects.shared_slung_load]\n{CABLE}"
 TWO = """
 [[vehicle]]
 name = "left"
@@ -116,9 +116,9 @@ def test_a_set_up_survives_text(setup):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("vehicle.1.effects.carried_load.mass=3.0", r"vehicle\.1\.effects\.carried_load\.mass: .*the same load"),
+        ("vehicle.1.effects.shared_slung_load.mass=3.0", r"vehicle\.1\.effects\.carried_load\.mass: .*the same load"),
         ("vehicle.1.start=[0.0, -6.0]", r"effects\.carried_load\.length: .*m away, in the middle of its carriers"),
-        ("effects.carried_load.stiffness=1e5", r"effects\.carried_load\.stiffness: .*softer cable"),
+        ("effects.shared_slung_load.stiffness=1e5", r"effects\.carried_load\.stiffness: .*softer cable"),
         ("vehicle.0.vehicle.model=multibody", "tells of bodies of its own"),
     ],
 )

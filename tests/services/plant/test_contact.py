@@ -27,7 +27,7 @@ def missing(flight):
     return mass * truth.acceleration - thrust - weight - told.force.sum(axis=1)
 
 
-@pytest.mark.parametrize("friction", ["anchor", "smooth"])
+@pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_to_rest(friction):
     """Bounces of the landing included, in which the ground does more than carry the weight."""
     flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})

@@ -14,10 +14,10 @@ SCENE = """
 duration = 4.0
 [effects.gravity]
 [effects.rotor_thrust]
-[effects.rotor_inflow]
+[effects.axial_inflow]
 [effects.body_drag]
 [effects.ground_contact]
-[effects.rotor_wash]
+[effects.downwash]
 [effects.collision]
 [autopilot]
 gains = "tuned"

@@ -9,7 +9,7 @@ from lapwing.kernels.compiler.source_digest import _all
 from lapwing.services.process_table import create
 from lapwing.services.scene_resolver import load, resolve
 
-SHARED = {"lapwing.dynamics.effects.payload"}  # what hangs below is weighed in any scene
+SHARED = {"lapwing.dynamics.effects.payload_release"}  # what hangs below is weighed in any scene
 
 
 def test_the_sources_of_a_plant_hold_no_effect_that_its_scene_does_not_name():

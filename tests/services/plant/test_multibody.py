@@ -17,7 +17,7 @@ pytestmark = pytest.mark.long
 
 MISSION = Path(__file__).parents[3] / "lapwing/scenes/delivery_mission.toml"
 FLOWN = "vehicle.model=multibody"
-CALM = ["effects.wind_random.mean=[0.0, 0.0, 0.0]", "effects.wind_random.sigma=0.0"]
+CALM = ["effects.random_wind_force.mean=[0.0, 0.0, 0.0]", "effects.random_wind_force.sigma=0.0"]
 
 
 def full(tick):

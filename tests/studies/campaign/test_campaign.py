@@ -24,7 +24,7 @@ pytestmark = pytest.mark.long
 
 SCENE = "delivery_mission"  # the start of it; some of the runs are said to fail
 SHORT = ("run.duration=3.5", 'success.require=["max_tilt < 0.03"]')
-VARY = {"vehicle.mass": normal(10.4, 0.3), "effects.wind_random.mean.0": uniform(0.0, 9.0)}
+VARY = {"vehicle.mass": normal(10.4, 0.3), "effects.random_wind_force.mean.0": uniform(0.0, 9.0)}
 RUNS = 40
 
 
@@ -81,7 +81,10 @@ def test_the_table_is_parquet_with_its_making_in_the_metadata(flown):
     folder, digest = flown
     found = parquet.read_table(folder.path / "runs.parquet")
     assert found.num_rows == RUNS
-    assert found["effects.wind_random.mean.0"].to_pylist() == folder.arrays()["effects.wind_random.mean.0"].tolist()
+    assert (
+        found["effects.random_wind_force.mean.0"].to_pylist()
+        == folder.arrays()["effects.random_wind_force.mean.0"].tolist()
+    )
     about = {name.decode(): text.decode() for name, text in found.schema.metadata.items()}
     assert (about["scene"], about["digest"]) == (SCENE, digest)
     assert json.loads(about["vary"])["vehicle.mass"] == "normal(10.4, 0.3)"

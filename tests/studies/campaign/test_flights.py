@@ -27,7 +27,7 @@ BREAKS = 'multibody.event=[{time=1.0, propeller=2, becomes="locked"}]'
         ("hover", []),
         ("delivery_mission", ["run.duration=20.0"]),
         ("delivery_mission", ["run.duration=10.0", "exchange.coupling=parallel"]),
-        ("hover", ["effects.battery.charge=0.071"]),
+        ("hover", ["effects.battery.initial_charge=0.071"]),
         ("hover", ["run.duration=2.0", "vehicle.model=multibody", BREAKS]),
     ],
     ids=["hover", "mission", "parallel", "battery", "five bodies and an event"],
@@ -43,7 +43,9 @@ def test_a_campaign_flies_what_the_single_executor_flies(scene, overrides, tmp_p
     assert synthetic_flights.differences(in_memory, recorded, [t.name.removeprefix("{vehicle}/") for t in TOPICS]) == []
     assert (in_memory.finished, in_memory.landed) == (recorded.finished, recorded.landed)
     assert in_memory.rmse == recorded.rmse
-    assert in_memory.status.failsafe.any() == ("effects.battery.charge=0.071" in overrides)  # the commander acts
+    assert in_memory.status.failsafe.any() == (
+        "effects.battery.initial_charge=0.071" in overrides
+    )  # the commander acts
 
 
 def test_runs_in_the_memory_of_others_are_the_same():

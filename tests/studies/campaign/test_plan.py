@@ -137,7 +137,7 @@ def test_a_sweep_may_begin_with_the_mark_that_spreadsheets_put_there(tmp_path):
 
 
 def test_a_grid_is_flown_though_its_first_runs_are_all_refused():
-    vary = {"effects.wind_random.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
+    vary = {"effects.random_wind_force.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
     made = plan("delivery_mission", vary=vary, design="grid")
     assert made.runs == 40
     assert first_setup(made)[0] >= 20

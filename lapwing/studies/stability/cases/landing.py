@@ -125,7 +125,7 @@ def resting(seconds: float, angle: float) -> float:
 def creeping(angle: float) -> float:
     """Distance [m] in a second from where it stood, held by friction that is a function of the slip."""
     _, rest = settled(angle)
-    p, state = standing(0.0, 0.0, angle, friction="smooth")
+    p, state = standing(0.0, 0.0, angle, friction="regularised")
     later = run_on(p, state._replace(motion=rest.motion), 1.0).motion
     return float(np.abs(np.subtract(later.position_world, rest.motion.position_world)).max())
 

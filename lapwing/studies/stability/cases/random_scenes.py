@@ -37,8 +37,8 @@ def drawn(seed: int) -> list[str]:
         "effects.ground_contact.stiffness": decades(1e3, 1e9),
         "effects.ground_contact.damping": decades(1.0, 1e6),
         "effects.ground_contact.friction_dynamic": 0.1,
-        "effects.wind_random.mean": [float(v) for v in rng.normal(0.0, 15.0, 3)],
-        "effects.wind_random.sigma": decades(0.01, 10.0),
+        "effects.random_wind_force.mean": [float(v) for v in rng.normal(0.0, 15.0, 3)],
+        "effects.random_wind_force.sigma": decades(0.01, 10.0),
     }
     slow = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "bodies", "operator")}
     return [f"{key}={value}" for key, value in {**found, **slow}.items()]

@@ -18,7 +18,11 @@ HARD = (
 
 STEP, AT, LOSS = 0.004, 5.0, 0.5  # [s]
 TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, STATUS)
-DROP = ("effects.payload.release_time=15.0", "effects.wind_random.mean=[25.0,0.0,0.0]", "effects.wind_random.sigma=2.0")
+DROP = (
+    "effects.payload_release.release_time=15.0",
+    "effects.random_wind_force.mean=[25.0,0.0,0.0]",
+    "effects.random_wind_force.sigma=2.0",
+)
 OUT = ("effects.rotor_damage.rotor=1", "effects.rotor_damage.time=5.0")
 GUST = (
     "effects.wind_gust.peak=[0.0,0.0,-25.0]",

@@ -24,7 +24,7 @@ class Settings(NamedTuple):
     size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m] of the box along body x, y, z
 
 
-class Payload(NamedTuple):
+class PayloadRelease(NamedTuple):
     """A uniform box; once it is released the vehicle has neither its mass nor its inertia.
 
     It is where the airframe's [payload] says, and the centre of mass moves when it goes (theory.md, eqs. (2.41) and
@@ -38,7 +38,7 @@ class Payload(NamedTuple):
     empty: AnyMassProperties
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "Payload":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "PayloadRelease":
         """Mass properties with and without the box."""
         given = checked(Settings, table)
         release = float("inf") if given.release_time is None else given.release_time
@@ -77,13 +77,13 @@ RELEASED = (1.0,)
 """Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
 
 
-@sample(Payload)
+@sample(PayloadRelease)
 def release(e, memory, s, rotors, key, tick, interval):
     """Let go when the time has come."""
     return (1.0,) if s.t >= e.release_time else memory
 
 
-@body(Payload)
-def payload(e, memory, before):
+@body(PayloadRelease)
+def payload_release(e, memory, before):
     """Mass properties with or without it."""
     return e.empty if memory[0] > 0.0 else e.loaded

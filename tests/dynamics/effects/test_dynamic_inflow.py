@@ -9,14 +9,14 @@ from scipy.optimize import brentq
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects.induced_velocity import follow, induced_velocity
+from lapwing.dynamics.effects.dynamic_inflow import dynamic_inflow, follow
 from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 
 SPEED, DENSITY = 300.0, 1.2
 
 
 def make(drone):
-    e, static = effects.from_scene({"rotor_thrust": {}, "induced_velocity": {}}, drone)
+    e, static = effects.from_scene({"rotor_thrust": {}, "dynamic_inflow": {}}, drone)
     return e, static
 
 
@@ -29,7 +29,7 @@ def settled(e, s, rotors, seconds=1.0, interval=0.004):
 
 def loads(e, static, memory, s):
     before = rotor_thrust.py_func(static, (), s, NO_FACTORS, NO_LOADS)
-    return before, induced_velocity.py_func(e, memory, s, NO_FACTORS, before)
+    return before, dynamic_inflow.py_func(e, memory, s, NO_FACTORS, before)
 
 
 def test_nothing_changes_in_hover(drone, situation, rotors):
@@ -108,7 +108,7 @@ def test_a_rotor_at_rest(drone, situation, rotors):
 
 def test_it_excludes_rotor_inflow_and_a_pitch_too_small(drone):
     with pytest.raises(ConfigError, match=r"both are a flow through the rotors"):
-        effects.from_scene({"rotor_inflow": {}, "induced_velocity": {}}, drone)
+        effects.from_scene({"axial_inflow": {}, "dynamic_inflow": {}}, drone)
     flat = drone.model_copy(update={"propeller": drone.propeller.model_copy(update={"pitch": 0.02})})
-    with pytest.raises(ConfigError, match=r"effects.induced_velocity: the propeller's pitch must be at least"):
-        effects.from_scene({"induced_velocity": {}}, flat)
+    with pytest.raises(ConfigError, match=r"effects.dynamic_inflow: the propeller's pitch must be at least"):
+        effects.from_scene({"dynamic_inflow": {}}, flat)

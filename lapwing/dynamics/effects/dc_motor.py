@@ -20,7 +20,7 @@ class Settings(NamedTuple):
     """No keys: the airframe's [motor] and [rotors] say it all."""
 
 
-class MotorElectrics(NamedTuple):
+class DcMotor(NamedTuple):
     """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9)).
 
     The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
@@ -41,7 +41,7 @@ class MotorElectrics(NamedTuple):
     inverse_esc_efficiency: float
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "MotorElectrics":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "DcMotor":
         """From the airframe's motor."""
         checked(Settings, table)
         engine = airframe.motor
@@ -89,8 +89,8 @@ def _power(e, voltage, both):
     return voltage * current * e.inverse_esc_efficiency
 
 
-@motor(MotorElectrics)
-def motor_electrics(e, memory, s, loads, voltage):
+@motor(DcMotor)
+def dc_motor(e, memory, s, loads, voltage):
     """(acceleration [rad/s^2], current [A], power [W]) of each rotor."""
     speed = s.motion.rotor_speed
     current = map_tuple(_current, e, speed, voltage)

@@ -22,7 +22,7 @@ class Settings(NamedTuple):
     """No keys: the airframe's [propeller] says it all."""
 
 
-class RotorInflow(NamedTuple):
+class AxialInflow(NamedTuple):
     """What climb takes from, and descent adds to, the static loads of `rotor_thrust` (theory.md, eq. (2.5)).
 
     The blade meets the air at an angle that falls with the advance per turn over the pitch: T = T_0 (1 - w / speed) and
@@ -36,7 +36,7 @@ class RotorInflow(NamedTuple):
     turn_per_metre: float  # [rad/m] 2 pi over pitch
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInflow":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "AxialInflow":
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
@@ -72,8 +72,8 @@ def _product(_, a, b):
     return a * b
 
 
-@loads(RotorInflow)
-def rotor_inflow(e, memory, s, factors, before):
+@loads(AxialInflow)
+def axial_inflow(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
     w = map_tuple(_advance, e.turn_per_metre, axial_speeds(s), speed)

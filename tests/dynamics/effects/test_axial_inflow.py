@@ -6,16 +6,16 @@ from effects_helpers import NO_FACTORS, NO_LOADS
 from scipy.integrate import quad
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects.rotor_inflow import rotor_inflow
+from lapwing.dynamics.effects.axial_inflow import axial_inflow
 from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
 
 def both(drone, s):
-    inflow, thrust = effects.from_scene({"rotor_thrust": {}, "rotor_inflow": {}}, drone)
+    inflow, thrust = effects.from_scene({"rotor_thrust": {}, "axial_inflow": {}}, drone)
     static = rotor_thrust.py_func(thrust, (), s, NO_FACTORS, NO_LOADS)
-    return static, rotor_inflow.py_func(inflow, (), s, NO_FACTORS, static)
+    return static, axial_inflow.py_func(inflow, (), s, NO_FACTORS, static)
 
 
 def test_thrust_falls_linearly_to_nothing_at_the_pitch_speed(drone, situation):
@@ -70,7 +70,7 @@ def test_rolling_and_pitching_are_damped_by_each_hubs_own_speed(drone, situation
 
 
 def test_the_damping_of_roll_is_the_slope_of_thrust_over_the_inertia(drone):
-    tables = {"rotor_thrust": {}, "rotor_inflow": {}}
+    tables = {"rotor_thrust": {}, "axial_inflow": {}}
     p = multirotor.parameters(drone, effects.from_scene(tables, drone))
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=335.0, omega_body=(0.1, 0.0, 0.0))
     found = multirotor.observe(p, 0, 0.004, state, (32.0,) * 4).angular_acceleration_body[0] / -0.1

@@ -8,12 +8,12 @@ import pytest
 
 from lapwing.dynamics.effects import from_scene
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.dynamics.effects.rotor_wash import blown
+from lapwing.dynamics.effects.downwash import blown
 from lapwing.dynamics.vehicles.airframe import load_airframe
 
 ROOT = Path(__file__).parents[3]
 QUAD = load_airframe(ROOT / "lapwing/scenes/vehicles/quad_x.toml")
-WASH = from_scene({"rotor_wash": {}}, QUAD)[0]
+WASH = from_scene({"downwash": {}}, QUAD)[0]
 NO_WIND = (0.0, 0.0, 0.0)
 WEIGHT, DENSITY = 1.5 * 9.80665, 1.2
 R = WASH.disc_radius

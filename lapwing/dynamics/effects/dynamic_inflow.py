@@ -7,7 +7,7 @@ from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import cannot, checked
 from lapwing.dynamics.effects._hooks import loads, sample
 from lapwing.dynamics.effects._types import Loads
-from lapwing.dynamics.effects.rotor_inflow import KIND
+from lapwing.dynamics.effects.axial_inflow import KIND
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
@@ -17,7 +17,7 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-__all__ = ["KIND", "InducedVelocity", "Settings"]
+__all__ = ["KIND", "DynamicInflow", "Settings"]
 
 APPARENT_MASS = 0.637  # of the sphere of air around the disc
 SLOWEST = 1e-3  # [m/s] least induced velocity that others are compared with
@@ -28,7 +28,7 @@ class Settings(NamedTuple):
     """No keys: the airframe's [propeller] says it all."""
 
 
-class InducedVelocity(NamedTuple):
+class DynamicInflow(NamedTuple):
     """What the flow through a rotor changes of the static loads of `rotor_thrust` (theory.md, eq. (2.35), (2.36)).
 
     The blades meet the air of the rotor's own speed along its axis and of the flow that it induces: momentum theory in
@@ -47,7 +47,7 @@ class InducedVelocity(NamedTuple):
     at_rest: tuple[float, ...]  # [m/s] a zero for each rotor
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "InducedVelocity":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "DynamicInflow":
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
@@ -88,7 +88,7 @@ def _followed(c, induced, both):
     return induced + (1.0 - math.exp(-rate * interval)) / gain * (steady - induced)
 
 
-@sample(InducedVelocity)
+@sample(DynamicInflow)
 def follow(e, memory, s, rotors, key, tick, interval):
     """Induced velocity of each rotor for the next interval [m/s]."""
     return map_tuple(_followed, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
@@ -116,8 +116,8 @@ def _more_torque(density, before, both):
     return before + density * factor * change[1]
 
 
-@loads(InducedVelocity)
-def induced_velocity(e, memory, s, factors, before):
+@loads(DynamicInflow)
+def dynamic_inflow(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     change = map_tuple(_change, e, map_tuple(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
     return Loads(

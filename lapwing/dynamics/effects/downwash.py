@@ -21,12 +21,12 @@ class Settings(NamedTuple):
     spread: Annotated[float, Ge(0), Le(1)] = 0.113  # m of the jet's radius, where it is e times slower, a metre of way
 
 
-class RotorWash(NamedTuple):
+class Downwash(NamedTuple):
     """The jet of each other vehicle that names it, as a wind (theory.md, eq. (2.62) to (2.64)).
 
     One jet for all rotors of a vehicle, against their thrust: twice the induced velocity of momentum theory once it
     has developed, a Gauss profile whose width grows with the way and whose momentum is the thrust. It acts through the
-    effects that know the air's speed (body_drag, rotor_inflow, induced_velocity). Source: Leishman, Principles of
+    effects that know the air's speed (body_drag, axial_inflow, dynamic_inflow). Source: Leishman, Principles of
     Helicopter Aerodynamics, on the wake in hover; Pope, Turbulent Flows, section 5.1, on the round jet, whose half
     width grows by 0.094 m a metre. Valid near hover, below by more than the distance between rotors, where their jets
     have joined; no wind carries the jet away, the ground does not turn it, and it is there at once.
@@ -36,7 +36,7 @@ class RotorWash(NamedTuple):
     spread: float
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorWash":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
         """With the discs of the airframe's propellers."""
         given = checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
@@ -51,7 +51,7 @@ class RotorWash(NamedTuple):
         return {"disc_radius": self.disc_radius}
 
 
-@interact(RotorWash)
+@interact(Downwash)
 def blown(e, memory, own, others, interval):
     """The wind of all other vehicles' jets where this one is, for the coming interval."""
     wind = (0.0, 0.0, 0.0)
@@ -71,7 +71,7 @@ def blown(e, memory, own, others, interval):
     return wind
 
 
-@air(RotorWash)
-def rotor_wash(e, memory, s, before):
+@air(Downwash)
+def downwash(e, memory, s, before):
     """Air with the wind of the others added."""
     return Air(before.density, add(before.wind_world, memory))

@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects.payload import RELEASED, payload, release
+from lapwing.dynamics.effects.payload_release import RELEASED, payload_release, release
 
 
 def make(drone, **table):
-    (e,) = effects.from_scene({"payload": table}, drone)
+    (e,) = effects.from_scene({"payload_release": table}, drone)
     return e
 
 
 def test_mass_and_inertia_with_and_without(drone):
     e = make(drone)
-    loaded, empty = payload.py_func(e, (0.0,), None), payload.py_func(e, RELEASED, None)
+    loaded, empty = payload_release.py_func(e, (0.0,), None), payload_release.py_func(e, RELEASED, None)
     assert loaded.mass == 10.0224
     assert empty.mass == pytest.approx(8.0224)
     box = 2.0 / 12 * np.array([0.13**2 + 0.23**2, 0.20**2 + 0.23**2, 0.20**2 + 0.13**2])
@@ -30,9 +30,9 @@ def test_lets_go_at_its_time_and_never_again(drone, situation, rotors):
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"mass": 11.0}, r"effects.payload.mass: expected less than the vehicle's 10.0224 kg, got 11.0"),
-        ({"mass": -1.0}, r"effects.payload.mass: expected a number above 0 \[kg\], got -1.0"),
-        ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload: takes more inertia"),
+        ({"mass": 11.0}, r"effects.payload_release.mass: expected less than the vehicle's 10.0224 kg, got 11.0"),
+        ({"mass": -1.0}, r"effects.payload_release.mass: expected a number above 0 \[kg\], got -1.0"),
+        ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload_release: takes more inertia"),
     ],
 )
 def test_refused(drone, table, message):

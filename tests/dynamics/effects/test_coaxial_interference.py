@@ -67,8 +67,8 @@ def test_the_lower_rotor_loses_thrust_and_the_upper_does_not(drone):
     """Thrust and induced power of the lower rotor meet the momentum theory of its disc; its profile power stays."""
     frame = stacked(drone)
     plain, drag = loads(frame, {"rotor_thrust": {}})
-    thrust, torque = loads(frame, {"rotor_thrust": {}, "coaxial_wash": {}})
-    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, frame)
+    thrust, torque = loads(frame, {"rotor_thrust": {}, "coaxial_interference": {}})
+    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}}, frame)
     assert thrust[1::2] == pytest.approx(plain[1::2], rel=1e-15)
     assert torque[1::2] == pytest.approx(drag[1::2], rel=1e-15)
     t = thrust[0] / plain[0]
@@ -82,19 +82,19 @@ def test_the_lower_rotor_loses_thrust_and_the_upper_does_not(drone):
 
 
 def test_a_lost_upper_propeller_has_no_wake(drone):
-    tables = {"rotor_thrust": {}, "coaxial_wash": {}}
+    tables = {"rotor_thrust": {}, "coaxial_interference": {}}
     stopped = loads(stacked(drone), tables, speeds=(300.0, 0.0) * 4)[0]
     assert stopped[::2] == pytest.approx(loads(stacked(drone), {"rotor_thrust": {}})[0][::2])
 
 
 def test_fast_flight_carries_the_wake_away(drone):
-    frame, tables = stacked(drone), {"rotor_thrust": {}, "coaxial_wash": {}}
+    frame, tables = stacked(drone), {"rotor_thrust": {}, "coaxial_interference": {}}
     found = [loads(frame, tables, (v, 0.0, 0.0))[0][0] for v in (0.0, 10.0, 20.0, 60.0)]
     assert np.all(np.diff(found) >= 0.0)
     assert found[-1] == pytest.approx(loads(frame, {"rotor_thrust": {}})[0][0])
 
 
-BOTH = {"rotor_thrust": {}, "coaxial_wash": {}}
+BOTH = {"rotor_thrust": {}, "coaxial_interference": {}}
 
 
 def test_slopes_are_those_of_the_plant(drone):
@@ -134,20 +134,20 @@ def test_changes_are_what_the_plant_adds(drone, velocity):
 @pytest.mark.parametrize(
     ("frame", "tables", "message"),
     [
-        (lambda d: d, {}, "effects.coaxial_wash: no rotor stands under another one"),
-        (lambda d: stacked(d, aside=0.2), {}, "effects.coaxial_wash: no rotor stands under another one"),
-        (lambda d: stacked(d, gap=0.7), {}, "effects.coaxial_wash: no rotor stands under another one"),
-        (stacked, {"induced_velocity": {}}, "effects.coaxial_wash: is not made to stand beside effects.induced"),
+        (lambda d: d, {}, "effects.coaxial_interference: no rotor stands under another one"),
+        (lambda d: stacked(d, aside=0.2), {}, "effects.coaxial_interference: no rotor stands under another one"),
+        (lambda d: stacked(d, gap=0.7), {}, "effects.coaxial_interference: no rotor stands under another one"),
+        (stacked, {"dynamic_inflow": {}}, "effects.coaxial_interference: is not made to stand beside effects.dynamic"),
     ],
 )
 def test_refused(drone, frame, tables, message):
     with pytest.raises(ValueError, match=message):
-        effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}, **tables}, frame(drone))
+        effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}, **tables}, frame(drone))
 
 
 def test_goes_with_rotor_thrust(drone):
-    with pytest.raises(ValueError, match=r"effects.coaxial_wash: goes with effects\.rotor_thrust"):
-        effects.from_scene({"coaxial_wash": {}}, stacked(drone))
+    with pytest.raises(ValueError, match=r"effects.coaxial_interference: goes with effects\.rotor_thrust"):
+        effects.from_scene({"coaxial_interference": {}}, stacked(drone))
 
 
 @pytest.mark.long
@@ -159,10 +159,10 @@ def test_eight_rotors_in_four_pairs_hover_and_land(drone):
         "hover",
         {"airframe.mass.total": 12.0, "airframe.mass.payload": 0.0, "airframe.mass.inertia": [0.54, 0.52, 0.84],
          "airframe.rotors.position": rotors["position"], "airframe.rotors.spin_direction": rotors["spin_direction"],
-         "effects.coaxial_wash": {}},
+         "effects.coaxial_interference": {}},
     )  # fmt: skip
     assert flight.landed
     thrust = flight.truth.rotor_thrust[(flight.truth.times > 5.0) & (flight.truth.times < 6.0)].mean(axis=0)
     assert thrust.sum() == pytest.approx(12.0 * 9.80665, rel=5e-3)
-    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_wash": {}}, frame)
+    e, _ = effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}}, frame)
     assert thrust[::2].sum() / thrust[1::2].sum() == pytest.approx(share(e.pitch, 1.0), rel=0.02)

@@ -29,7 +29,7 @@ class Settings(NamedTuple):
     drag_area: Annotated[float, Ge(0), Le(1e3)] = 0.0  # [m^2] of the load, its coefficient times area; also the same
 
 
-class CarriedLoad(NamedTuple):
+class SharedSlungLoad(NamedTuple):
     """The pull of the cable to the one load of all vehicles that name it (theory.md, eq. (1.20), (1.23)).
 
     Source: Newton's laws, Hooke's and a damper for a cable that can pull and not push. The load moves beside the
@@ -40,7 +40,7 @@ class CarriedLoad(NamedTuple):
     sling: Sling
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "CarriedLoad":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "SharedSlungLoad":
         """With the damping for the airframe's mass."""
         given = checked(Settings, table)
         reduced = 1.0 / (1.0 / given.mass + 1.0 / airframe.mass.total)
@@ -48,9 +48,9 @@ class CarriedLoad(NamedTuple):
         hook = subtract(given.hook, airframe.mass.centre)
         return cls(Sling(given.mass, given.length, given.stiffness, damping, hook, given.drag_area, LEVEL))
 
-    def in_environment(self, environment: Environment) -> "CarriedLoad":
+    def in_environment(self, environment: Environment) -> "SharedSlungLoad":
         """Over the ground that is there."""
-        return CarriedLoad(self.sling._replace(terrain=environment.terrain))
+        return SharedSlungLoad(self.sling._replace(terrain=environment.terrain))
 
     def initial_memory(self) -> tuple[Vec3, Vec3, Vec3, float]:
         """Position, velocity and acceleration of the load at a time [s]; before 0 nothing is known of it."""
@@ -61,7 +61,7 @@ class CarriedLoad(NamedTuple):
         return {"hook_body": self.sling.hook_body}
 
 
-@interact(CarriedLoad)
+@interact(SharedSlungLoad)
 def fastened(e, memory, own, others, interval):
     """Where the load is and how it moves, at the beginning of the coming interval."""
     for other in others:
@@ -70,8 +70,8 @@ def fastened(e, memory, own, others, interval):
     return memory
 
 
-@wrench(CarriedLoad)
-def carried_load(e, memory, s, rotors):
+@wrench(SharedSlungLoad)
+def shared_slung_load(e, memory, s, rotors):
     """Force [N] of the cable in world coordinates and its torque [N m] in the body."""
     place, velocity, acceleration, time = memory
     if time < 0.0:

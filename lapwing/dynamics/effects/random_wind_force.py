@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
-LANE = zlib.crc32(b"wind_random")
+LANE = zlib.crc32(b"wind_random")  # keeps the random numbers of earlier versions
 ROUNDING = 1e-6  # of an interval
 
 
@@ -32,10 +32,10 @@ class Settings(NamedTuple):
     density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
     shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
     interval: Annotated[float, Ge(1e-4), Le(10)] = 0.004  # [s] between two draws, whatever the exchange interval
-    beside_drag: bool = False  # whether body_drag may act as well, though both are drag in this wind
+    allow_body_drag: bool = False  # whether body_drag may act as well, though both are drag in this wind
 
 
-class WindRandom(NamedTuple):
+class RandomWindForce(NamedTuple):
     """A random force 1/2 C_s S rho |v| v at the centre of mass, of a wind's speed v past the vehicle (theory.md, eq.
     (2.8)); the air that other effects feel stands still.
 
@@ -51,7 +51,7 @@ class WindRandom(NamedTuple):
     interval: float  # [s] between two draws
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindRandom":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RandomWindForce":
         """What a scene says."""
         given = checked(Settings, table)
         return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
@@ -63,9 +63,9 @@ class WindRandom(NamedTuple):
 
 def check(table: Mapping, tables: Mapping) -> None:
     """ConfigError beside `body_drag`, unless the table insists."""
-    if "body_drag" in tables and not table.get("beside_drag"):
+    if "body_drag" in tables and not table.get("allow_body_drag"):
         message = "is drag already, and counts it twice beside effects.body_drag"
-        expected = "wind_constant or wind_dryden with body_drag, or beside_drag = true"
+        expected = "wind_constant or wind_dryden with body_drag, or allow_body_drag = true"
         raise ConfigError("", message, expected)
 
 
@@ -77,7 +77,7 @@ def _blow(e, key, number, velocity_world):
     return scale(e.factor * norm(v), v), drawn
 
 
-@sample(WindRandom)
+@sample(RandomWindForce)
 def draw(e, memory, s, rotors, key, tick, interval):
     """Mean force [N] and wind [m/s] of the next exchange interval, in world coordinates."""
     start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws
@@ -92,13 +92,13 @@ def draw(e, memory, s, rotors, key, tick, interval):
     return force, drawn
 
 
-@wrench(WindRandom)
-def wind_random(e, memory, s, rotors):
+@wrench(RandomWindForce)
+def random_wind_force(e, memory, s, rotors):
     """Force [N] in world, torque [N m] in body coordinates."""
     return memory[0], NOTHING
 
 
-@wind(WindRandom)
+@wind(RandomWindForce)
 def told(e, memory, before):
     """The wind [m/s] that the force is made of, added."""
     return add(before, memory[1])

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects.wind_random import draw, told, wind_random
+from lapwing.dynamics.effects.random_wind_force import draw, random_wind_force, told
 from lapwing.dynamics.noise import stream_key
 from lapwing.kernels import kernel
 
@@ -12,7 +12,7 @@ KEY = stream_key(3, "drone1", "effects")
 
 
 def make(drone, **table):
-    (e,) = effects.from_scene({"wind_random": {**WIND, **table}}, drone)
+    (e,) = effects.from_scene({"random_wind_force": {**WIND, **table}}, drone)
     return e
 
 
@@ -20,7 +20,7 @@ def test_force_of_a_steady_wind_is_the_source_formula(drone, situation, rotors):
     e = make(drone, sigma=0.0)
     s = situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 0, 0.004)
-    force, torque = wind_random.py_func(e, memory, s, rotors())
+    force, torque = random_wind_force.py_func(e, memory, s, rotors())
     assert force == pytest.approx((0.5 * 1.0 * 0.06 * 1.22 * 2.0**2, 0.0, 0.0))
     assert torque == (0.0, 0.0, 0.0)
 
@@ -87,6 +87,6 @@ def test_a_draw_is_shared_by_the_exchanges_within_it_and_averaged_over_long_ones
 
 
 def test_drag_is_not_counted_twice(drone):
-    with pytest.raises(ValueError, match=r"^effects.wind_random: is drag already.*beside_drag = true"):
-        effects.from_scene({"wind_random": {}, "body_drag": {}}, drone)
-    assert len(effects.from_scene({"wind_random": {"beside_drag": True}, "body_drag": {}}, drone)) == 2
+    with pytest.raises(ValueError, match=r"^effects.random_wind_force: is drag already.*allow_body_drag = true"):
+        effects.from_scene({"random_wind_force": {}, "body_drag": {}}, drone)
+    assert len(effects.from_scene({"random_wind_force": {"allow_body_drag": True}, "body_drag": {}}, drone)) == 2

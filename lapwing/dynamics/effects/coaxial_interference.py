@@ -23,14 +23,14 @@ CONTRACTED = math.sqrt(0.5)  # radius of the wake over that of the disc
 ASIDE = 1.0 - CONTRACTED  # radii that discs may be apart across their axis for the whole wake to meet the lower one
 FARTHEST = 2.0  # radii between discs that count as coaxial
 PARALLEL = 0.99  # least cosine between their axes
-NOT_BESIDE = ("rotor_quadratic", "rotor_table", "induced_velocity")
+NOT_BESIDE = ("rotor_quadratic", "rotor_table", "dynamic_inflow")
 
 
 class Settings(NamedTuple):
     """No keys: the airframe's [propeller] and [rotors] say it all."""
 
 
-class CoaxialWash(NamedTuple):
+class CoaxialInterference(NamedTuple):
     """What the wake of the upper rotor takes from the static loads of the lower one (theory.md, eq. (2.43), (2.44)).
 
     Momentum theory of a lower rotor whose inner half meets twice the upper's induced velocity, for blades of one pitch.
@@ -46,7 +46,7 @@ class CoaxialWash(NamedTuple):
     distance: PerRotor  # [m] of that one along the axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialWash":
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
         """For every rotor with another one above it."""
         checked(Settings, table)
         propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
@@ -174,8 +174,8 @@ def _second(_, change, factor):
     return factor, change[1]
 
 
-@loads(CoaxialWash)
-def coaxial_wash(e, memory, s, factors, before):
+@loads(CoaxialInterference)
+def coaxial_interference(e, memory, s, factors, before):
     """Loads of each rotor, added to `before`."""
     speed = s.motion.rotor_speed
     squares = map_tuple(_square, 0.0, speed, factors.thrust)
