@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.multibody import augmented, five_bodies, five_body_stabilisation
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, motion
@@ -83,7 +83,7 @@ def times(repeats=200):
     """Seconds a call of every contestant, the best of interleaved repeats, each shorter than a time slice."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     p = five_bodies.machine(drone, GRAVITY)
-    x = five_body_stabilisation.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    x = five_body_stabilisation.assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
     system, (q, v) = drone_system(drone), five_bodies.arrays(x)
     wrench, drive = np.zeros((5, 6)), np.array([[s, 0.0] for s in SPEEDS])
     flight, h = Flight(drone, QUIET), 1e-4
@@ -107,7 +107,7 @@ def times(repeats=200):
             lambda n: five_body_stabilisation.advance(LIE, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION),
             200,
         ),
-        "least-coordinate RK4 step": (lambda n: march(METHOD, flight, 0.0, START, h, n), 1000),
+        "least-coordinate RK4 step": (lambda n: integrate_fixed(METHOD, flight, 0.0, START, h, n), 1000),
     }
     try:
         import mujoco
@@ -135,10 +135,10 @@ def errors(h=1e-3, seconds=2.0):
     """Largest attitude error [-] at the same step, against a step of h / 16: ours (two ways) and MuJoCo's."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     n, flight = round(seconds / h), Flight(delivery_drone(**PAPER, propeller_inertia=INERTIA), QUIET)
-    true = np.array(march(METHOD, flight, 0.0, START, h / 16, 16 * n).attitude)
-    out = {"least coordinates": np.array(march(METHOD, flight, 0.0, START, h, n).attitude)}
+    true = np.array(integrate_fixed(METHOD, flight, 0.0, START, h / 16, 16 * n).attitude)
+    out = {"least coordinates": np.array(integrate_fixed(METHOD, flight, 0.0, START, h, n).attitude)}
     p = five_bodies.machine(drone, GRAVITY)
-    x = five_body_stabilisation.together(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    x = five_body_stabilisation.assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
     out["five bodies, projection"] = np.array(
         five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION).chassis.attitude
     )
@@ -169,7 +169,7 @@ def left_out(speed, seconds=2.0, h=5e-5):
     reduced = Flight(delivery_drone(**PAPER, propeller_inertia=(mean, mean, INERTIA[2])), QUIET)
     a, b, rates, accelerations = x, x, 0.0, 0.0
     for i in range(round(seconds / h / 10)):
-        a, b = (march(METHOD, f, i * 10 * h, s, h, 10) for f, s in ((full, a), (reduced, b)))
+        a, b = (integrate_fixed(METHOD, f, i * 10 * h, s, h, 10) for f, s in ((full, a), (reduced, b)))
         rates = max(rates, np.abs(np.subtract(a.omega_body, b.omega_body)).max())
         pair = [free_turn(f.drone, s) for f, s in ((full, a), (reduced, a))]
         accelerations = max(accelerations, np.abs(np.subtract(*pair)).max())

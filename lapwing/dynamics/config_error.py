@@ -26,7 +26,7 @@ class ConfigError(ValueError):
         hint = f"; did you mean {near[0]}?" if near else ""
         return cls(key, f"unknown {what} {name!r}{hint}", f"one of {', '.join(listed)}" if listed else "none")
 
-    def under(self, prefix: str) -> "ConfigError":
+    def with_prefix(self, prefix: str) -> "ConfigError":
         """The same fault, with the key seen from the table around it."""
         return ConfigError(".".join(filter(None, (prefix, self.key))), self.message, self.expected)
 

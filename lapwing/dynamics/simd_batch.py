@@ -117,7 +117,7 @@ def _all_asleep(like, memory, base, h):
     awake = 0
     for lane in range(WIDTH):
         m = take(like, memory, base + lane)
-        if not hooks.all_asleep(m.parameters.effects, m.memory, seen(m.parameters.layout, m.motion), h):
+        if not hooks.all_sleeping(m.parameters.effects, m.memory, seen(m.parameters.layout, m.motion), h):
             awake += 1
     return awake == 0
 

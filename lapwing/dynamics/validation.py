@@ -41,7 +41,7 @@ def fault(error: ValidationError, model: type) -> ConfigError:
         return ConfigError(key, "missing", describe(hint) + _unit(model, location))
     if kind == "value_error":
         cause = context["error"]
-        return cause.under(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
+        return cause.with_prefix(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
     unit = _unit(model, location) if kind in OF_NUMBERS else ""
     return ConfigError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
 

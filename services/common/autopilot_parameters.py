@@ -131,7 +131,7 @@ def _table(scene: "Scene") -> dict[str, Parameter]:
         try:
             known[name].check(value)
         except ConfigError as error:
-            raise error.under("autopilot.parameters") from None
+            raise error.with_prefix("autopilot.parameters") from None
         known[name] = known[name]._replace(default=float(value))
     return known
 

@@ -153,7 +153,7 @@ class EnvironmentTable(SceneTable):
         try:
             _resolved(self)
         except ConfigError as error:
-            raise error.under(self.TABLE) from None
+            raise error.with_prefix(self.TABLE) from None
 
     def resolved(self) -> dict[str, Any]:
         """Return the table with plain nested values."""
@@ -166,7 +166,7 @@ def _resolved(table: EnvironmentTable) -> Environment:
     try:
         terrain = table.terrain.ground()
     except ConfigError as error:
-        raise error.under("terrain") from None
+        raise error.with_prefix("terrain") from None
     field = table.magnetic_field or magnetic_field(table.home, _day(table.date))
     gravity = table.gravity
     if gravity is None:

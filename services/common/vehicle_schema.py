@@ -19,7 +19,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion, rotate
 from lapwing.dynamics.terrain import Level, Relief, surface
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles.airframe import Airframe
-from lapwing.dynamics.vehicles.ground_equilibrium import Pose, standing_pose
+from lapwing.dynamics.vehicles.ground_equilibrium import Pose, resting_pose
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import python_function
 from lapwing.services.common import mesh_schema
@@ -106,7 +106,7 @@ class Effects(NamedTables):
                 try:
                     module.embed(entries[name], files.folder)
                 except ConfigError as error:
-                    raise error.under(f"{cls.TABLE}.{name}") from None
+                    raise error.with_prefix(f"{cls.TABLE}.{name}") from None
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless all effects exist, have valid parameters and are compatible."""
@@ -189,7 +189,7 @@ def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
 
 def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
-    pose = standing_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
+    pose = resting_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
     if not isinstance(terrain, Level):
         _upright(pose)
         _above_ground(airframe(scene), terrain, pose)

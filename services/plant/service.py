@@ -16,7 +16,7 @@ from lapwing.dynamics.integrators import not_finite
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
-from lapwing.dynamics.vehicles.multirotor_multibody_equations import struck
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
 from lapwing.kernels import kernel
 from lapwing.kernels.cell import Cell, read, write
 from lapwing.kernels.codegen import overload_for
@@ -114,7 +114,7 @@ class PropellerFailures:
         self._graph = graph
         p, s = self._core.vehicle, read(self._part.state)
         for event in self._events:
-            p = self._form.after(p, event.propeller, event.becomes)
+            p = self._form.with_propeller_failure(p, event.propeller, event.becomes)
             if event.becomes == "locked":
                 lock(p, s.vehicle, self._core.off)
             parts = [
@@ -143,7 +143,7 @@ class PropellerFailures:
 def lock(p: MultirotorParameters, s: MultirotorState, command: PerRotor) -> MultirotorState:
     """The state s with the constraints of parameters p met at once, under a command [V]."""
     memory = s.memory
-    drive = MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, command)
+    drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, command)
     return MultirotorState(_struck(drive, s.motion), memory)
 
 
@@ -154,4 +154,4 @@ def _struck(drive: MultirotorDrive, x: Any) -> Any:
 
 @overload_for(_struck)
 def _struck_of(drive: types.Type, x: types.Type) -> Any:
-    return struck if x.instance_class is FiveBodies else multirotor_euler.struck
+    return apply_constraint_impulse if x.instance_class is FiveBodies else multirotor_euler.apply_constraint_impulse

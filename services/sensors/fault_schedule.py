@@ -56,7 +56,7 @@ def _fault(number: int, table: Mapping[str, Any], channels: Sequence[str], tick:
     try:
         t = FaultTable.model_validate(table)
     except ValidationError as error:
-        raise fault(error, FaultTable).under(f"faults.{number}") from None
+        raise fault(error, FaultTable).with_prefix(f"faults.{number}") from None
     if t.channel not in ("all", *channels):
         raise ConfigError.unknown(f"faults.{number}.channel", "channel", t.channel, ("all", *channels))
     if not t.stop > t.start:

@@ -75,9 +75,9 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
             return p
         return p._replace(faults=fault_schedule.compile_faults(faults, module.CHANNELS, tick))
     except ValidationError as error:
-        raise fault(error, type(preset)).under(sensor) from None
+        raise fault(error, type(preset)).with_prefix(sensor) from None
     except ConfigError as error:
-        raise error.under(sensor) from None
+        raise error.with_prefix(sensor) from None
 
 
 @cache
@@ -92,7 +92,7 @@ def _check_limits(p: Any) -> None:
             try:
                 _check_limits(value)
             except ConfigError as error:
-                raise error.under(key) from None
+                raise error.with_prefix(key) from None
         elif value == math.inf and p._field_defaults.get(key) != math.inf:
             raise ConfigError(key, "got inf", "a finite number")
     least, most = getattr(p, "range_min", 0.0), getattr(p, "range_max", math.inf)

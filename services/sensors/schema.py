@@ -32,5 +32,5 @@ class Sensors(NamedTables):
             try:
                 rate = parameters(name, table, scene[Communication].interval).rate
             except ConfigError as error:
-                raise error.under("sensors") from None
+                raise error.with_prefix("sensors") from None
             ticks(scene, rate, f"sensors.{name}.rate")

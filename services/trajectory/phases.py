@@ -17,7 +17,7 @@ def _segments(value: object) -> tuple[Segment, ...]:
         try:
             segments.append(choose(table))
         except ConfigError as error:
-            raise error.under(str(number)) from None
+            raise error.with_prefix(str(number)) from None
     return tuple(segments)
 
 

@@ -63,7 +63,7 @@ def _pieces(phase: Phase, key: str, channel: str, value: dict[str, float]) -> li
         try:
             pieces += segment.pieces(value[channel])
         except ConfigError as error:
-            raise error.under(f"{key}.{channel}") from None
+            raise error.with_prefix(f"{key}.{channel}") from None
         value[channel] = segment.end(value[channel])
     return pieces
 

@@ -77,7 +77,7 @@ def test_registers_a_hook(name):
 
 @pytest.mark.parametrize("name", effects.names())
 def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
-    assert isinstance(hooks.initial_memory(made(name, NEEDED.get(name, {}))), tuple)
+    assert isinstance(hooks.initial_discrete_state(made(name, NEEDED.get(name, {}))), tuple)
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.nonsense: ") as error:
         made(name, {**NEEDED.get(name, {}), "nonsense": 1.0})
     assert "\n" not in str(error.value)

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lapwing.dynamics import integrators
-from lapwing.dynamics.integrators import RATES, march
+from lapwing.dynamics.integrators import RATES, integrate_fixed
 from lapwing.dynamics.lie import quaternion, s2, so3, ts2
 from lapwing.dynamics.lie.quaternion import Quaternion, rotate_back
 from lapwing.dynamics.lie.s2 import Direction
@@ -113,7 +113,7 @@ def exact():
 
 
 def problem(method):
-    return BODY if hasattr(method, "unfit") else SPACES
+    return BODY if hasattr(method, "incompatibility") else SPACES
 
 
 def defect(x):
@@ -138,7 +138,7 @@ def test_order_and_manifold(name, exact):
     method = integrators.get(name)
     p, x0 = problem(method)
     steps = [SPAN / n for n in COUNTS[method.ORDER]]
-    ends = [march(method.Method(), p, 0.0, x0, SPAN / n, n) for n in COUNTS[method.ORDER]]
+    ends = [integrate_fixed(method.Method(), p, 0.0, x0, SPAN / n, n) for n in COUNTS[method.ORDER]]
     if method.ON_MANIFOLD:
         assert max(map(defect, ends)) < 8 * EPS
     measured = {}
@@ -182,9 +182,9 @@ RATES.update({CountingNumberParameters: counting_number_rate, CountingBodyParame
 @pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
 def test_evaluations_are_as_declared(name):
     method, (body, start), count = integrators.get(name), BODY, np.zeros(1, dtype=np.int64)
-    on_body = hasattr(method, "unfit")
+    on_body = hasattr(method, "incompatibility")
     p = CountingBodyParameters(body.inertia, count) if on_body else CountingNumberParameters(count)
-    march(method.Method(), p, 0.0, start if on_body else (0.3,), 0.1, 1)
+    integrate_fixed(method.Method(), p, 0.0, start if on_body else (0.3,), 0.1, 1)
     assert count[0] == method.EVALUATIONS
 
 
@@ -198,4 +198,4 @@ def test_a_drifting_method_says_so():
     drifting = [n for n in integrators.names() if not integrators.get(n).ON_MANIFOLD]
     assert drifting
     for name in drifting:
-        assert defect(march(integrators.get(name).Method(), p, 0.0, x0, 0.1, 16)) > 1e-7
+        assert defect(integrate_fixed(integrators.get(name).Method(), p, 0.0, x0, 0.1, 16)) > 1e-7

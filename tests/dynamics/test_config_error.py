@@ -28,6 +28,6 @@ def test_the_line(error, text):
 
 def test_a_fault_seen_from_the_table_around_it():
     inner = ConfigError("rate", "got -1", "a number above 0")
-    assert inner.under("sensors.imu").key == "sensors.imu.rate"
-    assert ConfigError("", "excludes b").under("effects.a").key == "effects.a"
-    assert inner.under("").key == "rate"
+    assert inner.with_prefix("sensors.imu").key == "sensors.imu.rate"
+    assert ConfigError("", "excludes b").with_prefix("effects.a").key == "effects.a"
+    assert inner.with_prefix("").key == "rate"

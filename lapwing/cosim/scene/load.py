@@ -186,7 +186,7 @@ def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[SceneT
         try:
             tables[section] = section.model_validate(copied(raw))
         except ValidationError as error:
-            raise fault(error, section).under(name) from None
+            raise fault(error, section).with_prefix(name) from None
     return tables
 
 

@@ -94,12 +94,12 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment:
             try:
                 get(name, module).check(table, tables)
             except ConfigError as error:
-                raise error.under(f"effects.{name}") from None
+                raise error.with_prefix(f"effects.{name}") from None
         cls = parameter_class(name, module)
         build = getattr(cls, "from_scene", None)
         try:
             effect = build(table, airframe) if build else checked(cls, table)
         except ConfigError as error:
-            raise error.under(f"effects.{name}") from None
+            raise error.with_prefix(f"effects.{name}") from None
         active.append(effect.in_environment(environment) if hasattr(effect, "in_environment") else effect)
     return tuple(active)

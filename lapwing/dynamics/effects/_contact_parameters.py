@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
 from lapwing.dynamics.vector import Vec3
@@ -63,7 +63,7 @@ class GroundContact(NamedTuple):
         if given.friction_dynamic > given.friction_static:
             expected = f"at most friction_static = {given.friction_static}"
             raise ConfigError("friction_dynamic", f"got {given.friction_dynamic}", expected)
-        points = airframe.contact or cannot("the vehicle has no feet, [contact] in its file")
+        points = airframe.contact or reject("the vehicle has no feet, [contact] in its file")
         feet = points.feet + points.hull
         common = (
             LEVEL, feet, _reach(feet), given.stiffness, given.damping, 1.0 / given.transition_width,
@@ -81,7 +81,7 @@ class GroundContact(NamedTuple):
         """On the ground that is there."""
         return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
 
-    def initial_memory(self) -> tuple[tuple[float, float, float, float, float], ...]:
+    def initial_discrete_state(self) -> tuple[tuple[float, float, float, float, float], ...]:
         """No foot is on the ground."""
         return (NOWHERE,) * len(self.feet)
 
@@ -110,7 +110,7 @@ class GroundContactSmooth(NamedTuple):
         """On the ground that is there."""
         return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
 
-    def initial_memory(self) -> tuple[tuple[()], ...]:
+    def initial_discrete_state(self) -> tuple[tuple[()], ...]:
         """Nothing to remember, foot by foot."""
         return ((),) * len(self.feet)
 

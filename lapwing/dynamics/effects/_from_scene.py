@@ -44,6 +44,6 @@ def _tuples(value: Any) -> Any:
     return value
 
 
-def cannot(reason: str) -> NoReturn:
+def reject(reason: str) -> NoReturn:
     """Refuse an effect that the vehicle cannot have."""
     raise ConfigError("", reason)

@@ -1,44 +1,41 @@
-"""What an effect may do, and how a scene's effects are combined without run-time cost.
+"""Hooks of effects, and their combination without run-time cost.
 
-A scene's effects are a tuple of parameter NamedTuples, one per active effect, sorted by name; beside it runs a tuple of
-equal length with each effect's memory. An effect registers compiled functions ("hooks") for its parameter type. From
-the *types* in the tuple the calls are written out as straight-line code when the plant is compiled: an effect that is
-not in the tuple leaves no trace in the machine code.
+The effects of a scene are a tuple of parameter NamedTuples, one per active effect, in the order of evaluation. A tuple
+of equal length holds the discrete state of each effect. An effect registers compiled functions ("hooks") for its
+parameter type. The calls are written out from the types in the tuple when the plant is compiled, so an effect that is
+not in the tuple is not in the machine code.
 
-The stages of one evaluation, in order, each a hook:
+Hooks of one evaluation, in order:
 
-    air       (e, memory, s, air) -> Air                     density and wind at the vehicle
-    air_rate  (e, memory, s, rate_body) -> rate_body [rad/s] at which the air turns
-    factors   (e, memory, s, factors) -> Factors             on each rotor's thrust and torque
-    loads     (e, memory, s, factors, loads) -> Loads        thrust and torque of each rotor, added to those before
-    supply    (e, memory, voltage) -> voltage                what the battery lets the motors have
-    gauge     (e, memory) -> (charge, voltage [V], current [A], temperature [K], NaN where not modelled) of the battery
-    motor     (e, memory, s, loads, voltage) -> (acceleration, current, power) of each rotor; one effect only
-    wrench    (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
-    wrench_body  the same with the force in body coordinates
-    torque    (e, memory, s, rotors) -> torque_body [N m], where there is no force
-    field     (e, memory) -> acceleration of gravity, world [m/s^2]: of what wrench, for each of several bodies
+    air                  (e, memory, s, air) -> Air                  density and wind at the vehicle
+    air_rate             (e, memory, s, rate_body) -> rate_body      [rad/s] rotation of the air
+    load_factors         (e, memory, s, factors) -> Factors          on thrust and torque of each rotor
+    loads                (e, memory, s, factors, loads) -> Loads     thrust and torque of each rotor, added to loads
+    supply_voltage       (e, memory, voltage) -> voltage             [V] available to the motors
+    battery_state        (e, memory) -> (charge, voltage [V], current [A], temperature [K]); NaN: not modelled
+    motor                (e, memory, s, loads, voltage) -> (acceleration, current, power) of each rotor; one effect only
+    wrench               (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
+    wrench_body          (e, memory, s, rotors) -> (force_body [N], torque_body [N m])
+    torque               (e, memory, s, rotors) -> torque_body [N m]
+    field                (e, memory) -> acceleration of gravity, world [m/s^2], for models of several bodies
 
-and between evaluations:
+Hooks between evaluations:
 
-    body      (e, memory, body) -> MassProperties      mass and inertia for the next exchange interval
-    sample    (e, memory, s, rotors, key, tick, interval) -> memory    once an exchange interval, before its first step;
-                                                       s and rotors are those without the effects that can sleep
-    asleep    (e, memory, motion, h) -> bool           can the effect do nothing within the next step?
-    substeps  (e, memory, motion, h) -> int            of an effect that can sleep and is stiff: how many steps to split
-                                                       the next one into at least, when awake
-    settle    (e, memory, motion, h) -> memory         after every step, when awake
-    event     (e, before, after) -> bool               of two memories: did forces jump in the step between them?
-    contact   (e, memory, s) -> bool                   does the vehicle touch the ground?
-    contact_forces   (e, memory, motion) -> ((place [m], force [N]) of every point that may touch it), world
-    wind      (e, memory, wind) -> wind                [m/s] world: for the log, of an effect that blows without moving
-                                                       the air that others feel
+    mass_properties      (e, memory, body) -> MassProperties         for the next communication step
+    discrete_update      (e, memory, s, rotors, key, tick, interval) -> memory    once per communication step, before
+                         its first integrator step; s and rotors exclude effects that can sleep
+    is_sleeping          (e, memory, motion, h) -> bool              True if the effect cannot act in the next step
+    substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
+    post_step            (e, memory, motion, h) -> memory            after every step, when awake
+    discontinuity        (e, before, after) -> bool                  True if forces jumped between two discrete states
+    contact              (e, memory, s) -> bool                      True if the vehicle touches the ground
+    contact_forces       (e, memory, motion) -> ((place [m], force [N]) of each contact point), world
+    wind                 (e, memory, wind) -> wind                   [m/s] world, for the log only
 
-While all effects that can sleep are asleep, steps are taken without them, at no cost but the question. While one that
-is stiff is awake, steps are taken under error control, their memory included
-(`lapwing.dynamics.vehicles.multirotor_stepper`).
+While all effects that can sleep are sleeping, steps are taken without them. While a stiff one is awake, steps are taken
+under error control, which includes their discrete states (`lapwing.dynamics.vehicles.multirotor_stepper`).
 
-The memory of an effect is a tuple of floats that its parameter class gives with `initial_memory()`; () without it.
+The discrete state of an effect is a tuple of floats, at first `initial_discrete_state()` of its parameter class, or ().
 """
 
 from collections.abc import Callable
@@ -67,31 +64,31 @@ def _hook(name: str) -> Callable:
     return for_type
 
 
-body = _hook("body")
+mass_properties = _hook("mass_properties")
 air = _hook("air")
 air_rate = _hook("air_rate")
-factors = _hook("factors")
+load_factors = _hook("load_factors")
 loads = _hook("loads")
-supply = _hook("supply")
-gauge = _hook("gauge")
+supply_voltage = _hook("supply_voltage")
+battery_state = _hook("battery_state")
 motor = _hook("motor")
 wrench = _hook("wrench")
 wrench_body = _hook("wrench_body")
 torque = _hook("torque")
 field = _hook("field")
-sample = _hook("sample")
-settle = _hook("settle")
+discrete_update = _hook("discrete_update")
+post_step = _hook("post_step")
 substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
-event = _hook("event")
-asleep = _hook("asleep")
+discontinuity = _hook("discontinuity")
+is_sleeping = _hook("is_sleeping")
 wind = _hook("wind")
 
 
-def initial_memory(e: Any) -> tuple:
-    """What an effect remembers before the first exchange."""
-    return e.initial_memory() if hasattr(e, "initial_memory") else ()
+def initial_discrete_state(e: Any) -> tuple:
+    """Return the discrete state of an effect before the first tick."""
+    return e.initial_discrete_state() if hasattr(e, "initial_discrete_state") else ()
 
 
 def _written_out(
@@ -133,12 +130,12 @@ def _chain(hook: str, before: str = "") -> Callable:
     return _written_out(f"all_{hook}", hook, f"{before}value", call, "value")
 
 
-all_body = _chain("body")
+all_mass_properties = _chain("mass_properties")
 all_air = _chain("air", "s, ")
 all_air_rate = _chain("air_rate", "s, ")
-all_factors = _chain("factors", "s, ")
+all_load_factors = _chain("load_factors", "s, ")
 all_loads = _chain("loads", "s, factors, ")
-all_supply = _chain("supply")
+all_supply_voltage = _chain("supply_voltage")
 all_winds = _chain("wind")
 all_torques = _written_out(
     "all_torques",
@@ -178,24 +175,24 @@ all_motors = _written_out(
     "value",
     default="default",
 )
-all_gauges = _written_out(
-    "all_gauges",
-    "gauge",
+all_battery_states = _written_out(
+    "all_battery_states",
+    "battery_state",
     "default",
     "value = f{i}(effects[{i}], memory[{i}])",
     "value",
     default="default",
 )
-all_samples = _written_out(
-    "all_samples",
-    "sample",
+all_discrete_updates = _written_out(
+    "all_discrete_updates",
+    "discrete_update",
     "s, rotors, key, tick, interval",
     "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
     "memory",
 )
-all_settled = _written_out(
-    "all_settled",
-    "settle",
+all_post_steps = _written_out(
+    "all_post_steps",
+    "post_step",
     "motion, h",
     "m{i} = f{i}(effects[{i}], memory[{i}], motion, h)",
     "memory",
@@ -209,9 +206,9 @@ all_substeps = _written_out(
     default="1",
     more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
 )
-all_events = _written_out(
-    "all_events",
-    "event",
+any_discontinuity = _written_out(
+    "any_discontinuity",
+    "discontinuity",
     "after",
     "happened = f{i}(effects[{i}], memory[{i}], after[{i}])",
     "happened",
@@ -236,9 +233,9 @@ all_contact_forces = _written_out(
     default="()",
     more="forces = forces + f{i}(effects[{i}], memory[{i}], motion)",
 )
-all_asleep = _written_out(
-    "all_asleep",
-    "asleep",
+all_sleeping = _written_out(
+    "all_sleeping",
+    "is_sleeping",
     "motion, h",
     "sleeping = f{i}(effects[{i}], memory[{i}], motion, h)",
     "sleeping",
@@ -247,24 +244,26 @@ all_asleep = _written_out(
 )
 
 
-def _all_calm(effects: Any, *_rest: Any) -> Callable:
-    both = HOOKS["substeps"], HOOKS["asleep"]
+def _all_stiff_sleeping(effects: Any, *_rest: Any) -> Callable:
+    both = HOOKS["substeps"], HOOKS["is_sleeping"]
     stiff = [i for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)]
-    names = {f"f{i}": HOOKS["asleep"][effects.types[i].instance_class] for i in stiff}
+    names = {f"f{i}": HOOKS["is_sleeping"][effects.types[i].instance_class] for i in stiff}
     calm = " and ".join(f"f{i}(effects[{i}], memory[{i}], motion, h)" for i in stiff)
-    return compile_source("all_calm(effects, memory, motion, h)", names, f"return {calm or 'True'}")
+    return compile_source("all_stiff_sleeping(effects, memory, motion, h)", names, f"return {calm or 'True'}")
 
 
-all_calm = generated_overload(
-    "all_calm(effects, memory, motion, h)",
-    _all_calm,
+all_stiff_sleeping = generated_overload(
+    "all_stiff_sleeping(effects, memory, motion, h)",
+    _all_stiff_sleeping,
     "Whether every effect that is stiff is asleep.",
     inline=True,
 )
 
 
 def _without_sleepers(effects: Any, _: Any) -> Callable:
-    kept = "".join(f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["asleep"])
+    kept = "".join(
+        f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["is_sleeping"]
+    )
     return compile_source("without_sleepers(effects, values)", {}, f"return ({kept})")
 
 

@@ -37,36 +37,36 @@ class NeighbourState(NamedTuple):
     is_load: bool = False
 
 
-INTERACT = HOOKS.setdefault("interact", DispatchTable())
+INTERACTION = HOOKS.setdefault("interaction", DispatchTable())
 
 
-def interact(parameters: type) -> Any:
+def interaction(parameters: type) -> Any:
     """Register the hook of a parameter class."""
 
     def register(function: Any) -> Any:
-        INTERACT[parameters] = always_inline(function)
-        return INTERACT[parameters]
+        INTERACTION[parameters] = always_inline(function)
+        return INTERACTION[parameters]
 
     return register
 
 
 def interacts(effects: tuple) -> bool:
     """Whether one of these effects knows of other vehicles."""
-    return any(type(e) in INTERACT for e in effects)
+    return any(type(e) in INTERACTION for e in effects)
 
 
 def presence(effects: tuple) -> NeighbourState:
     """What the effects of a vehicle say of it; the rest is for its state to fill in."""
-    given = [e.presence() for e in effects if type(e) in INTERACT]
+    given = [e.presence() for e in effects if type(e) in INTERACTION]
     return NeighbourState(**{key: value for table in given for key, value in table.items()})
 
 
 def _all_interactions(effects: Any, *_rest: Any) -> Any:
     names, members = {}, []
     for i, effect in enumerate(effects.types):
-        known = effect.instance_class in INTERACT
+        known = effect.instance_class in INTERACTION
         if known:
-            names[f"f{i}"] = INTERACT[effect.instance_class]
+            names[f"f{i}"] = INTERACTION[effect.instance_class]
         members.append(f"f{i}(effects[{i}], memory[{i}], own, others, interval)" if known else f"memory[{i}]")
     values = "".join(f"{member}, " for member in members)
     return compile_source("all_interactions(effects, memory, own, others, interval)", names, f"return ({values})")

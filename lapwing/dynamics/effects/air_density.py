@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.atmosphere import Atmosphere, density, density_slope
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import air, sample
+from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.kernels import always_inline, python_function
@@ -37,7 +37,7 @@ class AirDensity(NamedTuple):
         """That of the place and the day."""
         return AirDensity(environment.atmosphere, environment.home.height)
 
-    def initial_memory(self) -> tuple[float, float]:
+    def initial_discrete_state(self) -> tuple[float, float]:
         """The tangent at home."""
         return python_function(_tangent)(self, 0.0)
 
@@ -49,7 +49,7 @@ def _tangent(e, height):
     return (density(e.atmosphere, altitude) - slope * height, slope)
 
 
-@sample(AirDensity)
+@discrete_update(AirDensity)
 def tangent(e, memory, s, rotors, key, tick, interval):
     """(density [kg/m^3], slope [kg/m^4]) of the tangent to the law at the vehicle's height, given at z = 0.
 

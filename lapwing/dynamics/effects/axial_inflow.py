@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import axial_speeds
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
@@ -39,9 +39,9 @@ class AxialInflow(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AxialInflow":
         """From the airframe's propeller."""
         checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         if propeller.zero_lift_angle != 0.0:
-            cannot("the propeller's zero_lift_angle must be 0: the correction is derived for that")
+            reject("the propeller's zero_lift_angle must be 0: the correction is derived for that")
         profile, induced = drag_coefficients(propeller)
         square = (2.0 * math.pi) ** 2
         return cls(

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
-from lapwing.dynamics.effects._hooks import gauge, sample, supply
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.codegen import map_tuple
@@ -44,13 +44,13 @@ class Battery(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
         """From the airframe's battery."""
         given = checked(Settings, table)
-        pack = airframe.battery or cannot("the vehicle has no [battery]")
+        pack = airframe.battery or reject("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
         return cls(
             float(pack.cells), pack.capacity, resistance, given.initial_charge, pack.cells * given.cutoff_voltage
         )
 
-    def initial_memory(self) -> tuple[float, float, float]:
+    def initial_discrete_state(self) -> tuple[float, float, float]:
         """(charge, voltage [V] under load, current [A])."""
         return (self.initial_charge, self.cells * python_function(open_circuit_voltage)(self.initial_charge), 0.0)
 
@@ -67,7 +67,7 @@ def at_most(limit, voltage, _):
     return min(voltage, limit)
 
 
-@sample(Battery)
+@discrete_update(Battery)
 def discharge(e, memory, s, rotors, key, tick, interval):
     """Memory after drawing the motors' power for an interval."""
     charge, voltage, _ = memory
@@ -79,13 +79,13 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     return (charge, voltage if voltage > e.cutoff_voltage else 0.0, current)
 
 
-@supply(Battery)
+@supply_voltage(Battery)
 def battery(e, memory, voltage):
     """Voltage [V] that each motor gets."""
     return map_tuple(at_most, memory[1], voltage, voltage)
 
 
-@gauge(Battery)
+@battery_state(Battery)
 def read(e, memory):
     """What a battery monitor shows: charge, voltage [V] under load, current [A]; no temperature."""
     return memory[0], memory[1], memory[2], math.nan

@@ -7,8 +7,8 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import cannot, checked
-from lapwing.dynamics.effects._hooks import gauge, sample, supply
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, at_most, open_circuit_voltage
 from lapwing.dynamics.environment import Environment
@@ -71,7 +71,7 @@ class BatteryThevenin(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
         """From the airframe's battery."""
         given = checked(Settings, table)
-        pack = airframe.battery or cannot("the vehicle has no [battery]")
+        pack = airframe.battery or reject("the vehicle has no [battery]")
         if given.restart is not None and given.restart <= given.cutoff_voltage:
             raise ConfigError(
                 "restart", f"got {given.restart:g} V", f"more than cutoff_voltage = {given.cutoff_voltage:g} V"
@@ -91,7 +91,7 @@ class BatteryThevenin(NamedTuple):
         air = float(air_temperature(environment.atmosphere, environment.home.height))
         return self._replace(air_temperature=air, temperature=self.temperature if self.given_temperature else air)
 
-    def initial_memory(self) -> tuple[float, float, float, float, float, float, float]:
+    def initial_discrete_state(self) -> tuple[float, float, float, float, float, float, float]:
         """(charge, voltage [V], current [A], temperature [K], voltage over each transient [V], 1 while switched on)."""
         return (
             self.initial_charge,
@@ -104,7 +104,7 @@ class BatteryThevenin(NamedTuple):
         )
 
 
-@sample(BatteryThevenin)
+@discrete_update(BatteryThevenin)
 def discharge(e, memory, s, rotors, key, tick, interval):
     """Memory after drawing the motors' power for an interval."""
     charge, voltage, _, temperature, fast, slow, on = memory
@@ -124,13 +124,13 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)
 
 
-@supply(BatteryThevenin)
+@supply_voltage(BatteryThevenin)
 def battery_thevenin(e, memory, voltage):
     """Voltage [V] that each motor gets."""
     return map_tuple(at_most, memory[1] * memory[6], voltage, voltage)
 
 
-@gauge(BatteryThevenin)
+@battery_state(BatteryThevenin)
 def read(e, memory):
     """What a battery monitor shows: charge, voltage [V] at its terminals, current [A], temperature [K]."""
     return memory[0], memory[1], memory[2], memory[3]

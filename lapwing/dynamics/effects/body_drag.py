@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 
@@ -38,7 +38,7 @@ class BodyDrag(NamedTuple):
         given = checked(Settings, table)
         area = given.area
         if area is None:
-            area = airframe.drag.area if airframe.drag else cannot("needs the key area: the vehicle has no [drag]")
+            area = airframe.drag.area if airframe.drag else reject("needs the key area: the vehicle has no [drag]")
         x, y, z = area
         return cls((0.5 * x, 0.5 * y, 0.5 * z), given.linear)
 

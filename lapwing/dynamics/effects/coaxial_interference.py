@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
@@ -49,16 +49,16 @@ class CoaxialInterference(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
         """For every rotor with another one above it."""
         checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         uppers = _uppers(airframe, radius)
         if all(number < 0 for number, _ in uppers):
             most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
-            cannot(f"no rotor stands under another one (by at most {most})")
+            reject(f"no rotor stands under another one (by at most {most})")
         static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         if flow >= pitch:
-            cannot(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
         above = tuple(tuple(float(number == j) for j in range(len(uppers))) for number, _ in uppers)
         return cls(static, pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers))
 
@@ -97,10 +97,10 @@ class CoaxialInterference(NamedTuple):
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     """It changes the loads of `rotor_thrust`."""
     if "rotor_thrust" not in tables:
-        cannot("goes with effects.rotor_thrust, which the scene does not name")
+        reject("goes with effects.rotor_thrust, which the scene does not name")
     for name in NOT_BESIDE:
         if name in tables:
-            cannot(f"is not made to stand beside effects.{name}: keep one of them")
+            reject(f"is not made to stand beside effects.{name}: keep one of them")
 
 
 def stacked(airframe: "Airframe") -> bool:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench
-from lapwing.dynamics.effects._vehicle_interaction import interact
+from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import NOTHING, ZERO, add, dot, norm, scale, subtract
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -40,11 +40,11 @@ class Collision(NamedTuple):
         given = checked(Settings, table)
         radius = given.radius
         if radius is None:
-            propeller = airframe.propeller or cannot("needs the key radius: the vehicle has no [propeller]")
+            propeller = airframe.propeller or reject("needs the key radius: the vehicle has no [propeller]")
             radius = max(math.hypot(*place) for place in airframe.rotors.position) + 0.5 * propeller.diameter
         return cls(radius, given.restitution)
 
-    def initial_memory(self) -> tuple[float, float, float]:
+    def initial_discrete_state(self) -> tuple[float, float, float]:
         """The force of others [N], world."""
         return ZERO
 
@@ -53,7 +53,7 @@ class Collision(NamedTuple):
         return {"radius": self.radius, "restitution": self.restitution}
 
 
-@interact(Collision)
+@interaction(Collision)
 def touch(e, memory, own, others, interval):
     """The force of all that it touches, over the coming interval."""
     force = (0.0, 0.0, 0.0)

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
-from lapwing.dynamics.effects._vehicle_interaction import interact
+from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import ZERO, add, dot, norm, scale, subtract
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -39,10 +39,10 @@ class Downwash(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
         """With the discs of the airframe's propellers."""
         given = checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         return cls(0.5 * propeller.diameter * math.sqrt(len(airframe.rotors.position)), given.spread)
 
-    def initial_memory(self) -> tuple[float, float, float]:
+    def initial_discrete_state(self) -> tuple[float, float, float]:
         """The wind of others [m/s], world."""
         return ZERO
 
@@ -51,7 +51,7 @@ class Downwash(NamedTuple):
         return {"disc_radius": self.disc_radius}
 
 
-@interact(Downwash)
+@interaction(Downwash)
 def blown(e, memory, own, others, interval):
     """The wind of all other vehicles' jets where this one is, for the coming interval."""
     wind = (0.0, 0.0, 0.0)

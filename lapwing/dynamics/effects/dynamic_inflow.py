@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import cannot, checked
-from lapwing.dynamics.effects._hooks import loads, sample
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import discrete_update, loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.effects.axial_inflow import KIND
 from lapwing.dynamics.vector import pair
@@ -50,20 +50,20 @@ class DynamicInflow(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DynamicInflow":
         """From the airframe's propeller."""
         checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
         area = math.pi * radius * radius
         hover = math.sqrt(0.5 * static / area)
         if hover > LARGEST_SHARE * pitch:
             least = 2.0 * math.pi * hover / LARGEST_SHARE
-            cannot(
+            reject(
                 f"the propeller's pitch must be at least {least:.3g} m for its static thrust: got {propeller.pitch:g} m"
             )
         mass = APPARENT_MASS * 4.0 / 3.0 * math.pi * radius**3
         return cls(static / (pitch - hover), static, pitch, hover, area, mass, (0.0,) * len(airframe.rotors.position))
 
-    def initial_memory(self) -> tuple[float, ...]:
+    def initial_discrete_state(self) -> tuple[float, ...]:
         """Induced velocity of each rotor [m/s]."""
         return self.at_rest
 
@@ -88,7 +88,7 @@ def _followed(c, induced, both):
     return induced + (1.0 - math.exp(-rate * interval)) / gain * (steady - induced)
 
 
-@sample(DynamicInflow)
+@discrete_update(DynamicInflow)
 def follow(e, memory, s, rotors, key, tick, interval):
     """Induced velocity of each rotor for the next interval [m/s]."""
     return map_tuple(_followed, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))

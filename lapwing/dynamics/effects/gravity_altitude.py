@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.atmosphere import EARTH_RADIUS
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import field, sample, wrench
+from lapwing.dynamics.effects._hooks import discrete_update, field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
 from lapwing.kernels import always_inline
@@ -44,7 +44,7 @@ class GravityAltitude(NamedTuple):
         """[m/s^2] at the world frame's origin."""
         return _at(self, 0.0)
 
-    def initial_memory(self) -> tuple[float]:
+    def initial_discrete_state(self) -> tuple[float]:
         """Acceleration at home [m/s^2]."""
         return (self.acceleration_at_home,)
 
@@ -55,7 +55,7 @@ def _at(e, height):
     return e.acceleration * ratio * ratio
 
 
-@sample(GravityAltitude)
+@discrete_update(GravityAltitude)
 def weigh(e, memory, s, rotors, key, tick, interval):
     """The acceleration [m/s^2] for the next interval: it changes by 3e-7 of itself a metre."""
     return (_at(e, s.motion.position_world[2]),)

@@ -14,7 +14,15 @@ from lapwing.dynamics.effects._contact_parameters import (
     GroundContactSmooth,
 )
 from lapwing.dynamics.effects._foot_contact import NO_FOOT, footing, in_reach, stance_of
-from lapwing.dynamics.effects._hooks import asleep, contact, contact_forces, event, settle, substeps, wrench
+from lapwing.dynamics.effects._hooks import (
+    contact,
+    contact_forces,
+    discontinuity,
+    is_sleeping,
+    post_step,
+    substeps,
+    wrench,
+)
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
@@ -154,13 +162,13 @@ def forces_smooth(e, memory, motion):
     return _forces(e, memory, motion)
 
 
-@asleep(GroundContact)
+@is_sleeping(GroundContact)
 def far(e, memory, motion, h):
     """Well above the ground?"""
     return _far(e, motion, h)
 
 
-@asleep(GroundContactSmooth)
+@is_sleeping(GroundContactSmooth)
 def far_smooth(e, memory, motion, h):
     """Well above the ground?"""
     return _far(e, motion, h)
@@ -199,7 +207,7 @@ def _settled_four(c, feet, memory):
     return deinterleave((*place, select(pressing, how, FREE), select(pressing, square, 0.0)))
 
 
-@settle(GroundContact)
+@post_step(GroundContact)
 def drag_anchors(e, memory, motion, h):
     """Anchors after a step: kept by feet that stick, dragged along by feet that slide."""
     stance = stance_of(e, motion, rotation_matrix(motion.attitude))
@@ -212,7 +220,7 @@ def _lets_go(_, before, after):
     return before[3] + after[3] == STICKING + SLIDING
 
 
-@event(GroundContact)
+@discontinuity(GroundContact)
 def lets_go(e, before, after):
     """Has any foot begun to slide, or to stick?"""
     return any_in_tuple(map_tuple(_lets_go, 0.0, before, after))

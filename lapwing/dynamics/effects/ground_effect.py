@@ -3,8 +3,8 @@
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
-from lapwing.dynamics.effects._hooks import asleep, factors
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
@@ -37,7 +37,7 @@ class GroundEffect(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
         """From the airframe's propeller."""
         checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius = 0.5 * propeller.diameter
         reach = max(math.hypot(*position) for position in airframe.rotors.position)
         return cls(1.0 / radius, FADE_TO * radius + reach)
@@ -70,14 +70,14 @@ def _gained(_, factor, height):
     return factor * gain(height)
 
 
-@factors(GroundEffect)
+@load_factors(GroundEffect)
 def ground_effect(e, memory, s, before):
     """Factors on thrust; the torque stays."""
     heights = map_tuple(_height, (e, s), s.layout.x_body, s.layout.y_body)
     return Factors(map_tuple(_gained, 0.0, before.thrust, heights), before.torque)
 
 
-@asleep(GroundEffect)
+@is_sleeping(GroundEffect)
 def high(e, memory, motion, h):
     """Too high for any rotor to feel the ground within a step?"""
     over, climb = over_plane(e.terrain, motion.position_world), over_plane(e.terrain, motion.velocity_world)

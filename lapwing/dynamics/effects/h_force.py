@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
 from lapwing.dynamics.vector import add, cross, dot, pair, scale, subtract
@@ -42,10 +42,10 @@ class HForce(NamedTuple):
         given = checked(Settings, table)
         positions = airframe.rotors.position
         if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
-            cannot("the rotors must all be at one height")
+            reject("the rotors must all be at one height")
         coefficient = given.coefficient
         if coefficient is None:
-            propeller = airframe.propeller or cannot("needs the key coefficient: the vehicle has no [propeller]")
+            propeller = airframe.propeller or reject("needs the key coefficient: the vehicle has no [propeller]")
             coefficient = h_force_coefficient(propeller)
         return cls(coefficient, positions[0][2], tuple(x * x + y * y for x, y, _ in positions))
 

@@ -6,8 +6,8 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import cannot, checked
-from lapwing.dynamics.effects._hooks import body, sample
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import discrete_update, mass_properties
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -55,10 +55,10 @@ class PayloadRelease(NamedTuple):
         rest = (inertia[0] - box[0], inertia[1] - box[1], inertia[2] - box[2])
         moments = principal_moments(rest, products)
         if moments[0] <= 0.0 or moments[2] > moments[0] + moments[1]:
-            cannot("takes more inertia than the vehicle has: make its mass or size smaller")
+            reject("takes more inertia than the vehicle has: make its mass or size smaller")
         return cls(release, body_of(total, inertia, products), body_of(total - mass, rest, products))
 
-    def initial_memory(self) -> tuple[float]:
+    def initial_discrete_state(self) -> tuple[float]:
         """1 once released."""
         return (0.0,)
 
@@ -77,13 +77,13 @@ RELEASED = (1.0,)
 """Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
 
 
-@sample(PayloadRelease)
+@discrete_update(PayloadRelease)
 def release(e, memory, s, rotors, key, tick, interval):
     """Let go when the time has come."""
     return (1.0,) if s.t >= e.release_time else memory
 
 
-@body(PayloadRelease)
+@mass_properties(PayloadRelease)
 def payload_release(e, memory, before):
     """Mass properties with or without it."""
     return e.empty if memory[0] > 0.0 else e.loaded

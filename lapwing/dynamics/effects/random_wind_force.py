@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import sample, wind, wrench
+from lapwing.dynamics.effects._hooks import discrete_update, wind, wrench
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
 from lapwing.kernels import always_inline
@@ -56,7 +56,7 @@ class RandomWindForce(NamedTuple):
         given = checked(Settings, table)
         return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
 
-    def initial_memory(self) -> tuple[Vec3, Vec3]:
+    def initial_discrete_state(self) -> tuple[Vec3, Vec3]:
         """The force and the wind: none before the first exchange."""
         return ZERO, ZERO
 
@@ -77,7 +77,7 @@ def _blow(e, key, number, velocity_world):
     return scale(e.factor * norm(v), v), drawn
 
 
-@sample(RandomWindForce)
+@discrete_update(RandomWindForce)
 def draw(e, memory, s, rotors, key, tick, interval):
     """Mean force [N] and wind [m/s] of the next exchange interval, in world coordinates."""
     start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws

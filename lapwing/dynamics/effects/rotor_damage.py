@@ -6,7 +6,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import factors, sample
+from lapwing.dynamics.effects._hooks import discrete_update, load_factors
 from lapwing.dynamics.effects._types import Factors, PerRotor
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
@@ -48,7 +48,7 @@ class RotorDamage(NamedTuple):
 
         return cls(given.time, only_this(given.remaining_thrust), only_this(given.remaining_torque))
 
-    def initial_memory(self) -> tuple[PerRotor, PerRotor]:
+    def initial_discrete_state(self) -> tuple[PerRotor, PerRotor]:
         """Fractions of thrust and torque in force."""
         return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.remaining_torque)
 
@@ -58,13 +58,13 @@ def _product(_, a, b):
     return a * b
 
 
-@sample(RotorDamage)
+@discrete_update(RotorDamage)
 def strike(e, memory, s, rotors, key, tick, interval):
     """The fractions for the next interval."""
     return (e.remaining_thrust, e.remaining_torque) if s.t >= e.time else memory
 
 
-@factors(RotorDamage)
+@load_factors(RotorDamage)
 def rotor_damage(e, memory, s, before):
     """Factors on the damaged rotor's loads."""
     return Factors(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total_wrench
 from lapwing.dynamics.vector import add, cross, dot, norm, pair, scale, subtract
@@ -44,7 +44,7 @@ class RotorFlapping(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorFlapping":
         """From the airframe's propeller."""
         given = checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         coefficient, radius = given.coefficient, 0.5 * propeller.diameter
         if coefficient is None:
             # at the tip: geometric angle H / (2 pi R), inflow ratio v_h / (w R) = sqrt(T / (2 rho A)) / (w R)

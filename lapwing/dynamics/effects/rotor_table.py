@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._propeller_data import parsed
 from lapwing.dynamics.effects._types import Loads
@@ -63,7 +63,7 @@ class RotorTable(NamedTuple):
         given = checked(Settings, table)
         diameter = given.diameter
         if diameter is None:
-            propeller = airframe.propeller or cannot("needs the key diameter: the vehicle has no [propeller]")
+            propeller = airframe.propeller or reject("needs the key diameter: the vehicle has no [propeller]")
             diameter = propeller.diameter
         _check(given)
         thrust = np.array(given.thrust) * diameter**4
@@ -79,7 +79,7 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     """The table says all of a rotor's thrust and torque."""
     for name in INSTEAD_OF:
         if name in tables:
-            cannot(f"stands for effects.{name}: keep one of them")
+            reject(f"stands for effects.{name}: keep one of them")
 
 
 def embed(table: dict[str, Any], folder: Path) -> None:

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import cannot, checked
+from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
@@ -34,7 +34,7 @@ class RotorThrust(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
         """From the airframe's propeller."""
         checked(Settings, table)
-        propeller = airframe.propeller or cannot("the vehicle has no [propeller]; name rotor_quadratic instead")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]; name rotor_quadratic instead")
         square = (2.0 * math.pi) ** 2
         return cls(
             thrust_coefficient(propeller) * propeller.diameter**4 / square,

@@ -6,7 +6,7 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import wrench
-from lapwing.dynamics.effects._vehicle_interaction import interact
+from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
@@ -52,7 +52,7 @@ class SharedSlungLoad(NamedTuple):
         """Over the ground that is there."""
         return SharedSlungLoad(self.sling._replace(terrain=environment.terrain))
 
-    def initial_memory(self) -> tuple[Vec3, Vec3, Vec3, float]:
+    def initial_discrete_state(self) -> tuple[Vec3, Vec3, Vec3, float]:
         """Position, velocity and acceleration of the load at a time [s]; before 0 nothing is known of it."""
         return ZERO, ZERO, ZERO, -1.0
 
@@ -61,7 +61,7 @@ class SharedSlungLoad(NamedTuple):
         return {"hook_body": self.sling.hook_body}
 
 
-@interact(SharedSlungLoad)
+@interaction(SharedSlungLoad)
 def fastened(e, memory, own, others, interval):
     """Where the load is and how it moves, at the beginning of the coming interval."""
     for other in others:

@@ -3,7 +3,7 @@
 import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
-from lapwing.dynamics.effects._hooks import air, sample
+from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
     LONG_AGO,
@@ -48,12 +48,12 @@ class WindDryden(NamedTuple):
         """Over the ground that is there."""
         return WindDryden(self.conditions._replace(terrain=environment.terrain))
 
-    def initial_memory(self) -> tuple[tuple[float, ...], Vec3]:
+    def initial_discrete_state(self) -> tuple[tuple[float, ...], Vec3]:
         """(along, first and second state across, first and second vertical, 1 once started), then the wind."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO
 
 
-@sample(WindDryden)
+@discrete_update(WindDryden)
 def draw(e, memory, s, rotors, key, tick, interval):
     """States of the filters and the wind [m/s, world] for the next interval."""
     along, across1, across2, up1, up2, started = memory[0]

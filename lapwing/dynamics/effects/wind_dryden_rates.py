@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects import wind_dryden
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import air, air_rate, sample
+from lapwing.dynamics.effects._hooks import air, air_rate, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
     LONG_AGO,
@@ -72,7 +72,7 @@ class WindDrydenRates(NamedTuple):
         """Over the ground that is there."""
         return self._replace(conditions=self.conditions._replace(terrain=environment.terrain))
 
-    def initial_memory(self) -> tuple[tuple[float, ...], Vec3, tuple[float, float, float], Vec3]:
+    def initial_discrete_state(self) -> tuple[tuple[float, ...], Vec3, tuple[float, float, float], Vec3]:
         """Memory of `wind_dryden`, states of roll, pitch and yaw, and the air's rate [rad/s, world]."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 0.0), ZERO
 
@@ -117,7 +117,7 @@ def passed(x1, x2, z, beta, theta, n1, n2, n3):
     return a * x1 + b * x2 + low * z + c1 * n1 + c2 * n2 + c3 * n3
 
 
-@sample(WindDrydenRates)
+@discrete_update(WindDrydenRates)
 def draw(e, memory, s, rotors, key, tick, interval):
     """States of the filters, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
     along, across1, across2, up1, up2, started = memory[0]

@@ -3,7 +3,7 @@
 import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
-from lapwing.dynamics.effects._hooks import air, sample
+from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
     LONG_AGO,
@@ -53,7 +53,7 @@ class WindVonKarman(NamedTuple):
         """Over the ground that is there."""
         return WindVonKarman(self.conditions._replace(terrain=environment.terrain))
 
-    def initial_memory(self) -> tuple[tuple[Part, Part, Part, Part], Vec3, float]:
+    def initial_discrete_state(self) -> tuple[tuple[Part, Part, Part, Part], Vec3, float]:
         """(along, first and second state across, the same vertical) of each part, the wind, and 1 once started."""
         nothing = (0.0, 0.0, 0.0, 0.0, 0.0)
         return (nothing, nothing, nothing, nothing), ZERO, 0.0
@@ -72,7 +72,7 @@ def _part(k, state, theta, key, tick):
     return (along, across1, across2, up1, up2), gust
 
 
-@sample(WindVonKarman)
+@discrete_update(WindVonKarman)
 def draw(e, memory, s, rotors, key, tick, interval):
     """States of the parts, the wind [m/s, world] for the next interval, and that it has started."""
     sigma, rate = passing(e.conditions, s)

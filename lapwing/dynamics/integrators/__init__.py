@@ -5,28 +5,29 @@ A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on th
 `rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three
 more if they apply:
 `EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
-higher, and `unfit(p, x)` of a method that is not for every system.
+higher, and `incompatibility(p, x)` of a method that is not for every system.
 """
 
 from types import ModuleType
 from typing import Any
 
 from lapwing.dynamics import discovery
-from lapwing.dynamics.integrators._adaptive import adapt
-from lapwing.dynamics.integrators._fixed_step import RATES, march, rate, record, step
+from lapwing.dynamics.integrators._adaptive import integrate_adaptive
+from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
-from lapwing.dynamics.integrators._step_doubling import SHORTEST, StepDoubling, march_controlled, shorter
+from lapwing.dynamics.integrators._step_doubling import SHORTEST, StepDoubling, integrate_step_doubling, shorter
 
 __all__ = [
     "RATES",
     "SHORTEST",
     "StepDoubling",
-    "adapt",
     "check_start",
-    "fitting",
+    "compatible_methods",
     "get",
-    "march",
-    "march_controlled",
+    "incompatibility",
+    "integrate_adaptive",
+    "integrate_fixed",
+    "integrate_step_doubling",
     "names",
     "not_finite",
     "rate",
@@ -35,7 +36,6 @@ __all__ = [
     "simulate",
     "solve",
     "step",
-    "unfit",
 ]
 
 
@@ -49,12 +49,12 @@ def get(name: str) -> ModuleType:
     return discovery.get(__name__, name, "integrator")
 
 
-def unfit(name: str, p: Any, x: Any) -> str:
+def incompatibility(name: str, p: Any, x: Any) -> str:
     """Why a method is not for the system with parameters p and states like x, "" if it is."""
     module = get(name)
-    return module.unfit(p, x) if hasattr(module, "unfit") else ""
+    return module.incompatibility(p, x) if hasattr(module, "incompatibility") else ""
 
 
-def fitting(p: Any, x: Any) -> list[str]:
+def compatible_methods(p: Any, x: Any) -> list[str]:
     """Names of the methods for the system with parameters p and states like x."""
-    return [name for name in names() if not unfit(name, p, x)]
+    return [name for name in names() if not incompatibility(name, p, x)]

@@ -13,7 +13,7 @@ BETA = 0.04  # integral gain of the controller (Hairer, Wanner: Solving ODEs II,
 
 
 @kernel
-def adapt(p, x, times, tolerance, out):
+def integrate_adaptive(p, x, times, tolerance, out):
     """Write the state's numbers at each of `times` (increasing, the first that of x) into the rows of `out`.
 
     Returns (status, t, x, steps, rejected): where and why it ended (theory.md, eq. (6.17)).

@@ -16,7 +16,7 @@ RATES = DispatchTable()
 """The compiled `rate(p, t, x)` of a system, by the NamedTuple class of its parameters."""
 
 
-def token(module: str) -> type:
+def method_token(module: str) -> type:
     """The class that names a method in compiled code: empty, `Method` in the module, called as the module.
 
     The name matters: numba tells compiled versions of one function apart by the *names* of the argument types, and
@@ -54,7 +54,7 @@ def _step(method, p, t, x, h):
 
 
 @kernel
-def march(method, p, t, x, h, n):
+def integrate_fixed(method, p, t, x, h, n):
     """The state after n steps of h from time t (compiled loop; no checks)."""
     for i in range(n):
         x = step(method, p, t + i * h, x, h)

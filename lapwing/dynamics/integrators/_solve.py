@@ -100,7 +100,7 @@ def solve(p: Any, x0: Any, times: np.ndarray, tolerance: float) -> tuple[np.ndar
         raise ValueError(f"{_system(p)}: tolerance {tolerance:g} cannot be met: at least {SMALLEST_TOLERANCE:g}")
     check_start(p, x0)
     out = np.empty((len(times), len(flatten(x0))))
-    status, t, x, steps, rejected = _adaptive.adapt(p, x0, times, tolerance, out)
+    status, t, x, steps, rejected = _adaptive.integrate_adaptive(p, x0, times, tolerance, out)
     if status == _adaptive.STEP_TOO_SMALL:
         where = ", ".join(f"{name} = {value:.6g}" for name, value in named_numbers(x))
         raise ValueError(f"{_system(p)}: tolerance {tolerance:g} cannot be met at t = {t:.9g} s, state {where}")

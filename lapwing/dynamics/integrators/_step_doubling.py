@@ -31,7 +31,7 @@ def _once(method, p, t, x, h):
 
 
 @never_inlined
-def march_controlled(how, p, t, x, h, end):
+def integrate_step_doubling(how, p, t, x, h, end):
     """The state at time `end`, by parts of steps whose error is controlled; halves are kept, none longer than h."""
     allowed, part = how.tolerance, 2.0 * h
     smallest = SHORTEST * allowed

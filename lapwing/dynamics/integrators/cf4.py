@@ -3,14 +3,14 @@
 Celledoni, Marthinsen, Owren, Future Gener. Comput. Syst. 19 (2003) 341.
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, retract, scale
 
 ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -4,7 +4,7 @@ Called of fourth order by analogy; on a curved manifold it is of order 3, becaus
 differential of the exponential by the curvature at second order (theory.md, eq. (6.12)).
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, retract, scale, transport
 
@@ -12,7 +12,7 @@ ORDER = 3
 FLAT_ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -1,13 +1,13 @@
 """Forward Euler in the embedding: the stored numbers are stepped as if space were flat, and drift off the manifold."""
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed
 
 ORDER = 1
 EVALUATIONS = 1
 ON_MANIFOLD = False
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -2,13 +2,13 @@
 
 import math
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, largest, retract, scale
 
 ORDER = 2
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 ITERATIONS = 60
 

@@ -3,14 +3,14 @@
 This is also the gyrostat paper's forward Euler on a manifold, fEulM: its retraction on SO(3) is the same exponential.
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import retract, scale
 
 ORDER = 1
 EVALUATIONS = 1
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

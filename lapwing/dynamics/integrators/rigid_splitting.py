@@ -9,7 +9,7 @@ is kept to round-off in the world, and the energy error stays bounded for all ti
 import math
 from typing import Any
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.dynamics.lie.quaternion import Quaternion, normalise
 from lapwing.dynamics.vector import add, cross, divide, multiply, scale
 from lapwing.kernels import always_inline
@@ -18,13 +18,13 @@ from lapwing.kernels.state_tree import flatten, unflatten
 ORDER = 6
 EVALUATIONS = 10
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 _HALF = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023)
 STAGES = (*_HALF, 1.0 - 2.0 * sum(_HALF), *_HALF[::-1])
 
 
-def unfit(p: Any, x: Any) -> str:
+def incompatibility(p: Any, x: Any) -> str:
     """Why a system with parameters p and states like x is not for this method, "" if it is.
 
     The state must be (attitude, omega_body), the parameters have `inertia`, the principal moments [kg m^2], and

@@ -1,13 +1,13 @@
 """The classical Runge-Kutta method in the embedding: attitudes drift off SO(3) with the fifth power of the step."""
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed
 
 ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = False
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -1,14 +1,14 @@
 """The classical Runge-Kutta method in the embedding, brought back onto the manifold after every step."""
 
 from lapwing.dynamics.integrators import rk4
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import normalise
 
 ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

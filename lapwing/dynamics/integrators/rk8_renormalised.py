@@ -3,14 +3,14 @@
 For errors near round-off. Tableau: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.10.
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, embed, normalise
 
 ORDER = 8
 EVALUATIONS = 12
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -1,13 +1,13 @@
 """Runge-Kutta-Munthe-Kaas of order 2: the explicit midpoint rule along the exponential; no bracket is needed."""
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import retract, scale
 
 ORDER = 2
 EVALUATIONS = 2
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

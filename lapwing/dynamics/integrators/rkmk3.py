@@ -1,13 +1,13 @@
 """Runge-Kutta-Munthe-Kaas of order 3: Heun's tableau in the Lie algebra, with one bracket a step."""
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 3
 EVALUATIONS = 3
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -4,14 +4,14 @@ Munthe-Kaas, BIT 38 (1998) 92; the reduction to two brackets is that of Munthe-K
 Phil. Trans. R. Soc. A 357 (1999) 957.
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

@@ -3,14 +3,14 @@
 `step` is one fixed step; `stages` and `between` give what the adaptive run in `_adaptive` needs.
 """
 
-from lapwing.dynamics.integrators._fixed_step import token
+from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import axpy, bracket, retract, scale
 
 ORDER = 5
 EVALUATIONS = 7
 ON_MANIFOLD = True
-Method = token(__name__)
+Method = method_token(__name__)
 
 
 @always_inline

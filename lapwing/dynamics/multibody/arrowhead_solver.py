@@ -84,7 +84,7 @@ def point_inertia(mass, a):
 
 
 @always_inline
-def felt(C, moments, spins):
+def reflected_inertia(C, moments, spins):
     """The inertia of a leaf as its core feels it: C diag(moments) C^T for a rotation matrix C, without the moment about
     the leaf's z axis if it spins freely."""
     # C diag(1, 1, 1) C^T = 1 saves a column

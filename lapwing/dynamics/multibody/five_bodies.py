@@ -14,7 +14,7 @@ import numpy as np
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
-from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, felt
+from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, reflected_inertia
 from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.vector import (
     ZERO,
@@ -146,7 +146,7 @@ def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
     if feedback > 0.0:
         more, swing = _fed_back(feedback, r, speed, x, chassis, R0, axis, own)
         drift, turn = add(drift, more), add(turn, swing)
-    inertia = felt(C, moments, r.spins)
+    inertia = reflected_inertia(C, moments, r.spins)
     drive = r.held * r.drive
     return HingedBody(mass, inertia, r.offset, axis, r.inertia[2], r.spins, drive, drift, turn, force, torque)
 

@@ -4,7 +4,7 @@ import math
 
 from lapwing.dynamics.integrators import step
 from lapwing.dynamics.lie import quaternion
-from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, felt
+from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, reflected_inertia
 from lapwing.dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, column, free_turn, from_chassis
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 from lapwing.kernels import always_inline, kernel
@@ -26,7 +26,17 @@ def _resting(r, spins, C, drift, turn, force, torque):
     """Leaves whose drives rest; what acts on them are momenta, or nothing."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
     return HingedBody(
-        mass, felt(C, moments, spins), r.offset, column(C, 2), r.inertia[2], spins, rest, drift, turn, force, torque
+        mass,
+        reflected_inertia(C, moments, spins),
+        r.offset,
+        column(C, 2),
+        r.inertia[2],
+        spins,
+        rest,
+        drift,
+        turn,
+        force,
+        torque,
     )
 
 
@@ -156,7 +166,7 @@ def _worse(a, b):
 
 
 @kernel
-def violation(p, x):
+def constraint_violation(p, x):
     """Largest defect of any hinge: (position [m] or axis [-], velocity [m/s] or [rad/s])."""
     R0 = quaternion.rotation_matrix(x.chassis.attitude)
     w = x.chassis.omega_body
@@ -188,7 +198,7 @@ def advance(method, p, t, x, h, n, stabilisation):
 
 
 @kernel
-def together(p, chassis, angles, speeds):
+def assembled_state(p, chassis, angles, speeds):
     """Consistent state of a chassis and four spin angles [rad] and speeds [rad/s], relative to the chassis."""
     R0 = quaternion.rotation_matrix(chassis.attitude)
     r = p.rotors

@@ -71,7 +71,7 @@ def shares(p, x, wanted, slope):
 
 
 @kernel
-def wanted_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
+def desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
     """Force [N] that quadrotor i should give in the world, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
     c = p.drive
     q, omega = x.link[i].direction, x.link[i].omega
@@ -110,7 +110,7 @@ def upright(force, force_rate, floor):
 
 
 @always_inline
-def wanted_attitude(force, force_rate):
+def desired_attitude(force, force_rate):
     """R_world_wanted: z along the force, x towards world x; and its rate in that frame (theory.md, eq. (7.26))."""
     z, z_rate = _unit(force, force_rate)
     y, y_rate = _unit(cross(z, FORWARD), cross(z_rate, FORWARD))
@@ -124,7 +124,7 @@ def moment(p, x, force, force_rate, i):
     """Moment [N m] that turns body z to the wanted force and follows it (theory.md, eq. (7.27))."""
     c = p.drive
     kept, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
-    wanted, omega_wanted = wanted_attitude(kept, kept_rate)
+    wanted, omega_wanted = desired_attitude(kept, kept_rate)
     difference = matmul(transpose(wanted), rotation_matrix(x.attitude[i]))
     o = x.omega_body[i]
     rate_error = subtract(o, apply_transposed(difference, omega_wanted))
@@ -137,7 +137,7 @@ def moment(p, x, force, force_rate, i):
 def quad_thrust(p, x, wanted, slope, s, s_rate, i):
     """Thrust [N] of quadrotor i: the part of its wanted force along its axis."""
     # a force does not depend on the accelerations, only its derivative does
-    force, _ = wanted_force(p, x, wanted, slope, s, s_rate, NOTHING, i)
+    force, _ = desired_force(p, x, wanted, slope, s, s_rate, NOTHING, i)
     m = rotation_matrix(x.attitude[i])
     return dot(force, (m[2], m[5], m[8]))
 
@@ -146,5 +146,5 @@ def quad_thrust(p, x, wanted, slope, s, s_rate, i):
 def quad_moment(p, x, wanted, slope, s, s_rate, force, specific, i):
     """Moment [N m] of quadrotor i when all give `force` [N] and the load has `specific` acceleration [m/s^2]."""
     omega_rate = link_acceleration(p, x, force, specific, i)
-    wanted_thrust, thrust_rate = wanted_force(p, x, wanted, slope, s, s_rate, omega_rate, i)
+    wanted_thrust, thrust_rate = desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i)
     return moment(p, x, wanted_thrust, thrust_rate, i)

@@ -31,7 +31,7 @@ apply = python_function(compiled_apply)
 from_matrix, rotation_matrix = python_function(quaternion.from_matrix), python_function(quaternion.rotation_matrix)
 
 
-def standing_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: Place = (0.0, 0.0)) -> Pose:
+def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: Place = (0.0, 0.0)) -> Pose:
     """Where a vehicle stands whose centre of mass is over a place, heading along world x.
 
     It is tilted so that three feet around its centre of mass touch without pressing and no other is below the ground;
@@ -57,7 +57,7 @@ def standing_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: 
     return (x0, y0, max(lifts)), NO_ROTATION if slope == NO_SLOPE else from_matrix(R_world_body)
 
 
-def at_rest(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
+def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
     """The state of a vehicle that stands still: the springs of its feet carry it, and their friction holds it.
 
     Where the ground is too steep for the friction, or the feet do not stand around the centre of mass, it is the state
@@ -66,7 +66,7 @@ def at_rest(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: floa
     Args:
         form: module that makes the state: `lapwing.dynamics.vehicles.multirotor` or one with more bodies.
         p: the vehicle.
-        pose: where it stands, from `standing_pose`.
+        pose: where it stands, from `resting_pose`.
         gravity: [m/s^2].
     """
     position, attitude = pose

@@ -80,10 +80,11 @@ def observe(p, tick, interval, state, command):
     """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
     layout = p.layout
     voltage = map_tuple(within, layout.max_voltage, command, command)
-    body = hooks.all_body(p.effects, state.memory, p.body)
+    body = hooks.all_mass_properties(p.effects, state.memory, p.body)
     drive = MultirotorDrive(p, body, state.memory, voltage)
     s, rotors, _, _ = evaluate(drive, tick * interval, seen(layout, state.motion))
     linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
+    unknown = (math.nan, layout.max_voltage, total(rotors.current), math.nan)
     return MultirotorObservation(
         linear,
         angular,
@@ -97,7 +98,7 @@ def observe(p, tick, interval, state, command):
         hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
-        hooks.all_gauges(p.effects, state.memory, (math.nan, layout.max_voltage, total(rotors.current), math.nan)),
+        hooks.all_battery_states(p.effects, state.memory, unknown),
     )
 
 
@@ -127,4 +128,4 @@ def initial_state(
 ) -> MultirotorState:
     """All rotors at the same speed [rad/s], the effects' memory fresh; without more at rest in the world."""
     motion = Motion(position_world, attitude, velocity_world, omega_body, (rotor_speed,) * len(p.layout.x_body))
-    return MultirotorState(motion, tuple(hooks.initial_memory(e) for e in p.effects))
+    return MultirotorState(motion, tuple(hooks.initial_discrete_state(e) for e in p.effects))

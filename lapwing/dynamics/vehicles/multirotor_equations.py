@@ -118,9 +118,9 @@ def evaluate(drive, t, motion):
     s = EffectInputs(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
     # adding to -0.0 changes no number, so the compiler drops it
     one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
-    factors = hooks.all_factors(p.effects, memory, s, Factors(one, one))
+    factors = hooks.all_load_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
-    voltage = hooks.all_supply(p.effects, memory, drive.voltage)
+    voltage = hooks.all_supply_voltage(p.effects, memory, drive.voltage)
     current = map_tuple(_static_current, s, loads.torque, voltage)
     lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(_product, 0.0, voltage, current))
     acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)

@@ -178,8 +178,8 @@ def rate(drive, t, x):
 
 
 @noinline
-def struck(drive, x):
-    """As `multirotor_multibody_equations.struck`."""
+def apply_constraint_impulse(drive, x):
+    """See `multirotor_multibody_equations.apply_constraint_impulse`."""
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
     a = _system(drive.parameters.layout.bodies.arrays, p)
     q, v = _arrays(x)
@@ -194,7 +194,7 @@ def held(drive, x):
     if given.hold == five_body_stabilisation.NONE or not _all_upright(x):
         return x
     if given.hold == five_body_stabilisation.PROJECTION:
-        return struck(drive, x)
+        return apply_constraint_impulse(drive, x)
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
     a = _system(given.arrays, p)
     q, v = _arrays(x)
@@ -225,9 +225,9 @@ def parameters(*given, **named) -> MultirotorParameters:
     return _assembled(multirotor_multibody.parameters(*given, **named))
 
 
-def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
-    """As `multirotor_multibody.after`."""
-    return _assembled(multirotor_multibody.after(p, k, becomes))
+def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """See `multirotor_multibody.with_propeller_failure`."""
+    return _assembled(multirotor_multibody.with_propeller_failure(p, k, becomes))
 
 
 def _assembled(p: MultirotorParameters) -> MultirotorParameters:

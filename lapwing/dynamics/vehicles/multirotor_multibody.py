@@ -73,8 +73,8 @@ def parameters(
     return p._replace(layout=p.layout._replace(bodies=assembly))
 
 
-def after(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
-    """The parameters once propeller k (0 to 3) has become what BECOMES names; see `struck` for the state then."""
+def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
+    """Return the parameters after propeller k (0 to 3) failed as BECOMES names; see `apply_constraint_impulse`."""
 
     def changed(values: PerRotor, value: float) -> PerRotor:
         return (*values[:k], value, *values[k + 1 :])
@@ -98,5 +98,7 @@ def initial_state(
     d = p.layout.bodies.drone
     chassis = BodyState(position_world, attitude, velocity_world, omega_body)
     speeds = tuple(-sign * rotor_speed for sign in p.layout.reaction_sign)
-    x = five_body_stabilisation.together(five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds)
+    x = five_body_stabilisation.assembled_state(
+        five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds
+    )
     return plain._replace(motion=x)

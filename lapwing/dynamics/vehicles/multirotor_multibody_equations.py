@@ -147,7 +147,7 @@ def held(drive, x):
 
 
 @kernel
-def struck(drive, x):
+def apply_constraint_impulse(drive, x):
     """The bodies after impulses in the hinges that meet all constraints at once; they keep the momentum."""
     return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
 

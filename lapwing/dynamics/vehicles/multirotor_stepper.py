@@ -45,7 +45,7 @@ def _airborne(p, body, memory, voltage):
 def _awake_step(method, drive, t, x, h):
     """(state's form, memory) a step later with every effect taking part."""
     x = _step(method, drive, t, x, h)
-    return x, hooks.all_settled(drive.parameters.effects, drive.memory, seen(drive.parameters.layout, x), h)
+    return x, hooks.all_post_steps(drive.parameters.effects, drive.memory, seen(drive.parameters.layout, x), h)
 
 
 @never_inlined
@@ -73,7 +73,7 @@ def _stiff_steps(method, drive, t, x, h, end):
                 start = t + half
         sound = finite(y)
         error = max(relative_difference(y, whole), relative_difference(settled, at_once)) if sound else math.inf
-        if taken > smallest and (error > allowed or hooks.all_events(p.effects, memory, settled)):
+        if taken > smallest and (error > allowed or hooks.any_discontinuity(p.effects, memory, settled)):
             part = shorter(taken, error, allowed)
             continue
         x, memory = y, settled
@@ -89,10 +89,10 @@ def begin(p, key, tick, state, command, interval):
     """The drive of the exchange interval `tick`, with what effects draw for it; arguments as of `advance`."""
     layout, memory = p.layout, state.memory
     voltage = map_tuple(within, layout.max_voltage, command, command)
-    before = _airborne(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
+    before = _airborne(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
     s, rotors, _, _ = evaluate(before, tick * interval, seen(layout, state.motion))
-    memory = hooks.all_samples(p.effects, memory, s, rotors, key, tick, interval)
-    return MultirotorDrive(p, hooks.all_body(p.effects, memory, p.body), memory, voltage)
+    memory = hooks.all_discrete_updates(p.effects, memory, s, rotors, key, tick, interval)
+    return MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
 
 
 @always_inline
@@ -113,11 +113,11 @@ def steps(method, drive, x, start, end, h, first, n):
     p, body, memory, voltage = drive
     layout, airborne = p.layout, _airborne(p, body, memory, voltage)
     for i in range(first, n):
-        if hooks.all_asleep(p.effects, memory, seen(layout, x), h):
+        if hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
             x = _step(method, airborne, start + i * h, x, h)
             continue
         drive = MultirotorDrive(p, body, memory, voltage)
-        if not hooks.all_calm(p.effects, memory, seen(layout, x), h):
+        if not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
             x, memory = _stiff_steps(method, drive, start + i * h, x, h, end)
             break
         x, memory = _awake_step(method, drive, start + i * h, x, h)

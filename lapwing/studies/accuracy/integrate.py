@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from lapwing.dynamics import integrators
-from lapwing.dynamics.integrators import adapt, rate, record
+from lapwing.dynamics.integrators import integrate_adaptive, rate, record
 from lapwing.kernels import kernel, python_function
 from lapwing.kernels.state_tree import flatten, unflatten
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.problem import SolverMethod, SolverRun
 
-ADAPTIVE = "rkmk54"  # the method that `adapt` runs
+ADAPTIVE = "rkmk54"  # the method that `integrate_adaptive` runs
 SAMPLES = 8  # parts of a run after which its invariants are looked at; every count of steps is a multiple
 HALVINGS = 18
 TOLERANCES = tuple(10.0**-k for k in range(1, 14))
@@ -42,8 +42,8 @@ def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) 
 
 @kernel
 def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
-    """Write the states at `times` into the rows of `out`, by steps under error control; how it ended, as of `adapt`."""
-    return adapt(p, x, times, tolerance, out)
+    """Write the states at `times` into the rows of `out`; see `integrate_adaptive`."""
+    return integrate_adaptive(p, x, times, tolerance, out)
 
 
 def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
@@ -61,7 +61,7 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
 
 def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
     """A way for each integrator, all by steps."""
-    return [_fixed(name, p, x, duration, coarsest) for name in integrators.fitting(p, x)]
+    return [_fixed(name, p, x, duration, coarsest) for name in integrators.compatible_methods(p, x)]
 
 
 def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverMethod:

@@ -116,7 +116,7 @@ def problem(scene: Scene) -> Problem:
         f"{scene.name}: its multirotor in the air under prescribed voltages",
         "s",
         duration,
-        [way(name) for name in integrators.fitting(p, state.motion)],
+        [way(name) for name in integrators.compatible_methods(p, state.motion)],
         lambda: coordinates(motion, flown(rkmk54, FINEST)())[-1],
         f"rkmk54 with {FINEST} steps in an exchange interval",
         {},

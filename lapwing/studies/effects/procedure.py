@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects._vehicle_interaction import INTERACT
+from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.studies.effects.cost import costs
@@ -60,7 +60,7 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         raise ValueError(f"{scene.path}: the model {scene[Vehicle].model} knows no effects; expected a multirotor")
     tables = scene[Effects].tables
     fewer = {name: _without(tables, name) for name in tables}
-    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACT]  # nobody to meet
+    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACTION]  # nobody to meet
     more = {name: {**tables, name: {}} for name in alone if name not in tables}
     refused = {name: why for name, v in (fewer | more).items() if (why := refusal(scene, v))}
     flying = {name: v for name, v in (fewer | more).items() if name not in refused}

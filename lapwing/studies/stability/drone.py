@@ -5,7 +5,7 @@ from typing import Any
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, machine
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.vector import ZERO, Vec3
 
 __all__ = ["PAPER", "delivery_drone", "thrown"]
@@ -25,4 +25,4 @@ PAPER: dict[str, Any] = {
 def thrown(drone: Any, omega: Vec3, speeds: tuple[float, ...]) -> tuple[Any, Any]:
     """(machine, state): turning at omega [rad/s] with propellers at these speeds [rad/s], nothing acting."""
     p = machine(drone, ZERO, speeds=speeds)
-    return p, together(p, BodyState(ZERO, NO_ROTATION, ZERO, omega), (0.1, 0.4, 0.7, 1.0), speeds)
+    return p, assembled_state(p, BodyState(ZERO, NO_ROTATION, ZERO, omega), (0.1, 0.4, 0.7, 1.0), speeds)

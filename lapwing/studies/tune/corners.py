@@ -10,7 +10,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.ground_equilibrium import at_rest
+from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common.autopilot_parameters import of_gains
 from lapwing.services.common.environment_schema import environment
@@ -68,7 +68,7 @@ def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
     acting = tuple(_stronger(e, corner.thrust) for e in active)
     p = multirotor.parameters(frame, acting)
     plant = setup.services["plant"].parameters
-    start = plant.start._replace(vehicle=at_rest(multirotor, p, start_pose(scene), gravity(scene)))
+    start = plant.start._replace(vehicle=static_equilibrium(multirotor, p, start_pose(scene), gravity(scene)))
     return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
 
 

@@ -42,7 +42,7 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) 
     actuators = inputs[0]
     command = actuators.value.motor_voltage if actuators.due else p.off
     g, memory = p.vehicle, s.vehicle.memory
-    drive = MultirotorDrive(g, hooks.all_body(g.effects, memory, g.body), memory, command)
+    drive = MultirotorDrive(g, hooks.all_mass_properties(g.effects, memory, g.body), memory, command)
     x = on_se3(s.vehicle.motion)
     j = joints(drive, tick * p.interval, x)
     a, (b, c, d, e) = x.chassis, x.propellers

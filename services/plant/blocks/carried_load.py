@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.dynamics.integrators import RATES, march
+from lapwing.dynamics.integrators import RATES, integrate_fixed
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, load_acceleration, tension
@@ -83,7 +83,7 @@ def step(
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
         drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
-        x = march(p.method, drive, drive.start, x, p.step, p.steps)
+        x = integrate_fixed(p.method, drive, drive.start, x, p.step, p.steps)
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
     place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)

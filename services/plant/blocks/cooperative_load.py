@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import InputSample
-from lapwing.dynamics.integrators import march
+from lapwing.dynamics.integrators import integrate_fixed
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.cooperative_load import (
@@ -49,7 +49,7 @@ def step(
     )
     x = s
     if tick > 0:
-        x = march(p.method, g, (tick - 1) * p.interval, x, p.step, p.steps)
+        x = integrate_fixed(p.method, g, (tick - 1) * p.interval, x, p.step, p.steps)
     truth = TrueState(
         x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO
     )

@@ -25,7 +25,7 @@ class PresenceView(NamedTuple):
 def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[NeighbourState], int]:
     """The presence at `tick`, by the truth of that tick."""
     truth, vehicle = inputs[0].value, p.vehicle
-    body = hooks.all_body(vehicle.effects, s.vehicle.memory, vehicle.body)
+    body = hooks.all_mass_properties(vehicle.effects, s.vehicle.memory, vehicle.body)
     thrust, _ = thrust_wrench(vehicle.layout, Loads(truth.rotor_thrust, truth.rotor_torque))
     R, hook, omega = rotation_matrix(truth.attitude), p.like.hook_body, truth.omega_body
     turning = cross(omega, hook)

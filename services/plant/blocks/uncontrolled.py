@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 from lapwing.cosim.diagram.compiled_block import InputSample
-from lapwing.dynamics.integrators import StepDoubling, march, march_controlled
+from lapwing.dynamics.integrators import StepDoubling, integrate_fixed, integrate_step_doubling
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import overload_for
 from lapwing.kernels.state_tree import finite
@@ -45,8 +45,8 @@ def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
 @overload_for(_marched, inline=True)
 def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
     if getattr(method, "instance_class", None) is StepDoubling:
-        return lambda method, p, t, x: march_controlled(method, p.system, t, x, p.step, t + p.interval)
-    return lambda method, p, t, x: march(method, p.system, t, x, p.step, p.steps)
+        return lambda method, p, t, x: integrate_step_doubling(method, p.system, t, x, p.step, t + p.interval)
+    return lambda method, p, t, x: integrate_fixed(method, p.system, t, x, p.step, p.steps)
 
 
 @always_inline

@@ -13,7 +13,7 @@ from lapwing.dynamics.integrators import check_start
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.ground_equilibrium import at_rest
+from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.ports import BatteryReading, BodyMotions, TrueState
@@ -106,7 +106,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     settle = round(scene[Run].settle * exchange.rate)
     p = p._replace(tolerance=scene[Solver].contact_tolerance)
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
-    start = MultirotorPlantState(at_rest(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
+    start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay = exchange.loop_delay
     return ServiceConfig(
@@ -133,6 +133,6 @@ def check_system(scene: Scene, p: Any, start: Any) -> None:
 def check_integrator(scene: Scene, p: Any, start: Any) -> None:
     """ConfigError of `solver.integrator` if it is not for a system with parameters p and such states."""
     name, model = scene[Solver].integrator, scene[Vehicle].model
-    if why := integrators.unfit(name, p, start):
-        others = ", ".join(integrators.fitting(p, start))
+    if why := integrators.incompatibility(name, p, start):
+        others = ", ".join(integrators.compatible_methods(p, start))
         raise ConfigError("solver.integrator", f"{name} does not fit the model {model}: {why}", f"one of {others}")

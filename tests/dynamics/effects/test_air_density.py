@@ -13,7 +13,9 @@ HIGH = Environment(home=Home(46.0, 11.0, 800.0), atmosphere=Atmosphere(100_000.0
 @pytest.mark.parametrize("height", [0.0, 100.0, 3000.0, 12_000.0])
 def test_it_is_the_atmospheres_at_home_and_above(drone, situation, rotors, around, height):
     (e,) = effects.from_scene({"air_density": {}}, drone, around)
-    memory = tangent.py_func(e, e.initial_memory(), situation(position=(0, 0, height)), rotors(), (0, 0), 0, 0.004)
+    memory = tangent.py_func(
+        e, e.initial_discrete_state(), situation(position=(0, 0, height)), rotors(), (0, 0), 0, 0.004
+    )
     for above, bound in ((0.0, 1e-13), (0.08, 1e-10)):  # 20 m/s of climb for 4 ms
         s = situation(position=(0, 0, height + above))
         expected = density(around.atmosphere, around.home.height + height + above)
@@ -22,4 +24,4 @@ def test_it_is_the_atmospheres_at_home_and_above(drone, situation, rotors, aroun
 
 def test_it_begins_at_home(drone):
     (e,) = effects.from_scene({"air_density": {}}, drone, HIGH)
-    assert e.initial_memory()[0] == density(HIGH.atmosphere, 800.0)
+    assert e.initial_discrete_state()[0] == density(HIGH.atmosphere, 800.0)

@@ -18,7 +18,7 @@ def test_published_open_circuit_curve():
 
 def test_empties_by_the_charge_drawn(drone, situation, rotors):
     """Charge lost times capacity is the integral of power over voltage."""
-    e, memory = make(drone), make(drone).initial_memory()
+    e, memory = make(drone), make(drone).initial_discrete_state()
     drawn = 0.0
     for tick in range(250):
         before = memory
@@ -30,8 +30,8 @@ def test_empties_by_the_charge_drawn(drone, situation, rotors):
 
 def test_sags_with_load(drone, situation, rotors):
     e = make(drone)
-    light = discharge.py_func(e, e.initial_memory(), situation(), rotors(current=1.0), (0, 0), 0, 0.004)
-    heavy = discharge.py_func(e, e.initial_memory(), situation(), rotors(current=20.0), (0, 0), 0, 0.004)
+    light = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=1.0), (0, 0), 0, 0.004)
+    heavy = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=20.0), (0, 0), 0, 0.004)
     assert light[1] - heavy[1] == pytest.approx(12 * 0.002 * (heavy[2] - light[2]), rel=1e-3)
 
 
@@ -41,7 +41,7 @@ def test_motors_get_what_they_ask_for_or_what_there_is(drone):
 
 def test_cuts_off_for_good(drone, situation, rotors):
     e = make(drone, initial_charge=0.02, cutoff_voltage=3.3)
-    memory = discharge.py_func(e, e.initial_memory(), situation(), rotors(current=20.0), (0, 0), 0, 1.0)
+    memory = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=20.0), (0, 0), 0, 1.0)
     assert memory[1] == 0.0
     assert discharge.py_func(e, memory, situation(), rotors(current=0.0), (0, 0), 1, 1.0)[1] == 0.0
 

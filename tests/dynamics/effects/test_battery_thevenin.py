@@ -30,9 +30,9 @@ def flown(e, memory, situation, rotors, current, seconds, interval=0.1):
 def test_voltage_after_a_step_of_current_is_the_sum_of_two_exponentials(drone, situation, rotors):
     """At 40 A for 20 s, and back: the published ratios 0.627 and 0.669 and times 32.9 and 223 s."""
     e = make(drone, initial_charge=0.6, **COLD)
-    loaded = flown(e, e.initial_memory(), situation, rotors, 40.0, 20.0)
+    loaded = flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0)
     sag = OHMIC * 40.0 * (1.0 + 0.627 * (1 - math.exp(-20 / 32.9)) + 0.669 * (1 - math.exp(-20 / 223.0)))
-    rest = e._replace(initial_charge=loaded[0]).initial_memory()[1]
+    rest = e._replace(initial_charge=loaded[0]).initial_discrete_state()[1]
     assert rest - loaded[1] == pytest.approx(sag, rel=1e-6)
     rested = flown(e, loaded, situation, rotors, 0.0, 60.0)
     left = 0.627 * (1 - math.exp(-20 / 32.9)) * math.exp(-60 / 32.9)
@@ -42,7 +42,7 @@ def test_voltage_after_a_step_of_current_is_the_sum_of_two_exponentials(drone, s
 
 def test_the_interval_does_not_matter(drone, situation, rotors):
     e = make(drone, initial_charge=0.6, **COLD)
-    fine, coarse = (flown(e, e.initial_memory(), situation, rotors, 40.0, 20.0, h) for h in (0.05, 1.0))
+    fine, coarse = (flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0, h) for h in (0.05, 1.0))
     assert coarse[:2] == pytest.approx(fine[:2], rel=1e-9)
 
 
@@ -51,25 +51,25 @@ def test_it_warms_to_where_losses_are_carried_off(drone, situation, rotors):
     air = Environment(atmosphere=Atmosphere(temperature_offset=10.0))
     e = make(drone, air, initial_charge=1.0, activation=0.0, transient_resistance=[0.0, 0.0], heat_capacity=3000.0)
     kelvin = 288.15 + 10.0 - 0.0065 * air.home.height
-    assert e.initial_memory()[3] == pytest.approx(kelvin, abs=0.01)
-    memory = flown(e, e.initial_memory(), situation, rotors, 40.0, 300.0, 1.0)
+    assert e.initial_discrete_state()[3] == pytest.approx(kelvin, abs=0.01)
+    memory = flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 300.0, 1.0)
     rise = OHMIC * 40.0**2 * 1800.0 / 3000.0 * (1.0 - math.exp(-300.0 / 1800.0))
-    assert read.py_func(e, memory)[3] - e.initial_memory()[3] == pytest.approx(rise, rel=1e-9)
+    assert read.py_func(e, memory)[3] - e.initial_discrete_state()[3] == pytest.approx(rise, rel=1e-9)
 
 
 def test_a_cold_pack_has_a_higher_resistance(drone, situation, rotors):
     """By Arrhenius' law, 20 kJ/mol: at -10 degC about 2.9 times that at 25."""
     for kelvin in (263.15, 298.15):
         e = make(drone, temperature=kelvin, transient_resistance=[0.0, 0.0], heat_capacity=1e6)
-        memory = flown(e, e.initial_memory(), situation, rotors, 20.0, 0.1)
-        drop = e._replace(initial_charge=memory[0]).initial_memory()[1] - memory[1]
+        memory = flown(e, e.initial_discrete_state(), situation, rotors, 20.0, 0.1)
+        drop = e._replace(initial_charge=memory[0]).initial_discrete_state()[1] - memory[1]
         assert drop / (OHMIC * 20.0) == pytest.approx(math.exp(2400 * (1 / kelvin - 1 / 298.15)), rel=1e-6)
     assert math.exp(2400 * (1 / 263.15 - 1 / 298.15)) == pytest.approx(2.9, abs=0.05)
 
 
 def test_it_cuts_off_and_starts_again_with_hysteresis(drone, situation, rotors):
     e = make(drone, initial_charge=0.1, cutoff_voltage=3.5, restart=3.6, **COLD)
-    memory = flown(e, e.initial_memory(), situation, rotors, 100.0, 0.1)
+    memory = flown(e, e.initial_discrete_state(), situation, rotors, 100.0, 0.1)
     assert memory[6] == 0.0
     assert battery_thevenin.py_func(e, memory, (30.0,) * 4) == (0.0,) * 4
     later = flown(e, memory, situation, rotors, 0.0, 300.0, 1.0)

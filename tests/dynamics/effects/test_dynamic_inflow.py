@@ -21,7 +21,7 @@ def make(drone):
 
 
 def settled(e, s, rotors, seconds=1.0, interval=0.004):
-    memory = e.initial_memory()
+    memory = e.initial_discrete_state()
     for tick in range(round(seconds / interval)):
         memory = follow.py_func(e, memory, s, rotors(), (0, 0), tick, interval)
     return memory

@@ -19,7 +19,7 @@ def make(drone, **table):
 def test_force_of_a_steady_wind_is_the_source_formula(drone, situation, rotors):
     e = make(drone, sigma=0.0)
     s = situation(velocity=(1, 1, 0))
-    memory = draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 0, 0.004)
+    memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.004)
     force, torque = random_wind_force.py_func(e, memory, s, rotors())
     assert force == pytest.approx((0.5 * 1.0 * 0.06 * 1.22 * 2.0**2, 0.0, 0.0))
     assert torque == (0.0, 0.0, 0.0)
@@ -39,15 +39,15 @@ def test_depends_on_tick_and_key_only(drone, situation, rotors):
     e, s = make(drone), situation()
     other = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     one = draw.py_func(e, other, s, rotors(), KEY, 7, 0.004)
-    assert one == draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 7, 0.004)
-    assert one != draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 8, 0.004)
-    assert one != draw.py_func(e, e.initial_memory(), s, rotors(), stream_key(4, "drone1", "effects"), 7, 0.004)
+    assert one == draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 7, 0.004)
+    assert one != draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 8, 0.004)
+    assert one != draw.py_func(e, e.initial_discrete_state(), s, rotors(), stream_key(4, "drone1", "effects"), 7, 0.004)
 
 
 def test_the_wind_that_makes_the_force_is_told(drone, situation, rotors):
     """The truth's wind: 0 before, though the vehicle was blown about."""
     e, s = make(drone), situation(velocity=(1, 1, 0))
-    memory = draw.py_func(e, e.initial_memory(), s, rotors(), KEY, 5, 0.004)
+    memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 5, 0.004)
     wind = np.array(told.py_func(e, memory, (0.5, 0.0, 0.0))) - (0.5, 0.0, 0.0)
     past = wind - (1.0, 1.0, 0.0)
     assert memory[0] == pytest.approx(0.5 * 0.06 * 1.22 * np.linalg.norm(past) * past)
@@ -78,7 +78,7 @@ def test_a_draw_is_shared_by_the_exchanges_within_it_and_averaged_over_long_ones
     e, s = make(drone), situation()
 
     def at(tick, interval):
-        return np.array(draw.py_func(e, e.initial_memory(), s, rotors(), KEY, tick, interval))
+        return np.array(draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, tick, interval))
 
     assert (at(28, 0.001) == at(7, 0.004)).all()
     assert (at(31, 0.001) == at(7, 0.004)).all()

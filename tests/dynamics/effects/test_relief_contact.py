@@ -11,7 +11,7 @@ from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import relief, surface
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.ground_equilibrium import at_rest, standing_pose
+from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose, static_equilibrium
 
 RK4 = get("rk4_renormalised").Method()
 G, HEIGHT, OFF = 9.80665, 0.35, (0.0,) * 4
@@ -67,7 +67,7 @@ def test_a_grid_is_the_slope_that_its_points_are(drone):
     ends = []
     for terrain in (slope, GRID):
         p = vehicle(drone, terrain)
-        start = at_rest(multirotor, p, standing_pose(drone.contact.feet, terrain), G)
+        start = static_equilibrium(multirotor, p, resting_pose(drone.contact.feet, terrain), G)
         m = run(p, start, 1.0).motion
         assert np.abs(np.subtract(m.position_world, start.motion.position_world)).max() < 1e-7
         ends.append(m.position_world)

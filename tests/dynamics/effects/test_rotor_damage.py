@@ -9,7 +9,7 @@ def test_one_rotor_from_its_time(drone, situation, rotors):
     (e,) = effects.from_scene(
         {"rotor_damage": {"rotor": 2, "time": 4.0, "remaining_thrust": 0.6, "remaining_torque": 1.1}}, drone
     )
-    memory = strike.py_func(e, e.initial_memory(), situation(t=3.99), rotors(), (0, 0), 0, 0.004)
+    memory = strike.py_func(e, e.initial_discrete_state(), situation(t=3.99), rotors(), (0, 0), 0, 0.004)
     assert rotor_damage.py_func(e, memory, situation(), NO_FACTORS) == NO_FACTORS
     memory = strike.py_func(e, memory, situation(t=4.0), rotors(), (0, 0), 0, 0.004)
     hurt = rotor_damage.py_func(e, memory, situation(), NO_FACTORS)

@@ -50,7 +50,7 @@ def test_it_follows_the_vehicles_height_over_the_ground_and_its_airspeed(drone, 
     (follows,) = effects.from_scene({"wind_dryden": {"wind_speed": 7.0}}, drone, around)
     s = situation(position=(50.0, 0, 30.0 + 50.0 * slope), velocity=(6.0, 0, 8.0), wind=(0.0, 0.0, 3.0))
     fixed = make(drone, airspeed=math.hypot(6.0, 5.0), altitude=30.0)
-    ours, given = (draw(e, e.initial_memory(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
+    ours, given = (draw(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
     assert ours[1] == pytest.approx(given[1], rel=1e-12)
     low, high, still = (passing(follows.conditions, situation(**where)) for where in (
         {"position": (0, 0, 1.0), "velocity": (5, 0, 0)}, {"position": (0, 0, 2000.0), "velocity": (5, 0, 0)},
@@ -63,7 +63,7 @@ def test_it_follows_the_vehicles_height_over_the_ground_and_its_airspeed(drone, 
 def test_spectra(drone, situation, rotors):
     e, interval, airspeed = make(drone, altitude=20.0), 0.02, 8.0
     wind = np.empty((2**19, 3))
-    series(e, e.initial_memory(), situation(), rotors(), KEY, interval, wind)
+    series(e, e.initial_discrete_state(), situation(), rotors(), KEY, interval, wind)
     frequency, power = welch(wind, fs=1 / interval, nperseg=2**13, axis=0)
     omega = 2 * math.pi * frequency
     band = (omega > 0.05) & (omega < 0.2 / interval)
@@ -90,7 +90,7 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
     first, second = [], []
     for seed in range(1500):
         key = stream_key(seed, "", "effects")
-        memory = draw(e, e.initial_memory(), situation(), rotors(), key, 0, 0.004)
+        memory = draw(e, e.initial_discrete_state(), situation(), rotors(), key, 0, 0.004)
         first.append(memory[1])
         second.append(draw(e, memory, situation(), rotors(), key, 1, 3.0)[1])
     assert np.std(first, axis=0) == pytest.approx(sigma, rel=0.08)
@@ -102,7 +102,7 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
 
 
 def test_heading_turns_the_axes(drone, situation, rotors):
-    along = draw(make(drone), make(drone).initial_memory(), situation(), rotors(), KEY, 0, 0.01)[1]
+    along = draw(make(drone), make(drone).initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]
     e = make(drone, direction_to=math.pi / 2)
-    turned = draw(e, e.initial_memory(), situation(), rotors(), KEY, 0, 0.01)[1]
+    turned = draw(e, e.initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]
     assert turned == pytest.approx((-along[1], along[0], along[2]))

@@ -53,7 +53,7 @@ def published(omega):
 def test_spectra_whatever_the_interval(drone, situation, rotors, interval):
     rate = np.empty((2**18, 3))
     e = make(drone)
-    series(e, e.initial_memory(), situation(), rotors(), KEY, interval, rate)
+    series(e, e.initial_discrete_state(), situation(), rotors(), KEY, interval, rate)
     frequency, power = welch(rate, fs=1 / interval, nperseg=2**12, axis=0)
     omega = 2 * math.pi * frequency
     band = (omega > 0.2) & (omega < 0.1 * 2 * math.pi / interval)
@@ -69,7 +69,7 @@ def test_standard_deviations_from_the_first_exchange_on(drone, situation, rotors
     e, first, second = make(drone), [], []
     for seed in range(800):
         key = stream_key(seed, "", "effects")
-        memory = draw(e, e.initial_memory(), situation(), rotors(), key, 0, 0.004)
+        memory = draw(e, e.initial_discrete_state(), situation(), rotors(), key, 0, 0.004)
         first.append(memory[3])
         second.append(draw(e, memory, situation(), rotors(), key, 1, 2.0)[3])
     assert np.std(first, axis=0) == pytest.approx(expected, rel=0.1)
@@ -79,7 +79,7 @@ def test_standard_deviations_from_the_first_exchange_on(drone, situation, rotors
 def test_the_gusts_are_those_of_wind_dryden_to_the_bit(drone, situation, rotors):
     e = make(drone)
     (plain,) = effects.from_scene({"wind_dryden": {key: TABLE[key] for key in TABLE if key != "span"}}, drone)
-    ours, theirs = e.initial_memory(), plain.initial_memory()
+    ours, theirs = e.initial_discrete_state(), plain.initial_discrete_state()
     for tick in range(20):
         ours = draw(e, ours, situation(), rotors(), KEY, tick, 0.02)
         theirs = wind_dryden.draw(plain, theirs, situation(), rotors(), KEY, tick, 0.02)
@@ -89,7 +89,7 @@ def test_the_gusts_are_those_of_wind_dryden_to_the_bit(drone, situation, rotors)
 def test_a_gust_that_rises_as_it_comes_lifts_the_bow(drone, situation, rotors):
     """A field that passes at V along x has dw/dx = -(1/V) dw/dt: the air turns about y at -dw/dx."""
     e, interval, low_pass = make(drone), 0.001, 4 * SPAN / (math.pi * AIRSPEED)
-    memory, rows = e.initial_memory(), []
+    memory, rows = e.initial_discrete_state(), []
     for tick in range(3000):
         memory = draw(e, memory, situation(), rotors(), KEY, tick, interval)
         rows.append((*memory[1], *memory[3]))
@@ -115,7 +115,7 @@ def test_rotors_feel_the_air_turn_as_they_feel_the_vehicle_turn(drone, situation
 def test_it_is_a_turbulence_with_the_vehicles_span(drone, situation):
     (e,) = effects.from_scene({"wind_dryden_rates": {"wind_speed": 7.0}}, drone)
     assert e.span == pytest.approx(2 * 0.4974 + 0.5588)
-    memory = (e.initial_memory()[0], (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))
+    memory = (e.initial_discrete_state()[0], (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))
     s = situation(turn=(0, 0, math.pi / 2))
     assert wind_dryden_rates.py_func(e, memory, s, Air(1.2, (0.0, 0.0, 0.0))).wind_world == (1.0, 2.0, 3.0)
     assert turning.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))

@@ -43,7 +43,7 @@ def test_spectra(drone, situation, rotors):
     (e,) = effects.from_scene({"wind_von_karman": table}, drone)
     interval, (sigma, scale) = 0.02, intensity(7.0, 20.0)
     wind = np.empty((2**19, 3))
-    series(e, e.initial_memory(), situation(), rotors(), KEY, interval, wind)
+    series(e, e.initial_discrete_state(), situation(), rotors(), KEY, interval, wind)
     frequency, power = welch(wind, fs=1 / interval, nperseg=2**13, axis=0)
     omega = 2 * math.pi * frequency
     band = (omega > 0.05) & (omega < 0.2 / interval)

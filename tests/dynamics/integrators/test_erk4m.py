@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from lapwing.dynamics.integrators import RATES, erk4m, march, rkmk54
+from lapwing.dynamics.integrators import RATES, erk4m, integrate_fixed, rkmk54
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, log
 from lapwing.dynamics.vector import Vec3, add, scale
 from lapwing.kernels import always_inline
@@ -33,8 +33,8 @@ RATES[RampParameters] = ramp_rate
 def test_the_local_error_is_the_curvature_term():
     k, slope = np.array([0.7, -0.4, 0.5]), np.array([-0.3, 0.9, 0.6])
     p, x0, h = RampParameters(tuple(k), tuple(slope)), RampState(NO_ROTATION), 0.005
-    got = march(erk4m.Method(), p, 0.0, x0, h, 1)
-    exact = march(rkmk54.Method(), p, 0.0, x0, h / 4, 4)
+    got = integrate_fixed(erk4m.Method(), p, 0.0, x0, h, 1)
+    exact = integrate_fixed(rkmk54.Method(), p, 0.0, x0, h / 4, 4)
     error = np.array(log(got.attitude)) - np.array(log(exact.attitude))
     predicted = h**4 / 192 * np.cross(k, np.cross(k, slope))
     assert error == pytest.approx(predicted, rel=0.02, abs=0.02 * abs(predicted).max())

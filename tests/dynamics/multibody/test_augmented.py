@@ -10,7 +10,7 @@ from lapwing.dynamics.multibody import augmented, pivoted_qr
 from lapwing.dynamics.multibody.augmented import accelerations
 from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
 from lapwing.dynamics.multibody.stabilisation import rows
 from lapwing.dynamics.multibody.system import assemble
@@ -37,7 +37,7 @@ def state(rng):
         tuple(rng.normal(size=3)),
         tuple(3 * rng.normal(size=3)),
     )
-    x = together(machine(drone, (0.0, 0.0, -9.81)), chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds))
+    x = assembled_state(machine(drone, (0.0, 0.0, -9.81)), chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds))
     wrench = rng.normal(size=(5, 6)) * [10, 10, 10, 1, 1, 1]
     wrench[1:, 3:] *= 0.01
     return drone, *arrays(x), wrench, np.stack([speeds, 10.0 * rng.normal(size=4)], axis=1)

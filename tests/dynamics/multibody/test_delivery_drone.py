@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from test_augmented import PAPER
 
-from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
 from lapwing.dynamics.multibody.five_bodies import BodyState, Wrench, arrays, machine, rate
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 
 ZERO4 = (0.0, 0.0, 0.0, 0.0)
 GRAVITY = (0.0, 0.0, -9.81)
@@ -43,7 +43,7 @@ def test_least_coordinates_are_the_five_bodies(driven):
         ]
         wrenches = (Wrench(given.force_world, given.torque_body), *thrusts)
         p = machine(drone, GRAVITY, given.drive, x.speeds, wrenches)
-        five = together(p, BodyState(*x[:4]), x.angles, x.speeds)
+        five = assembled_state(p, BodyState(*x[:4]), x.angles, x.speeds)
         _, expected = arrays(rate(p, 0.0, five))
         ours = solve(drone, given, x)
         scale = np.abs(expected).max()
@@ -86,7 +86,7 @@ def test_free_flight_keeps_angular_momentum_whatever_the_motors_do():
     drone = delivery_drone(**PAPER)
     x = state(np.random.default_rng(53))
     motors = QUIET._replace(drive=(0.02, -0.01, 0.005, 0.01))
-    end = march(get("rkmk4").Method(), Flight(drone, motors), 0.0, x, 1e-4, 5000)
+    end = integrate_fixed(get("rkmk4").Method(), Flight(drone, motors), 0.0, x, 1e-4, 5000)
     np.testing.assert_allclose(momentum(drone, end), momentum(drone, x), atol=1e-7)
     np.testing.assert_allclose(end.velocity_world, x.velocity_world, atol=1e-12)
 

@@ -13,7 +13,7 @@ from lapwing.dynamics.multibody.body_kinematics import displaced
 from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
 from lapwing.dynamics.multibody.five_bodies import reactions as from_chassis
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system
 
 GRAVITY = (0.0, 0.0, -9.81)
@@ -31,7 +31,7 @@ def scene(rng, driven):
     q /= np.linalg.norm(q)
     position, velocity, omega = rng.normal(size=(3, 3)).tolist()
     chassis = BodyState(tuple(position), Quaternion(*q.tolist()), tuple(velocity), tuple(omega))
-    return drone, p, together(p, chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds)), wrench, speeds, drive
+    return drone, p, assembled_state(p, chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds)), wrench, speeds, drive
 
 
 def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):

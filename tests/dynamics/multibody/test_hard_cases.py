@@ -7,13 +7,20 @@ from multibody_angles import euler_from_quaternion
 from test_augmented import PAPER
 from test_delivery_drone import momentum, without_propeller
 
-from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, accelerations, solve
 from lapwing.dynamics.multibody.body_kinematics import displaced
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
-from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, together, violation
+from lapwing.dynamics.multibody.five_body_stabilisation import (
+    NONE,
+    PARTITION,
+    PROJECTION,
+    advance,
+    assembled_state,
+    constraint_violation,
+)
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
 from lapwing.dynamics.multibody.simulation import energy, simulate
 
@@ -24,7 +31,7 @@ RENORMALISED, RKMK4 = get("rk4_renormalised").Method(), get("rkmk4").Method()
 
 def five(drone, omega, speeds, gravity=GRAVITY, angles=(0.1, 0.4, 0.7, 1.0)):
     p = machine(drone, gravity, speeds=speeds)
-    return p, together(p, BodyState(NOWHERE, quaternion.NO_ROTATION, NOWHERE, omega), angles, speeds)
+    return p, assembled_state(p, BodyState(NOWHERE, quaternion.NO_ROTATION, NOWHERE, omega), angles, speeds)
 
 
 def test_pitch_through_90_degrees():
@@ -58,7 +65,7 @@ def test_an_hour_of_flight_stays_together(stabilisation):
     worst = (0.0, 0.0)
     for minute in range(60):
         x = advance(RENORMALISED, p, 60.0 * minute, x, 6e-3, 10000, stabilisation)
-        worst = np.maximum(worst, violation(p, x))
+        worst = np.maximum(worst, constraint_violation(p, x))
     assert np.all(np.isfinite(np.hstack(arrays(x))))
     assert max(worst) < 1e-10, worst
 
@@ -68,7 +75,7 @@ def test_without_stabilisation_an_hour_drifts_apart():
     drift = []
     for _ in range(3):
         x = advance(RENORMALISED, p, 0.0, x, 6e-3, 10000, NONE)
-        drift.append(violation(p, x)[0])
+        drift.append(constraint_violation(p, x)[0])
     assert drift[0] > 1e-7
     assert drift[2] > 2.0 * drift[0] or not np.isfinite(drift[2])
 
@@ -87,13 +94,13 @@ def test_light_propellers_at_1000_rad_per_s():
     drone, speeds = light(), (1000.0, -1000.0, 1000.0, -1000.0)
     x = DroneState(NOWHERE, quaternion.NO_ROTATION, NOWHERE, (1.0, -0.7, 0.4), (0.1, 0.4, 0.7, 1.0), speeds)
     flight = Flight(drone, Loads(NOWHERE, NOWHERE, ZERO4, ZERO4, ZERO4, NOWHERE))
-    end = march(RKMK4, flight, 0.0, x, 1e-3, 20000)
+    end = integrate_fixed(RKMK4, flight, 0.0, x, 1e-3, 20000)
     np.testing.assert_allclose(momentum(drone, end), momentum(drone, x), rtol=1e-5)
-    fine = march(RKMK4, flight, 0.0, x, 1e-4, 200000)
+    fine = integrate_fixed(RKMK4, flight, 0.0, x, 1e-4, 200000)
     np.testing.assert_allclose(end.attitude, fine.attitude, atol=1e-3)
     p, naive = five(drone, (1.0, -0.7, 0.4), speeds, NOWHERE)
     naive = advance(RENORMALISED, p, 0.0, naive, 1e-3, 5000, NONE)
-    assert not max(violation(p, naive)) < 1e-2
+    assert not max(constraint_violation(p, naive)) < 1e-2
 
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
@@ -105,7 +112,7 @@ def test_five_bodies_with_light_fast_propellers_are_held(driven):
     )
     for hold in (PARTITION, PROJECTION):
         end = advance(RENORMALISED, p, 0.0, x, 2.5e-4, 8000, hold)
-        assert max(violation(p, end)) < 1e-9
+        assert max(constraint_violation(p, end)) < 1e-9
         assert np.abs(end.chassis.omega_body).max() < 5.0
 
 
@@ -116,14 +123,14 @@ def test_a_locked_propeller_a_free_one_and_two_driven():
         NOWHERE, quaternion.NO_ROTATION, NOWHERE, (0.2, 0.3, 0.1), (0.1, 0.4, 0.7, 1.0), (0.0, 50.0, 100.0, -100.0)
     )
     loads = Loads(NOWHERE, (0.1, 0.0, 0.05), ZERO4, ZERO4, (0.0, 0.0, 5.0, -5.0), GRAVITY)
-    end = march(RKMK4, Flight(drone, loads), 0.0, x, 1e-3, 1000)
+    end = integrate_fixed(RKMK4, Flight(drone, loads), 0.0, x, 1e-3, 1000)
     assert end.speeds[0] == 0.0
     assert end.angles[0] == x.angles[0]
     np.testing.assert_allclose([end.speeds[2], end.speeds[3]], [105.0, -105.0], rtol=1e-12)
     # the same through the general engine: three drives, one free hinge
     system = drone_system(drone, (True, False, True, True))
     p = machine(drone, GRAVITY)
-    q, v = arrays(together(p, BodyState(*x[:4]), x.angles, x.speeds))
+    q, v = arrays(assembled_state(p, BodyState(*x[:4]), x.angles, x.speeds))
     wrench = np.zeros((5, 6))
     wrench[0, 3:] = loads.torque_body
     drive = [[0.0, 0.0], [100.0, 5.0], [-100.0, -5.0]]
@@ -170,7 +177,7 @@ def test_a_propeller_torn_off_in_flight():
         speeds,
     )
     flight = Flight(lost, Loads(NOWHERE, NOWHERE, ZERO4, ZERO4, ZERO4, GRAVITY))
-    end = march(RKMK4, flight, 0.0, start, 5e-4, 400)
+    end = integrate_fixed(RKMK4, flight, 0.0, start, 5e-4, 400)
     np.testing.assert_allclose(end.position_world, after.configuration[-1, 0, :3], atol=1e-8)
     np.testing.assert_allclose(np.abs(end.attitude), np.abs(after.configuration[-1, 0, 3:]), atol=1e-6)
 

@@ -5,7 +5,7 @@ import pytest
 from test_augmented import PAPER
 from test_delivery_drone import state
 
-from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, solve
 
@@ -79,7 +79,7 @@ def test_five_seconds_of_tumbling():
         data.qfrc_applied[6:] = loads.drive
         for _ in range(n):
             mujoco.mj_step(m, data)
-        ours = march(method, Flight(drone, loads), 0.0, x, 5.0 / n, n)
+        ours = integrate_fixed(method, Flight(drone, loads), 0.0, x, 5.0 / n, n)
         ours = np.hstack(
             [ours.position_world, ours.attitude, ours.angles, ours.velocity_world, ours.omega_body, ours.speeds]
         )

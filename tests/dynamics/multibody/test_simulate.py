@@ -8,7 +8,7 @@ from test_augmented import PAPER
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system, four_bars
 from lapwing.dynamics.multibody.simulation import energy, simulate
 
@@ -18,7 +18,7 @@ SPEEDS = (40.0, -30.0, 35.0, -45.0)
 def tumbling():
     drone = delivery_drone(**PAPER)
     chassis = BodyState((0.0, 0.0, 10.0), Quaternion(0.8, 0.0, 0.6, 0.0), (1.0, 2.0, 3.0), (0.3, 0.5, -0.4))
-    return drone, *arrays(together(machine(drone, (0.0, 0.0, -9.81)), chassis, (0.1, 0.2, 0.3, 0.4), SPEEDS))
+    return drone, *arrays(assembled_state(machine(drone, (0.0, 0.0, -9.81)), chassis, (0.1, 0.2, 0.3, 0.4), SPEEDS))
 
 
 @pytest.mark.parametrize("stabilisation", ["none", "baumgarte", "partitioning", "projection"])

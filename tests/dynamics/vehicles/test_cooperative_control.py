@@ -70,7 +70,7 @@ def forces(p, t, x, acceleration=ZERO, omega_rate=(ZERO,) * 3):
     wanted, slope = forces_of.wanted_specific(p, t, x, acceleration)
     s, s_rate = forces_of.shares(p, x, wanted, slope)
     n = len(x.link)
-    return wanted, [forces_of.wanted_force(p, x, wanted, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
+    return wanted, [forces_of.desired_force(p, x, wanted, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
 
 
 def test_wanted_forces_give_the_wanted_motion():
@@ -105,13 +105,13 @@ def test_derivatives_of_the_wanted_forces_along_the_motion():
 
 def test_wanted_attitude_and_its_rate():
     force, force_rate, h = np.array((1.0, -2.0, 7.0)), np.array((0.5, 0.3, -1.0)), 1e-6
-    matrix, omega = forces_of.wanted_attitude(tuple(force), tuple(force_rate))
+    matrix, omega = forces_of.desired_attitude(tuple(force), tuple(force_rate))
     m = np.array(matrix).reshape(3, 3)
     assert m @ (0, 0, 1) == pytest.approx(force / np.linalg.norm(force))
     assert m[0, 1] == pytest.approx(0.0, abs=1e-16)  # body x stays in the plane of z and world x, and towards that
     assert m[0, 0] > 0.0
     assert np.linalg.det(m) == pytest.approx(1.0)
-    ahead, behind = (forces_of.wanted_attitude(tuple(force + s * h * force_rate), ZERO)[0] for s in (1, -1))
+    ahead, behind = (forces_of.desired_attitude(tuple(force + s * h * force_rate), ZERO)[0] for s in (1, -1))
     spin = m.T @ (np.array(ahead) - behind).reshape(3, 3) / (2 * h)
     assert (spin[2, 1], spin[0, 2], spin[1, 0]) == pytest.approx(omega, abs=1e-9)
 
@@ -132,7 +132,7 @@ def test_a_force_that_points_down_does_not_tip_the_quadrotor_over():
 def test_the_moment_vanishes_on_the_wanted_attitude_and_opposes_an_error():
     p, x = published()
     force = (0.0, 0.0, 10.0)
-    aligned = from_matrix(forces_of.wanted_attitude(force, ZERO)[0])
+    aligned = from_matrix(forces_of.desired_attitude(force, ZERO)[0])
     assert isinstance(aligned, Quaternion)
     assert forces_of.moment(p, x._replace(attitude=(aligned,) * 2), force, ZERO, 0) == pytest.approx(ZERO, abs=1e-14)
     tilted = x._replace(attitude=(exp((0.1, 0.0, 0.0)),) * 2)

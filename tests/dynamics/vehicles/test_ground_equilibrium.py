@@ -8,22 +8,22 @@ import pytest
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, rotation_matrix
 from lapwing.dynamics.terrain import LEVEL, relief, surface
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.ground_equilibrium import standing_pose
+from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose
 
 DRONE = load_airframe("lapwing/scenes/vehicles/delivery_drone.toml")
 FEET = DRONE.contact.feet
 
 
 def clearances(feet, ground=LEVEL):
-    position, attitude = standing_pose(feet, ground)
+    position, attitude = resting_pose(feet, ground)
     R = np.reshape(rotation_matrix(attitude), (3, 3))
     places = np.array(position) + np.array(feet) @ R.T
     return R, np.array([z - surface(ground, x, y)[0] for x, y, z in places])
 
 
 def test_on_level_ground_it_is_not_turned_by_a_bit():
-    assert standing_pose(FEET) == ((0.0, 0.0, 0.35), NO_ROTATION)
-    assert standing_pose([]) == ((0.0, 0.0, 0.0), NO_ROTATION)
+    assert resting_pose(FEET) == ((0.0, 0.0, 0.35), NO_ROTATION)
+    assert resting_pose([]) == ((0.0, 0.0, 0.0), NO_ROTATION)
 
 
 @pytest.mark.parametrize("slope", [(0.1, 0.0), (0.0, -0.2), (0.5, 0.5), (-0.9, 0.1)])
@@ -33,7 +33,7 @@ def test_on_a_slope_every_foot_touches(slope):
     assert abs(heights).max() < 1e-12
     assert R[:, 2] == pytest.approx(surface(plane, 3.0, 4.0)[1], abs=1e-12)
     assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(0.0, abs=1e-12)  # heading
-    assert standing_pose(FEET, plane)[0][:2] == (0.0, 0.0)
+    assert resting_pose(FEET, plane)[0][:2] == (0.0, 0.0)
 
 
 UNEVEN = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.25, -0.2, -0.32)]
@@ -57,7 +57,7 @@ def test_three_feet_of_unequal_height_give_the_tilt_in_closed_form():
 
 
 def test_feet_that_do_not_stand_around_the_centre_of_mass_leave_it_level():
-    (x, y, z), attitude = standing_pose([(0.1, 0.1, -0.3), (0.2, 0.1, -0.35), (0.2, -0.1, -0.35)])
+    (x, y, z), attitude = resting_pose([(0.1, 0.1, -0.3), (0.2, 0.1, -0.35), (0.2, -0.1, -0.35)])
     assert (x, y, z, attitude) == (0.0, 0.0, 0.35, NO_ROTATION)
 
 

@@ -44,12 +44,14 @@ def seen(p, x):
 
 @kernel
 def struck(p, state, volts):
-    return multirotor_multibody_equations.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+    return multirotor_multibody_equations.apply_constraint_impulse(
+        MultirotorDrive(p, p.body, state.memory, volts), state.motion
+    )
 
 
 @kernel
 def euler_struck(p, state, volts):
-    return multirotor_euler.struck(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+    return multirotor_euler.apply_constraint_impulse(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
 
 
 @kernel
@@ -97,7 +99,7 @@ def before(coordinates, drive):
 @pytest.mark.parametrize("becomes", BECOMES)
 def test_momentum_is_kept_across_the_event(coordinates, drive, becomes):
     form, p, start, state = before(coordinates, drive)
-    after = form.after(p, 1, becomes)
+    after = form.with_propeller_failure(p, 1, becomes)
     kept = momenta(p, state.motion)
     assert np.abs(kept - momenta(p, start.motion)).max() < 1e-7
     if becomes == "locked":
@@ -111,7 +113,7 @@ def test_momentum_is_kept_across_the_event(coordinates, drive, becomes):
 def test_a_locked_propeller_gives_its_spin_to_the_chassis():
     """The naive way, which just stops it, loses the spin."""
     _, p, _, state = before("se3", "torque")
-    after = multirotor_multibody.after(p, 1, "locked")
+    after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
     speed = seen(p, state.motion).rotor_speed[1]
     motion = struck(after, state, VOLTS)
     assert seen(after, motion).rotor_speed[1] == pytest.approx(0.0, abs=1e-11)
@@ -130,7 +132,7 @@ def test_a_locked_propeller_gives_its_spin_to_the_chassis():
 def test_a_free_propeller_keeps_its_spin_without_air(drive):
     """The naive way, a motor without voltage, brakes it."""
     _, p, _, state = before("se3", drive)
-    after = multirotor_multibody.after(p, 1, "free")
+    after = multirotor_multibody.with_propeller_failure(p, 1, "free")
     end = flown(after, state, 20, 10)
     axial = [bodies(x)[2].omega_body[2] for x in (state.motion, end.motion)]
     # uneven blades trade a trace of it with the body rates
@@ -146,7 +148,7 @@ def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
     """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held. The naive way,
     a propeller that gives no thrust any more, stays where it is."""
     form, p, _, state = before(coordinates, "speed")
-    after = form.after(p, 1, "torn_off")
+    after = form.with_propeller_failure(p, 1, "torn_off")
     if coordinates == "euler":
         arrays = after.layout.bodies.arrays
         assert (len(arrays.joint_bodies), len(arrays.drive_bodies)) == (3, 3)
@@ -168,7 +170,7 @@ def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
     ]
     assert np.abs([gap[k] for k in (0, 2, 3)]).max() < 1e-10
     assert np.abs(gap[1]).max() > 1e-4
-    naive = bodies(flown(form.after(p, 1, "free"), state, 20, 10).motion)
+    naive = bodies(flown(form.with_propeller_failure(p, 1, "free"), state, 20, 10).motion)
     assert np.abs(np.subtract(naive[2].position_world, straight)).max() > 1e-4
 
 
@@ -176,7 +178,7 @@ def test_both_coordinates_tear_alike():
     ends = []
     for coordinates in FORMS:
         form, p, _, state = before(coordinates, "torque")
-        ends.append(bodies(flown(form.after(p, 1, "torn_off"), state, 10, 10).motion))
+        ends.append(bodies(flown(form.with_propeller_failure(p, 1, "torn_off"), state, 10, 10).motion))
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-8)
         np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-5)
@@ -184,7 +186,7 @@ def test_both_coordinates_tear_alike():
 
 def test_thrust_of_what_is_gone_is_gone():
     active = effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE)
-    p = multirotor_multibody.after(multirotor_multibody.parameters(DRONE, active), 1, "torn_off")
+    p = multirotor_multibody.with_propeller_failure(multirotor_multibody.parameters(DRONE, active), 1, "torn_off")
     state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=SPEED)
     assert multirotor.observe(p, 0, H, state, VOLTS).thrust[1] == 0.0
     end = flown(p, state, 50)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lapwing.dynamics.integrators import StepDoubling, get, march, march_controlled, rate
+from lapwing.dynamics.integrators import StepDoubling, get, integrate_fixed, integrate_step_doubling, rate
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
 from lapwing.dynamics.vehicles.unloading_contact_points import roller_speed
@@ -27,7 +27,7 @@ FORWARD = np.array((math.cos(P.tilt), 0.0, -math.sin(P.tilt)))
 
 
 def run(p, x, seconds, start=0.0, h=H):
-    return march(RK4, p, start, x, h, round(seconds / h))
+    return integrate_fixed(RK4, p, start, x, h, round(seconds / h))
 
 
 def test_the_contact_of_two_that_move_as_one_does_no_work():
@@ -105,7 +105,7 @@ def test_a_fall_bounces_lower_every_time():
 @pytest.mark.long
 def test_the_whole_unloading_converges_and_the_door_shuts():
     coarse, fine = (
-        march_controlled(StepDoubling(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)
+        integrate_step_doubling(StepDoubling(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)
         for tolerance, step in ((1e-5, 1e-3), (1e-8, 2.5e-4))
     )
     assert coarse.position_world == pytest.approx(fine.position_world, abs=1e-5)

@@ -35,7 +35,7 @@ def test_all_services_share_the_environment():
     around = environment(scene)
     assert gravity(scene) == around.gravity == normal_gravity(47.3)
     air = next(effect for effect in active(scene) if hasattr(effect, "atmosphere"))
-    assert air.initial_memory()[0] == density(around.atmosphere, 1600.0)
+    assert air.initial_discrete_state()[0] == density(around.atmosphere, 1600.0)
     instruments = setup.services["sensors"].parameters.instruments
     assert {instrument.around.home for instrument in instruments} == {around.home}
     filter_ = setup.services["autopilot"].parameters.estimator

@@ -25,7 +25,7 @@ def test_gravity_comes_from_the_gravity_effect():
     assert gravity(without_gravity()) == 0.0
     altitude = without_gravity(("effects.gravity_altitude", {}), ("environment.home.height", 5000.0))
     assert gravity(altitude) == pytest.approx(9.80665 * (6_356_766.0 / 6_361_766.0) ** 2, rel=1e-12)
-    assert gravity(altitude) == active(altitude)[0].initial_memory()[0]
+    assert gravity(altitude) == active(altitude)[0].initial_discrete_state()[0]
 
 
 def test_imu_reads_gravity_of_any_gravity_effect():

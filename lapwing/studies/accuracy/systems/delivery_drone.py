@@ -53,7 +53,7 @@ def _of_one(p: Any, x: Any) -> float:
 @kernel
 def _of_five(p: Any, x: Any) -> float:
     drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
-    return five_body_stabilisation.violation(unloaded(drive, seen(p.layout, x)), x)[0]
+    return five_body_stabilisation.constraint_violation(unloaded(drive, seen(p.layout, x)), x)[0]
 
 
 @kernel
@@ -111,7 +111,9 @@ def thrown(p: Any, frame: Any) -> FiveBodies:
     """The five bodies at the start, blades along x."""
     speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
     machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
-    return five_body_stabilisation.together(machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds)
+    return five_body_stabilisation.assembled_state(
+        machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds
+    )
 
 
 def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:

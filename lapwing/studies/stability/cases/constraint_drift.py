@@ -7,7 +7,13 @@ import numpy as np
 from lapwing.dynamics import integrators
 from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
-from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, violation
+from lapwing.dynamics.multibody.five_body_stabilisation import (
+    NONE,
+    PARTITION,
+    PROJECTION,
+    advance,
+    constraint_violation,
+)
 from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
@@ -35,7 +41,7 @@ def defects(way: int) -> np.ndarray:
     found = []
     for minute in range(MINUTES):
         x = advance(METHOD.Method(), p, 60.0 * minute, x, STEP, EACH, way)
-        found.append(max(violation(p, x)))
+        found.append(max(constraint_violation(p, x)))
     return np.array(found)
 
 

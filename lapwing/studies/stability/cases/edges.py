@@ -9,7 +9,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import relief
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.ground_equilibrium import at_rest, standing_pose
+from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose, static_equilibrium
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
@@ -26,7 +26,7 @@ def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
     """(parameters, state at rest, voltages) of a drone whose rotors give that share of its weight."""
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE, Environment(terrain=terrain)))
-    state = at_rest(multirotor, p, standing_pose(DRONE.contact.feet if DRONE.contact else (), terrain), G)
+    state = static_equilibrium(multirotor, p, resting_pose(DRONE.contact.feet if DRONE.contact else (), terrain), G)
     speed = math.sqrt(share * DRONE.mass.total * G / (4.0 * p.effects[2].thrust_constant * DENSITY))
     motion = state.motion._replace(rotor_speed=(speed,) * 4)
     return p, state._replace(motion=motion), (speed / p.layout.speed_per_volt,) * 4

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lapwing.dynamics.integrators import get, march
+from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.reference import turning
 from lapwing.studies.accuracy.systems.gyrostat import SPINNING, START
@@ -45,7 +45,7 @@ def accumulated() -> np.ndarray:
     """The end where each of ten parts takes over the clock that the one before has added up from its steps."""
     x, t, h = START, 0.0, DURATION / STEPS
     for _ in range(10):
-        x = march(get("rkmk4").Method(), SPINNING, t, x, h, STEPS // 10)
+        x = integrate_fixed(get("rkmk4").Method(), SPINNING, t, x, h, STEPS // 10)
         for _ in range(STEPS // 10):
             t += h
     return np.array(flatten(x))

@@ -5,7 +5,13 @@ from typing import Any
 import numpy as np
 
 from lapwing.dynamics import integrators
-from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, violation
+from lapwing.dynamics.multibody.five_body_stabilisation import (
+    NONE,
+    PARTITION,
+    PROJECTION,
+    advance,
+    constraint_violation,
+)
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone, thrown
 
@@ -27,7 +33,7 @@ def defects(way: int, scale: float, speed: float, step: float, looks: int) -> np
     found = []
     for look in range(looks):
         x = advance(METHOD, p, look * EACH * step, x, step, EACH, way)
-        found.append(max(violation(p, x)))
+        found.append(max(constraint_violation(p, x)))
     return np.array(found)
 
 

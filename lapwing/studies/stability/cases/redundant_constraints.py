@@ -16,7 +16,7 @@ from lapwing.dynamics.multibody.augmented import (
 )
 from lapwing.dynamics.multibody.body_kinematics import displaced
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
-from lapwing.dynamics.multibody.five_body_stabilisation import together
+from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.initial_conditions import consistent
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system, four_bars
 from lapwing.dynamics.multibody.simulation import simulate
@@ -67,7 +67,7 @@ def redundant() -> tuple[float, float]:
         pose = Quaternion(*map(float, turn / np.linalg.norm(turn)))
         chassis = BodyState(tuple(rng.normal(size=3)), pose, tuple(rng.normal(size=3)), tuple(3.0 * rng.normal(size=3)))
         q, v = arrays(
-            together(machine(drone, (0.0, 0.0, -GRAVITY)), chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds))
+            assembled_state(machine(drone, (0.0, 0.0, -GRAVITY)), chassis, tuple(rng.uniform(-3, 3, 4)), tuple(speeds))
         )
         drive = np.column_stack([speeds, 10.0 * rng.normal(size=4)])
         ours = accelerations(system, q, v, None, drive).acceleration.ravel()
