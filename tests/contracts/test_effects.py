@@ -28,6 +28,7 @@ HOVER = (32.6, 32.5, 32.7, 32.6)
 
 NEEDED = {  # the keys that a scene cannot leave out
     "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
+    "rotational_drag": {"linear": [0.1, 0.1, 0.1]},
     "rotor_damage": {"rotor": 1},
     "rotor_table": {"advance": [0.0, 0.2], "thrust": [[0.1, 0.08]], "power": [[0.04, 0.038]]},
     "shared_slung_load": {"mass": 2.0, "length": 3.0},
