@@ -44,7 +44,7 @@ class CellType(types.StructRef):
 
 @dataclass
 class _Form:
-    """What cells of one structure share."""
+    """Data shared by the cells of one structure."""
 
     kind: types.Type  # of the value
     cell: CellType
@@ -57,7 +57,7 @@ _by_classes: dict[Hashable, list[_Form]] = {}  # by the classes at the top, whic
 
 
 def _form(value: Any) -> tuple[_Form, Sequence[Any]]:
-    """That of a cell of this value, and the value's leaves."""
+    """Return the form of a cell of this value, and the leaves of the value."""
     top: Any = (type(value), *map(type, value)) if isinstance(value, tuple) else type(value)
     for form in _by_classes.get(top, ()):
         assert form.flattener is not None
@@ -89,7 +89,7 @@ class Cell(structref.StructRefProxy):
     memory: Memory
 
     def __new__(cls, value: Any) -> "Cell":
-        """A cell that holds `value`: a number, an array or another cell, or a NamedTuple or tuple of such."""
+        """Return a cell that holds `value`: a number, array or cell, or a tuple or NamedTuple of these."""
         # numba's own constructor would be compiled in every process, and for every type of value
         form, parts = _form(value)
         memory = Memory(form.kind, parts, form.layout)
@@ -102,7 +102,7 @@ structref.define_boxing(CellType, Cell)
 
 
 def read(cell: Cell) -> Any:
-    """The value of a cell, its arrays as copies."""
+    """Return the value of a cell, with copies of its arrays."""
     return cell.memory.read()
 
 

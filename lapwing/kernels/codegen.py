@@ -120,7 +120,7 @@ def _reduce_tuple(function, common, value, a, b):
 
 
 def any_in_tuple(found: tuple) -> bool:
-    """Whether any entry of a tuple is true."""
+    """Return True if any entry of a tuple is true."""
     return any(found)
 
 

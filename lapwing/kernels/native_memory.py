@@ -1,7 +1,7 @@
-"""Values in memory as compiled code has them, put there and read from there by Python, without compiling anything.
+"""Values in the memory layout of compiled code, written and read by Python without compilation.
 
-Compiled code counts who uses the memory of a cell or an array, and the last one lets it go. So memory here belongs to
-such a count from the beginning (numba's `MemInfo`), and holds a count of its own of every array and cell in it.
+Compiled code counts references to the memory of cells and arrays. So memory here belongs to a reference count (numba's
+`MemInfo`) and holds one reference to each array and cell in it.
 """
 
 # numba.core.types fills itself at import
@@ -26,7 +26,7 @@ ARRAY, CELL = "PPqqP", "P"  # of an array before its shape and strides: count, o
 
 
 class Layout(NamedTuple):
-    """How the values of a type lie in memory."""
+    """Memory layout of the values of a type."""
 
     format: str  # of the module `struct`
     alignment: int  # [bytes]
@@ -73,7 +73,7 @@ def layout(kind: types.Type) -> Layout:
 
 @cache
 def _make_ready() -> None:
-    """Make numba's counting ready."""
+    """Initialise numba's reference counting."""
     cpu_target.target_context.refresh()
 
 
@@ -86,7 +86,7 @@ class Memory:
     """
 
     def __init__(self, kind: types.Type, leaves: Sequence[Any], lies: Layout):
-        """Of the leaves of a value of a type with this layout."""
+        """Store the leaves of a value of a type with this layout."""
         _make_ready()
         self._block = _Block(kind, lies, leaves)
         self.pointer: int = counted.meminfo_new(self._block.address, self._block)
@@ -109,7 +109,7 @@ class Memory:
 
 
 class _Block:
-    """The memory itself; it lets go of what in it is counted when compiled code lets go of it."""
+    """Memory of one value; releases its arrays and cells when compiled code releases it."""
 
     def __init__(self, kind: types.Type, lies: Layout, leaves: Sequence[Any]):
         self.kind, self._layout = kind, lies
@@ -119,18 +119,18 @@ class _Block:
         self.put(leaves)
 
     def put(self, leaves: Sequence[Any]) -> None:
-        """Fill it."""
+        """Write the leaves."""
         numbers = list(leaves)
         for k in reversed(self._layout.others):
             numbers[k : k + 1] = _in_memory(leaves[k])
         self._struct.pack_into(self._place, 0, *numbers)
 
     def numbers(self) -> tuple:
-        """What is in it now, flat."""
+        """Return the present contents, flat."""
         return self._struct.unpack_from(self._place)
 
     def release(self) -> None:
-        """Let go of the arrays and cells that are in it now."""
+        """Release the arrays and cells in the memory."""
         if self._layout.counted:
             numbers = self.numbers()
             for i in self._layout.counted:
@@ -143,7 +143,7 @@ class _Block:
 
 
 def _in_memory(leaf: Any) -> tuple[int, ...]:
-    """What stands in memory for an array, a cell or None."""
+    """Return the memory representation of an array, a cell or None."""
     if leaf is None:
         return (0,)
     if isinstance(leaf, np.ndarray):

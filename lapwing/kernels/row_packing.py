@@ -70,7 +70,7 @@ def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
 
 
 def _alike(part: tuple) -> bool:
-    """Whether a NamedTuple stands for one quantity, such as a quaternion."""
+    """Return True if a NamedTuple is one quantity, such as a quaternion."""
     return type(part).__name__ == "Quaternion"
 
 
@@ -134,7 +134,7 @@ def _made(tree: types.Type) -> types.Type:
 
 
 def _first(context: Any, builder: Any, signature: Any, row: int, arguments: Sequence[Any]) -> Any:
-    """Where a row begins: argument `row` is the array, the next one the number of the row."""
+    """Return the address of a row: argument `row` is the array, the next one the row number."""
     array = context.make_array(signature.args[row])(context, builder, arguments[row])
     width = cgutils.unpack_tuple(builder, array.shape)[1]
     return builder.gep(array.data, [builder.mul(arguments[row + 1], width)])

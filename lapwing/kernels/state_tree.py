@@ -21,7 +21,7 @@ from lapwing.kernels.codegen import compile_source, generated_overload
 
 
 class Manifold(NamedTuple):
-    """What a manifold leaf class must know; compiled functions, u and v in its tangent coordinates.
+    """Operations of a manifold leaf class: compiled functions, u and v in its tangent coordinates.
 
     The tangent space at every point is one Lie algebra that acts on the manifold (theory.md, section 5.1).
     """

@@ -35,7 +35,7 @@ class Flattener:
     """Flattens values of one structure."""
 
     def __init__(self, example: Any):
-        """Of the structure of a value that `structure` knows."""
+        """Generate the function for the structure of an example, which `structure` must know."""
         self._flatten = _written(example)
         tuples, parts = self._flatten(example)
         self._types = tuple(map(type, tuples)), tuple(map(type, parts))
@@ -43,7 +43,7 @@ class Flattener:
         self._closer = [(k, structure(part)) for k, part in enumerate(parts) if type(part) not in _BY_TYPE]
 
     def leaves(self, value: Any) -> tuple[Any, ...] | None:
-        """The same as of the function; None of a value of another structure."""
+        """Return all numbers, arrays and cells in order; None for a value of another structure."""
         try:
             tuples, parts = self._flatten(value)
         except (TypeError, ValueError):  # it has other tuples, or of other lengths

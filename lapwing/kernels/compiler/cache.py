@@ -18,7 +18,7 @@ from lapwing.kernels.compiler.cache_key import Key, NotKeptError, key
 
 
 class Statistics(NamedTuple):
-    """Of the kernels that this process has needed so far."""
+    """Numbers of kernels that this process has used."""
 
     compiled: int
     loaded: int  # from the disk, with all that they call
@@ -29,7 +29,7 @@ _listeners: list[Callable[[str], None]] = []
 
 
 def statistics() -> Statistics:
-    """How many versions of kernels this process has compiled, and how many it has loaded."""
+    """Return the numbers of kernel versions that this process has compiled and loaded."""
     return Statistics(**_counted)
 
 

@@ -32,7 +32,7 @@ def _checksum(content: bytes) -> bytes:
 
 
 def _ours(status: os.stat_result) -> bool:
-    """Whether only this user, or root, can have written a file: what is read from here is run."""
+    """Return True if only this user or root can have written a file: its content is executed."""
     return status.st_uid in (0, os.geteuid()) and not status.st_mode & 0o022
 
 

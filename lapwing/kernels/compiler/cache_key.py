@@ -1,4 +1,4 @@
-"""What a compiled version of a kernel is made of, as text that is the same in every process.
+"""Key of a compiled version of a kernel: text that is equal in every process.
 
 Three things make it up: the types of its arguments; every function that it can reach through names, closures and
 tables (`DispatchTable`), with the constants that these take from their modules; and the sources that can be in it.
@@ -32,7 +32,7 @@ class NotKeptError(Exception):
 
 
 class Key(NamedTuple):
-    """Of one compiled version."""
+    """Key of one compiled version."""
 
     made_of: str  # types, functions and constants, compiler: a digest
     sources: str  # digest of all sources that can be in it
@@ -108,7 +108,7 @@ class _Writer:
         return f"{module}.{name}{''.join(entries)}"
 
     def of_global(self, path: str, namespace: dict, name: str, names: set[str], told: bool) -> str:
-        """What a function takes from its module, which may have been set from elsewhere; `told` by its source."""
+        """Return the text of a global name; `told`: the source of the module defines it."""
         value = namespace[name]
         self.seen.append((namespace, name, value))
         if isinstance(value, ModuleType):

@@ -1,8 +1,7 @@
-"""How one kernel calls another in the code that LLVM is given: every argument and the result as one value.
+"""Calling convention between kernels: every argument and the result is one value (by-value aggregate).
 
-numba takes every tuple apart into its numbers before a call and puts it together again behind it, and does the same
-with a result: for a state of a hundred numbers four hundred instructions at every call, two thirds of all that LLVM
-was given. Once a function is inlined nothing of either way is left.
+numba passes a tuple as its numbers: 400 instructions a call for a state of a hundred numbers, two thirds of the
+code given to LLVM. After inlining both conventions give equal code.
 """
 
 # numba.core.types fills itself at import
@@ -30,7 +29,7 @@ class _Whole:
         self.argument_types = tuple(kind for kind in self._kinds if kind is not None)
 
     def as_arguments(self, builder: Any, values: Sequence[Any]) -> tuple:
-        """What is passed."""
+        """Return the values to pass."""
         pairs = zip(values, self._kinds, strict=True)
         return tuple(_converted(builder, value, kind) for value, kind in pairs if kind is not None)
 
@@ -62,7 +61,7 @@ class ValueCallConv(CPUCallConv):
         return _Whole(self.context, argtypes)
 
     def get_return_type(self, ty: types.Type) -> Any:
-        """Of the place for the result."""
+        """Return the type of the pointer to the result."""
         return self.context.get_value_type(ty).as_pointer()
 
     def declare(self, module: Any, fndesc: Any) -> Any:
@@ -94,7 +93,7 @@ class _Failed(NamedTuple):
 
 
 def uses_value_call_conv(fndesc: Any) -> bool:
-    """Whether the function of a descriptor is called by `ValueCallConv`."""
+    """Return True if the function of a descriptor is called by `ValueCallConv`."""
     return fndesc.mangled_name.endswith(WHOLE)
 
 
@@ -151,7 +150,7 @@ class InnerLower(KernelLower):
 
     @property
     def call_conv(self) -> CPUCallConv:
-        """Of the function itself."""
+        """Convention of the function itself."""
         return ValueCallConv(self.context) if uses_value_call_conv(self.fndesc) else super().call_conv
 
     def setup_function(self, fndesc: Any) -> None:

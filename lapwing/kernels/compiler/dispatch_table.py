@@ -6,7 +6,7 @@ from typing import Any
 
 
 class DispatchTable(UserDict[type, Any]):
-    """What a class stands for in compiled code: a compiled function, or a NamedTuple of some.
+    """Mapping from a class to a compiled function, or to a NamedTuple of compiled functions.
 
     A kernel may reach code through such a table that its own module never imports. So the cache looks up every class in
     an argument's type in every table: what is found there is part of what the kernel is made of.

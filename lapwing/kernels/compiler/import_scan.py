@@ -1,4 +1,4 @@
-"""What a module's source imports, found without running it."""
+"""Imports in the source of a module, found without running it."""
 
 import ast
 

@@ -1,10 +1,9 @@
-"""How kernels are compiled: what is compiled for another kernel's sake is optimised, but gets no machine code.
+"""Compile pipeline: functions compiled for other kernels are optimised but get no machine code.
 
-Of every function, however small, numba makes machine code and two wrappers, for calls from Python and from C. A kernel
-calls hundreds that end up inlined in it, so that most of the compile time went there. Here such a function is an
-`InnerLibrary`: optimised LLVM code, linked into its caller as numba links any, which takes its arguments whole
-(`_calls`). The outermost kernel's own code does the same with or without (docs/reference/benchmarks.md, "Compile
-time").
+numba makes machine code and two wrappers, for calls from Python and C, of every function. A kernel calls hundreds that
+end up inlined in it, so that most of the compile time went there. Here such a function is an `InnerLibrary`: optimised
+LLVM code linked into its caller, with arguments passed by value (`call_convention`). The machine code of the outermost
+kernel is as fast with or without (docs/appendix/benchmark_history.md, "Compile time").
 """
 
 import gc
@@ -29,7 +28,7 @@ from lapwing.kernels.compiler.file_locks import released_at_end
 
 
 class _Depth(threading.local):
-    """Of the compilations in this thread that wait for one another."""
+    """Depth of nested compilations in this thread."""
 
     value = 0
 
@@ -108,7 +107,7 @@ class KernelLowering(NativeLowering):
 
     @property
     def lowering_class(self) -> type[Lower]:
-        """What writes the LLVM code."""
+        """Class that writes the LLVM code."""
         return KernelLower
 
     def run_pass(self, state: Any) -> bool:
@@ -122,7 +121,7 @@ class KernelLowering(NativeLowering):
 
 
 def _forwards(func_ir: Any) -> bool:
-    """Whether a function hands its arguments to another, and returns what that returns.
+    """Return True if a function passes its arguments to another and returns its result.
 
     Not with a kernel among them: its address, of which nothing is made, goes only when the code is optimised.
     """
@@ -143,7 +142,7 @@ class InnerLowering(KernelLowering):
 
     @property
     def lowering_class(self) -> type[Lower]:
-        """The same, for a function that takes its arguments whole."""
+        """Class that writes the LLVM code of a function that may use `ValueCallConv`."""
         return InnerLower
 
     def run_pass(self, state: Any) -> bool:

@@ -49,7 +49,7 @@ def _file(module: str) -> str | None:
 
 @cache
 def _folders(package: str) -> tuple[str, ...]:
-    """Where the modules of a package are; () if it is a plain module."""
+    """Return the folders of the modules of a package; () for a plain module."""
     loaded = sys.modules.get(package)
     if loaded is not None:
         return tuple(getattr(loaded, "__path__", ()))
@@ -76,7 +76,7 @@ def _entries(folder: str) -> frozenset[str]:
 
 @cache
 def _kind(package: str) -> str:
-    """Whether a top-level package is "followed", only "stamped" as it is somebody else's, "standard" or "missing"."""
+    """Return "followed", "stamped" (an external package), "standard" or "missing" for a top-level package."""
     place = _file(package) or next(iter(_folders(package)), None)
     if place is None:
         return "standard" if package in sys.stdlib_module_names else "missing"

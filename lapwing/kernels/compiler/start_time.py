@@ -1,4 +1,4 @@
-"""When this process read its first source that uses kernels; imported before numba, which takes its time."""
+"""Time at which this process read its first source with kernels; imported before numba, which takes long."""
 
 import time
 
