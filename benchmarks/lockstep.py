@@ -70,7 +70,7 @@ class Constant:
 
 def lockstep_process(name, peers, cycles, core):
     services = {name: ServiceConfig(None, *parts) for name, parts in PARTS.items()}
-    setup = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    setup = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     part = Constant(name, cycles)
     wires = plant_wires(setup, NONE) if name == "plant" else []
     participants = PublisherIds("bench")

@@ -43,7 +43,7 @@ def prepare(bus, giver, tick, interval_ns):
 def own(name, cycles):
     """Seconds a cycle of (taking, stepping, publishing) in the service `name`."""
     services = {service: ServiceConfig(None, *parts) for service, parts in PARTS.items()}
-    setup = RunConfig("benchmark", "", 1, 2 * cycles, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    setup = RunConfig("benchmark", "", 1, 2 * cycles, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     bus = Idle()
     process = SimpleNamespace(
         setup=setup, name=name, bus=bus, participants=PublisherIds("bench"), key_prefix="bench",

@@ -53,7 +53,7 @@ def setup(rate, seconds):
     ticks = rate // len(SAMPLES)
     services = {SOURCE: None}
     return RunConfig(
-        "bench", "", 1, int(ticks * seconds), ticks, 10**9 // ticks, "sequential", "drone1", services, {}, {}
+        "bench", "", 1, int(ticks * seconds), ticks, 10**9 // ticks, "gauss_seidel", "drone1", services, {}, {}
     )
 
 

@@ -105,7 +105,14 @@ def soak(folder):
     """A client flies up and down for 30 simulated minutes; (simulated [s], wall [s], longest gap [s], flights)."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    more = ["--speed", f"{SOAK_SPEED:g}", "--set", "autopilot.trajectory=false", "--set", f"run.duration={SOAK:g}"]
+    more = [
+        "--speed",
+        f"{SOAK_SPEED:g}",
+        "--set",
+        "autopilot.follow_trajectory=false",
+        "--set",
+        f"run.duration={SOAK:g}",
+    ]
     gaps, last, flights, airborne, sent, now, asked = [0.0], None, 0, False, 0.0, 0.0, -1e9
     with start("lapwing/scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
         began = None
@@ -147,7 +154,7 @@ def main():
         print(f"as the link sees it: {report}")
         variants = {
             "nobody listens": [],
-            "an operator is listened to": ["--set", "autopilot.operator=true"],
+            "an operator is listened to": ["--set", "autopilot.accept_commands=true"],
             "with a link": ["--mavlink", f"udpout:127.0.0.1:{free_port()}"],
         }
         factors = {name: [] for name in variants}

@@ -66,7 +66,7 @@ class BatchSimulator:
         """n vehicles at rest where the scene puts them.
 
         Args:
-            scene: what to simulate: a path, a name, or a loaded one; its model is "reduced".
+            scene: what to simulate: a path, a name, or a loaded one; its model is "rigid_body".
             n: how many.
             vary: how keys of the scene vary from member to member; member k draws what run k of a campaign draws. Each
                 costs the resolving of a scene, about 6 ms.
@@ -227,7 +227,7 @@ class BatchSimulator:
 def _plant(scene: Scene) -> PlantSetup:
     plant: PlantSetup = resolve(scene).services["plant"].parameters
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
-        raise SceneError("vehicle.model", f"got {plant.model!r}", '"reduced", the only one that batches step')
+        raise SceneError("vehicle.model", f"got {plant.model!r}", '"rigid_body", the only one that batches step')
     if plant.others:
         raise SceneError(
             "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"

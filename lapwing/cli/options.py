@@ -18,7 +18,9 @@ Overrides = Annotated[
 KeyPrefix = Annotated[str, typer.Option(metavar="NAME", help="prefix of the run's Zenoh keys")]
 Speed = Annotated[
     str | None,
-    typer.Option(metavar="1|N|max", help="simulated seconds per second (overrides run.speed); max: unlimited"),
+    typer.Option(
+        metavar="1|N|max", help="simulated seconds per second (overrides run.real_time_factor); max: unlimited"
+    ),
 ]
 Keys = Annotated[
     Path | None,

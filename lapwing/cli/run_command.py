@@ -79,7 +79,7 @@ def _load(options: RunOptions) -> "Scene":
     if options.plan:
         overrides += plan_options.overrides(options.plan, options.scene, overrides)
     elif options.mavlink:
-        overrides += ["autopilot.operator=true"]
+        overrides += ["autopilot.accept_commands=true"]
     if options.run_ is None or options.campaign is None:
         return with_solver_selected(options.scene, overrides)
     from lapwing.services.scene_resolver import load
@@ -113,7 +113,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     speed, table, realtime = options.speed, options.table, options.realtime
     if speed is None:
         paced = options.mavlink or options.view or realtime or options.ros2 is not None
-        speed = str(scene[Run].speed) if scene[Run].speed else "1" if paced else None
+        speed = str(scene[Run].real_time_factor) if scene[Run].real_time_factor else "1" if paced else None
     if table is not None:
         check_complete(table, [*needed(setup, external_services(table)), MONITOR])
     log = options.log or reserve_log(scene.name)

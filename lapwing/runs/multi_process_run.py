@@ -104,7 +104,7 @@ class Clock:
 
 def shared_core(setup: RunConfig) -> int | None:
     """The core for all services of a sequential lock step, in which only one works at a time; None: leave it free."""
-    if setup.coupling != "sequential" or not hasattr(os, "sched_getaffinity"):
+    if setup.coupling != "gauss_seidel" or not hasattr(os, "sched_getaffinity"):
         return None
     cores = sorted(os.sched_getaffinity(0))
     return cores[os.getpid() % len(cores)]

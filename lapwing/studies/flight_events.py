@@ -83,7 +83,7 @@ def planned_faults(scene: dict[str, Any]) -> list[tuple[float, str]]:
         left = damage.get("remaining_thrust", 0.0)
         found.append((damage.get("time", 0.0), f"rotor {damage.get('rotor')} keeps {100.0 * left:g} % of its thrust"))
     for event in scene.get("multibody", {}).get("event", ()):
-        found.append((event["time"], f"propeller {event['propeller']} becomes {event['becomes'].replace('_', ' ')}"))
+        found.append((event["time"], f"propeller {event['propeller']} becomes {event['failure'].replace('_', ' ')}"))
     for sensor, table in scene.get("sensors", {}).items():
         for fault in table.get("faults", ()) if isinstance(table, dict) else ():
             start, stop = fault.get("start", 0.0), fault.get("stop", math.inf)

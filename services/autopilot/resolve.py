@@ -31,13 +31,13 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         return None
     config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
-    truth, own = config.estimator == "truth", config.estimator not in ESTIMATORS
+    truth, own = config.estimator == "ground_truth", config.estimator not in ESTIMATORS
     carried = sorted(scene.tables("sensors"))
     sensors = [name for name in FUSED if name in carried and not truth and not own]
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if truth else [InputPort(name) for name in (carried if own else sensors)]
-    if ports.AIRSPEED in carried and config.operator and not own:
+    if ports.AIRSPEED in carried and config.accept_commands and not own:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
@@ -48,15 +48,15 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         imu_every,
         _lateness(scene, imu_every) if ports.GPS in sensors else 0,
         scene[GainSet].plain(),
-        config.attitude == "so3",
+        config.attitude_error == "so3",
         known_airframe(scene),
         tuple(autopilot_parameters.table(scene).values()),
         _phases(scene) if follows else (),
-        config.operator,
+        config.accept_commands,
         (),
         ticks(scene, min(rates.estimate, exchange.rate), "rates.estimate"),
         ticks(scene, min(rates.status, exchange.rate), "rates.status"),
-        ticks(scene, min(rates.operator, exchange.rate), "rates.operator"),
+        ticks(scene, min(rates.commands, exchange.rate), "rates.commands"),
         _custom(scene, "controller", controller_rate) if config.controller else None,
         _custom(scene, "estimator", estimator_rate) if own else None,
         vehicle_model(known_airframe(scene), exchange.interval) if config.controller or own else None,

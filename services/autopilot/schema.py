@@ -18,7 +18,7 @@ from lapwing.services.common import user_code, user_modules
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.parameter_file import parse
 
-ESTIMATORS = ("sensors", "truth")
+ESTIMATORS = ("kalman", "ground_truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors that the filter needs to start
 WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unreliable
 
@@ -31,13 +31,13 @@ class Autopilot(SceneTable):
     TABLE: ClassVar[str] = "autopilot"
     OPTIONAL: ClassVar[bool] = True
     gains: str = "tuned"  # shipped, in gains/ next to the scene, or the path of a .toml file
-    estimator: str = "sensors"  # the Kalman filter; "truth": the true state; or "module:Name" of a user's class
+    estimator: str = "kalman"  # the Kalman filter; "ground_truth": the true state; or "module:Name" of a user's class
     estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
-    attitude: Literal["angles", "so3"] = "angles"  # attitude error by Euler angles, as in the paper, or geometric
+    attitude_error: Literal["euler", "so3"] = "euler"  # by Euler angles, as in the paper, or on SO(3)
     controller: str | None = None  # "module:Name" of a user's controller, instead of the cascaded PID
     controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
-    operator: bool = False  # accept commands of an operator
-    trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
+    accept_commands: bool = False  # accept commands of an operator
+    follow_trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
     parameters: dict[str, float] = Field(default_factory=dict)  # by name, or the path of a file of them
 
     @classmethod
@@ -62,9 +62,9 @@ class Autopilot(SceneTable):
     def check(self, scene: Scene) -> None:
         """Raise ConfigError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
         parameters.table(scene)
-        if not self.trajectory and not self.operator:
-            message = "false leaves no source of setpoints; set operator = true too"
-            raise ConfigError("autopilot.trajectory", message)
+        if not self.follow_trajectory and not self.accept_commands:
+            message = "false leaves no source of setpoints; set accept_commands = true too"
+            raise ConfigError("autopilot.follow_trajectory", message)
         told = known_airframe(scene)
         try:
             build(scene[GainSet].plain(), told)
@@ -76,10 +76,12 @@ class Autopilot(SceneTable):
         for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 raise ConfigError(f"autopilot.{key}_options", "is not used", f'autopilot.{key} = "module:Name" too')
-        if self.estimator == "sensors":
+        if self.estimator == "kalman":
             missing = [f"[sensors.{name}]" for name in NEEDED if name not in scene.tables("sensors")]
             if missing:
-                raise ConfigError("autopilot.estimator", f'"sensors" needs {", ".join(missing)}, or say "truth"')
+                raise ConfigError(
+                    "autopilot.estimator", f'"kalman" needs {", ".join(missing)}; add them or use "ground_truth"'
+                )
             horizontal = math.hypot(*environment(scene).magnetic_field_world[:2])
             if horizontal < WEAKEST_FIELD:
                 message = f"got {horizontal:.1g} T horizontally, too little for the estimator's heading"

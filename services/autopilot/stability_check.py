@@ -10,7 +10,7 @@ from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication
 
-MODELS = ("reduced", "multibody", "slung_load")  # plant models to which the margins apply
+MODELS = ("rigid_body", "multibody", "slung_load")  # plant models to which the margins apply
 
 
 def unstable_loops(scene: Scene) -> list[str]:

@@ -12,10 +12,10 @@ from lapwing.messages.topics import Topic
 class Communication(SceneTable):
     """Communication step between services and coupling of the control loop."""
 
-    TABLE: ClassVar[str] = "exchange"
+    TABLE: ClassVar[str] = "communication"
     SHARED: ClassVar[bool] = True
     rate: int = Field(default=250, gt=0, le=10_000)  # [Hz] one tick is 1/rate
-    coupling: Literal["sequential", "parallel"] = "sequential"  # Gauss-Seidel, or Jacobi: services run concurrently
+    coupling: Literal["gauss_seidel", "jacobi"] = "gauss_seidel"  # jacobi: services overlap, 1 tick more delay
 
     @property
     def interval_ns(self) -> int:
@@ -30,17 +30,17 @@ class Communication(SceneTable):
     @property
     def loop_delay(self) -> int:
         """Delay of the plant's command input [ticks]; one more with Jacobi coupling."""
-        return 1 if self.coupling == "sequential" else 2
+        return 1 if self.coupling == "gauss_seidel" else 2
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless a tick is a whole number of nanoseconds."""
         if 1_000_000_000 % self.rate:
             expected = "a rate with a whole number of ns per tick (100, 125, 200, 250, 400, 500, 1000, ...)"
-            raise ConfigError("exchange.rate", f"got {self.rate} Hz", expected)
+            raise ConfigError("communication.rate", f"got {self.rate} Hz", expected)
 
 
 class Rates(SceneTable):
-    """Publication rates of derived messages [Hz], at most one message a tick; each divides exchange.rate."""
+    """Publication rates of derived messages [Hz], at most one message a tick; each divides communication.rate."""
 
     TABLE: ClassVar[str] = "rates"
     SHARED: ClassVar[bool] = True
@@ -48,9 +48,9 @@ class Rates(SceneTable):
     estimate: int = Field(default=50, gt=0)  # [Hz] state estimate of the autopilot
     status: int = Field(default=10, gt=0)  # [Hz] phase, armed, landed, failures
     battery: int = Field(default=10, gt=0)  # [Hz] charge, voltage, current
-    bodies: int = Field(default=50, gt=0)  # [Hz] states of the bodies of a multibody vehicle
-    operator: int = Field(default=50, gt=0)  # [Hz] external commands and their acknowledgements
-    contact: int | None = Field(default=None, gt=0)  # [Hz] forces on every foot of a multirotor; unset: not published
+    body_states: int = Field(default=50, gt=0)  # [Hz] states of the bodies of a multibody vehicle
+    commands: int = Field(default=50, gt=0)  # [Hz] external commands and their acknowledgements
+    contact_forces: int | None = Field(default=None, gt=0)  # [Hz] forces on each foot; unset: not published
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless every rate divides the exchange rate."""
@@ -68,7 +68,7 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
     exchange = scene[Communication].rate
     if rate <= 0 or exchange % rate:
         divisors = ", ".join(str(exchange // n) for n in range(1, 51) if exchange % n == 0)
-        raise ConfigError(key, f"got {rate:g}", f"a rate that divides exchange.rate = {exchange} Hz ({divisors})")
+        raise ConfigError(key, f"got {rate:g}", f"a rate that divides communication.rate = {exchange} Hz ({divisors})")
     return int(exchange // rate)
 
 

@@ -14,7 +14,7 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
 from lapwing.messages import MissionItem, OperatorCommand, Vector3
 
-OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]  # scene overrides for flying a plan
+OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false"]  # scene overrides for flying a plan
 READY_TIMEOUT = 60.0  # [s] for the vehicle to become ready for take-off
 SOURCE = "plan"
 HEADER = "QGC WPL 110"

@@ -24,8 +24,8 @@ class Run(SceneTable):
     title: str = ""  # one line for `lapwing scenes`
     seed: int = Field(default=1, ge=0, lt=2**63)  # of all random numbers; equal seeds give bit-for-bit equal runs
     duration: float = Field(gt=0.0, le=1e6)  # [s] latest end of the run
-    settle: float = Field(default=1.0, ge=0.0)  # [s] from the end of the mission to the end of the run
-    speed: float | None = Field(default=None, gt=0.0)  # simulated seconds per second; unset: as fast as possible
+    stop_delay: float = Field(default=1.0, ge=0.0)  # [s] from the end of the mission to the end of the run
+    real_time_factor: float | None = Field(default=None, gt=0.0)  # simulated over wall time; unset: unlimited
 
 
 def title(scene: Path) -> str:
@@ -63,4 +63,4 @@ class Published(SceneTable):
 
 def follows_trajectory(scene: Scene) -> bool:
     """Return True if the vehicle follows the scene's `[trajectory]` rather than operator commands."""
-    return scene.has("trajectory") and not (scene.has("autopilot") and not scene.lookup("autopilot.trajectory"))
+    return scene.has("trajectory") and not (scene.has("autopilot") and not scene.lookup("autopilot.follow_trajectory"))

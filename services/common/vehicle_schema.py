@@ -38,9 +38,9 @@ class Vehicle(SceneTable):
     DISTINCT: ClassVar[str] = "name"
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
     airframe: str | None = None  # shipped, in vehicles/ next to the scene, or the path of a .toml file
-    model: str = "reduced"  # a module of services/plant/models
+    model: str = "rigid_body"  # a module of services/plant/models
     mass: float | None = Field(default=None, gt=0.0)  # [kg] with payload, instead of airframe.mass.total
-    start: Pair | None = None  # [m] east and north of home; start of the vehicle and its trajectory; default: home
+    initial_position: Pair | None = None  # [m] east and north of home, also of its trajectory; default: home
 
     @classmethod
     def numbered(cls, i: int) -> dict[str, Any]:
@@ -189,7 +189,7 @@ def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
 
 def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
-    pose = resting_pose(contact.feet if contact else (), terrain, scene[Vehicle].start or (0.0, 0.0))
+    pose = resting_pose(contact.feet if contact else (), terrain, scene[Vehicle].initial_position or (0.0, 0.0))
     if not isinstance(terrain, Level):
         _upright(pose)
         _above_ground(airframe(scene), terrain, pose)

@@ -41,7 +41,7 @@ def describe(scene: Scene) -> VehicleDescription:
         flow_interval=1.0 / scene.lookup("sensors.optical_flow.rate") if "optical_flow" in sensors else 0.0,
         parameters=tuple(table(scene).values()),
         gripper=any(isinstance(effect, PayloadRelease) for effect in active(scene)),
-        accepts_commands=scene.lookup("autopilot.operator"),
+        accepts_commands=scene.lookup("autopilot.accept_commands"),
         tick_ns=scene[Communication].interval_ns,
     )
 

@@ -24,7 +24,7 @@ def resolve(scene: Scene) -> ServiceConfig:
     """The plant of the scene: every scene has one."""
     model = scene[Vehicle].model
     found = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
-    if scene[Rates].contact is not None:
+    if scene[Rates].contact_forces is not None:
         found = _with_contact(scene, found)
     if any(isinstance(e, SharedSlungLoad) for e in fleet_coupling.effects_of(found)):
         if any(port.name == ports.BODIES for port in found.ports):
@@ -44,9 +44,11 @@ def _with_contact(scene: Scene, found: ServiceConfig) -> ServiceConfig:
     )
     if effect is None:
         message = "no effect of the scene tells of forces on feet"
-        raise ConfigError("rates.contact", message, "a multirotor with [effects.ground_contact], or to leave it out")
+        raise ConfigError(
+            "rates.contact_forces", message, "a multirotor with [effects.ground_contact], or to leave it out"
+        )
     plant, zero = found.parameters, (ZERO,) * len(effect.feet)
-    port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact"))
+    port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact_forces"))
     return ServiceConfig(plant._replace(contact=ContactView(plant.core.vehicle)), found.inputs, (*found.ports, port))
 
 

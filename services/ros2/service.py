@@ -63,6 +63,6 @@ def run(process: Participant, given: Any) -> None:
 
 
 def _commands(setup: RunConfig) -> list[Commands]:
-    """Of each vehicle that the scene lets others command: `autopilot.operator`."""
+    """Of each vehicle that the scene lets others command: `autopilot.accept_commands`."""
     steered = [member for member in members(setup) if "autopilot" in member.services]
     return [Commands(member.vehicle) for member in steered if member.services["autopilot"].parameters.operator]

@@ -41,7 +41,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 
 def _leader(trajectory: Trajectory) -> tuple[str, bool]:
     """Return the leader's name and True if displacements are in its heading axes."""
-    return (trajectory.follow, trajectory.frame != "world") if trajectory.follow else ("", False)
+    return (trajectory.leader, trajectory.frame != "world") if trajectory.leader else ("", False)
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
@@ -54,23 +54,23 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
     Raises:
         ConfigError: a leader does not exist or follows another vehicle.
     """
-    return {name: _following(name, shares, keys[name]) if share.parameters.follow else share
+    return {name: _following(name, shares, keys[name]) if share.parameters.leader else share
             for name, share in shares.items()}  # fmt: skip
 
 
 def _following(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
     own = shares[name].parameters
-    others = [other for other, share in shares.items() if other != name and not share.parameters.follow]
-    if own.follow not in others:
+    others = [other for other, share in shares.items() if other != name and not share.parameters.leader]
+    if own.leader not in others:
         expected = f"a vehicle with a trajectory and no leader: {', '.join(others) or 'there is none'}"
-        raise ConfigError(f"{key}trajectory.follow", f"got {own.follow}", expected)
-    leader, core = shares[own.follow].parameters.core, own.core
-    if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(leader.path), strict=True)):
-        message = f"repeats the phases of {own.follow}, which doubles the displacement"
+        raise ConfigError(f"{key}trajectory.leader", f"got {own.leader}", expected)
+    path, core = shares[own.leader].parameters.core, own.core
+    if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(path.path), strict=True)):
+        message = f"repeats the phases of {own.leader}, which doubles the displacement"
         raise ConfigError(f"{key}trajectory.phase", message, "phases relative to the leader")
-    origin = subtract(core.path.origin_world, leader.path.origin_world)
+    origin = subtract(core.path.origin_world, path.path.origin_world)
     relative = core._replace(path=core.path._replace(origin_world=origin))
-    return shares[name]._replace(parameters=own._replace(core=FollowedPath(leader, relative, own.heading)))
+    return shares[name]._replace(parameters=own._replace(core=FollowedPath(path, relative, own.heading)))
 
 
 def _numbers(path: Parameters) -> list[np.ndarray]:

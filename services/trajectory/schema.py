@@ -10,7 +10,7 @@ name = "hover"
 duration = 5.0
 ```
 
-Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground. With `follow` they are
+Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground. With `leader` they are
 displacements relative to the leader's trajectory. Channels without a segment hold. A channel may have a list of
 consecutive segments. A phase lasts `duration`, by default as long as its longest channel; shorter channels hold.
 """
@@ -30,7 +30,7 @@ class Trajectory(Phases, SceneTable):
 
     TABLE: ClassVar[str] = "trajectory"
     OPTIONAL: ClassVar[bool] = True
-    follow: str | None = None  # name of the vehicle relative to whose trajectory the phases are defined
+    leader: str | None = None  # name of the vehicle relative to whose trajectory the phases are defined
     frame: Literal["heading", "world"] | None = None  # axes of the phases: the leader's heading [heading], or world
 
     @classmethod
@@ -50,8 +50,8 @@ class Trajectory(Phases, SceneTable):
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless the segments join, phases are long enough, and a frame has a leader."""
         compiled(scene)
-        if self.frame and not self.follow:
-            raise ConfigError("trajectory.frame", "has no leader", "trajectory.follow, or no frame")
+        if self.frame and not self.leader:
+            raise ConfigError("trajectory.frame", "has no leader", "trajectory.leader, or no frame")
 
 
 def compiled(scene: Scene) -> CompiledTrajectory:

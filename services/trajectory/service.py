@@ -20,7 +20,7 @@ class TrajectorySetup(NamedTuple):
 
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
-    follow: str = ""  # name of the leader; "": none
+    leader: str = ""  # name of the leader; "": none
     heading: bool = False  # displacements are in axes along the leader's heading
 
 

@@ -9,7 +9,7 @@ NAME = "test"
 def setup_of(ports=(), last=10_000):
     """A run of one service that gives these ports."""
     return RunConfig(
-        NAME, "", 1, last, 100, 10_000_000, "sequential", "drone1", {NAME: ServiceConfig(None, (), ports)}, {}, {}
+        NAME, "", 1, last, 100, 10_000_000, "gauss_seidel", "drone1", {NAME: ServiceConfig(None, (), ports)}, {}, {}
     )
 
 

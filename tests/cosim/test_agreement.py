@@ -13,7 +13,7 @@ from tests.cosim.memory_log import MemoryLog, fly
 pytestmark = pytest.mark.long
 
 SENSORS = [
-    "autopilot.estimator=sensors", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
+    "autopilot.estimator=kalman", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
     "sensors.barometer={}", "sensors.sonar={}",
 ]  # fmt: skip
 FAULTS = [
@@ -24,14 +24,14 @@ FAULTS = [
     'sensors.magnetometer.faults=[{kind="delay", start=0.4, samples=3}]',
 ]
 BATTERY = ["effects.battery.initial_charge=0.16", "effects.dc_motor={}"]
-EVENT = 'multibody.event=[{time=0.3, propeller=2, becomes="locked"}, {time=0.31, propeller=4, becomes="torn_off"}]'
+EVENT = 'multibody.event=[{time=0.3, propeller=2, failure="locked"}, {time=0.31, propeller=4, failure="torn_off"}]'
 SCRIPT = {0.04: [command("takeoff", 3.0), command("arm")], 0.6: [command("parameter", 5.0, text="PID_Z_P")]}
 
 CASES = {
     "sensors": ("hover", SENSORS, 1.2, None),
     "sensors, another seed": ("hover", [*SENSORS, "run.seed=7"], 0.5, None),
     "sensors that fail": ("hover", [*SENSORS, *FAULTS], 1.2, None),
-    "parallel coupling": ("hover", [*SENSORS, "exchange.coupling=parallel"], 0.5, None),
+    "parallel coupling": ("hover", [*SENSORS, "communication.coupling=jacobi"], 0.5, None),
     "a battery runs down": ("hover", BATTERY, 1.0, None),
     "five bodies of which two break": ("delivery_mission", ["vehicle.model=multibody", EVENT], 0.5, None),
     "an operator": ("hover", OPERATED, 1.2, SCRIPT),

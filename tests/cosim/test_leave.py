@@ -16,7 +16,7 @@ from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, HEARD_KEY
 
 PREFIX = "test-leave"
-SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "sequential", "drone1", {}, {}, {})
+SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "gauss_seidel", "drone1", {}, {}, {})
 
 
 @contextmanager

@@ -143,7 +143,7 @@ def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
 
 def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_path):
     broken = ", ".join(
-        f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, becomes="{fate}"}}'
+        f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, failure="{fate}"}}'
         for k, fate in enumerate(("locked", "free", "torn_off"))
     )
     bodies = ["vehicle.model=multibody", f"multibody.event=[{broken}]", "success.require=[]"]  # it does crash
@@ -180,8 +180,8 @@ def test_effects_that_have_nothing_to_do_leave_every_recorded_bit(tmp_path):
 
 
 def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
-    parallel = single(tmp_path, "exchange.coupling=parallel")
-    assert processes(tmp_path, "test-parallel", "exchange.coupling=parallel")["digest"] == parallel
+    parallel = single(tmp_path, "communication.coupling=jacobi")
+    assert processes(tmp_path, "test-parallel", "communication.coupling=jacobi")["digest"] == parallel
     assert parallel != single(tmp_path)
 
 

@@ -23,7 +23,7 @@ SMALL_SCENES = (  # of which more are tried in a second than of those that ship
     b"""run = { duration = 2.0 }
 vehicle.airframe = 'hexacopter'
 effects = { gravity = {}, rotor_thrust = {} }
-autopilot = { gains = "tuned", estimator = "truth" }
+autopilot = { gains = "tuned", estimator = "ground_truth" }
 trajectory.phase = [{ name = "up", z = { kind = "ramp", to = 1e1, rate = 1 } }]
 """,
     b"""run.duration = 2
@@ -35,7 +35,7 @@ mean = [3.0, 1.0, 0]
 preset = "mpu6000"
 [autopilot]
 gains = "tuned"
-estimator = "truth"
+estimator = "ground_truth"
 [[trajectory.phase]]
 name = "wait"
 duration = 1.0

@@ -95,7 +95,7 @@ class Faulty(NamedTuple):
         (Faulty(ThrustAndMoments(float("nan"), (0.0,) * 3)), "thrust = (nan,), which is not finite"),
         (Faulty(RuntimeError("no\nway")), "memory:Faulty: RuntimeError: no (test_api.py, line "),
         (Faulty(SystemExit(3)), "memory:Faulty: SystemExit: 3 (test_api.py, line "),
-        (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), 100.0), "expected a rate that divides exchange.rate = 250 Hz"),
+        (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), 100.0), "expected a rate that divides communication.rate = 250 Hz"),
         (Faulty(ThrustAndMoments(1.0, (0.0,) * 3), "fast"), "has rate = 'fast'; expected a number of steps a second"),
         (7, "memory:int has no step; expected the method `step`"),
         ("memory:Gone", "Gone was an object in the memory of the Python session"),

@@ -91,7 +91,10 @@ def test_body_rates_are_followed_and_thrust_holds_the_weight():
     ("wrong", "said"),
     [
         (lambda b: lapwing.BatchSimulator("hover", 0), "n: expected at least 1 member, got 0"),
-        (lambda b: lapwing.BatchSimulator("gyrostat_chaotic", 2), 'expected "reduced", the only one that batches step'),
+        (
+            lambda b: lapwing.BatchSimulator("gyrostat_chaotic", 2),
+            'expected "rigid_body", the only one that batches step',
+        ),
         (
             lambda b: lapwing.BatchSimulator("hover", 2, overrides=LOADED),
             "effects.shared_slung_load: .*what they carry",

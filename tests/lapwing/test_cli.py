@@ -23,8 +23,11 @@ BAD = {
     "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
     "unknown table": ([HOVER, "--set", "runn.seed=1"], "unknown table 'runn'; did you mean run?"),
     "wrong type": ([HOVER, "--set", "run.seed=x"], "--set run.seed: expected a whole number at least 0 and"),
-    "negative rate": ([HOVER, "--set", "exchange.rate=-250"], "exchange.rate: expected a whole number above 0 and"),
-    "rates": ([HOVER, "--set", "rates.pose=33"], "expected a rate that divides exchange.rate"),
+    "negative rate": (
+        [HOVER, "--set", "communication.rate=-250"],
+        "communication.rate: expected a whole number above 0 and",
+    ),
+    "rates": ([HOVER, "--set", "rates.pose=33"], "expected a rate that divides communication.rate"),
     "step": ([HOVER, "--set", "solver.step=0.003"], "expected a step that divides the exchange interval"),
     "integrator": ([HOVER, "--set", "solver.integrator=rk5"], "unknown integrator 'rk5'; did you mean rk"),
     "effect": ([HOVER, "--set", "effects.gravty={}"], "effects.gravty: unknown effect 'gravty'; did you"),

@@ -109,7 +109,7 @@ def test_of_a_fleet_every_vehicle_is_shown_and_its_events_are_its_own():
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_a_browser_draws_it_follows_it_and_keeps_it(tmp_path):
-    run = Run(overrides={"rates.contact": 125})
+    run = Run(overrides={"rates.contact_forces": 125})
     until = "const until = async (holds) => { while (!holds()) await new Promise((done) => setTimeout(done, 20)); };"
     until += 'await until(() => document.readyState === "complete");'
     until += 'const section = document.getElementById("motion"), state = document.getElementById("state");'

@@ -13,8 +13,8 @@ PLAN = "lapwing/scenes/plans/delivery.plan"
 
 def test_one_vehicle_needs_no_name():
     assert plan_options.overrides([PLAN], Path("hover"), []) == [
-        "autopilot.operator=true",
-        "autopilot.trajectory=false",
+        "autopilot.accept_commands=true",
+        "autopilot.follow_trajectory=false",
     ]
     assert list(plan_options.commands([PLAN], load("hover"))) == ["drone1"]
     assert plan_options.overrides([], Path("hover"), []) == []
@@ -25,8 +25,8 @@ def test_one_vehicle_needs_no_name():
 def test_of_several_those_that_are_named_are_operated():
     given = [f"right={PLAN}"]
     assert plan_options.overrides(given, Path("fleet"), []) == [
-        "vehicle.1.autopilot.operator=true",
-        "vehicle.1.autopilot.trajectory=false",
+        "vehicle.1.autopilot.accept_commands=true",
+        "vehicle.1.autopilot.follow_trajectory=false",
     ]
 
 

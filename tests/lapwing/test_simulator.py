@@ -10,7 +10,7 @@ import lapwing
 from lapwing.services.common.ports import Reference
 from lapwing.simulator import Simulator
 
-STILL = {"autopilot.estimator": "truth"}
+STILL = {"autopilot.estimator": "ground_truth"}
 
 
 def test_without_voltage_in_the_air_it_falls_as_galileo_says():

@@ -11,7 +11,7 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 
 
 def setup(ticks, rate=100, **resolved):
-    return RunConfig("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "sequential", "drone1", {}, {}, resolved)
+    return RunConfig("made_up", "", 1, ticks - 1, rate, 10**9 // rate, "gauss_seidel", "drone1", {}, {}, resolved)
 
 
 def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):

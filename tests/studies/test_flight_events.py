@@ -9,7 +9,7 @@ SCENE = {
     "airframe": {"motor": {"max_voltage": 40.0}},
     "effects": {"rotor_damage": {"rotor": 2, "time": 2.5, "remaining_thrust": 0.3}},
     "sensors": {"gps": {"faults": [{"kind": "dropout", "start": 2.0, "stop": 3.0}]}, "imu": {"preset": "ideal"}},
-    "multibody": {"event": [{"time": 9.0, "propeller": 1, "becomes": "torn_off"}]},
+    "multibody": {"event": [{"time": 9.0, "propeller": 1, "failure": "torn_off"}]},
 }
 
 

@@ -32,7 +32,7 @@ AIRFRAME = {
 }
 
 
-def flight(model="reduced", ticks=TICKS, scene=None, **topics):
+def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
     """Up at 1 m/s, rotors at 10 rad/s, wind of 3 m/s along x."""
     t = np.arange(ticks) / RATE
     truth = {

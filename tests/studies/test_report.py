@@ -170,7 +170,7 @@ def values(array):
 
 
 def test_every_plot_is_on_the_page_in_its_order(page):
-    of_multirotors = [m for m in plots.modules() if "reduced" in getattr(m, "MODELS", ("reduced",))]
+    of_multirotors = [m for m in plots.modules() if "rigid_body" in getattr(m, "MODELS", ("rigid_body",))]
     names = [m.__name__.rpartition(".")[2] for m in of_multirotors if not getattr(m, "FLEET", False)]
     assert page.ids == ["motion", *names]
     assert list(page.plots) == ["motion", *names]

@@ -1,4 +1,4 @@
-//! An autopilot of one's own: the service `autopilot` of a scene whose `autopilot.estimator` is "truth".
+//! An autopilot of one's own: the service `autopilot` of a scene whose `autopilot.estimator` is "ground_truth".
 //!
 //!     lapwing protocol rust_mission.toml --json layout.json
 //!     rust_controller layout.json tcp/127.0.0.1:7450 [SPACE] &

@@ -38,7 +38,7 @@ class RunConfig(NamedTuple):
     last_tick: int  # the run ends here at the latest
     rate: int  # [Hz] ticks
     interval_ns: int  # length of a tick
-    coupling: str  # "sequential" or "parallel"
+    coupling: str  # "gauss_seidel" or "jacobi"
     vehicle: str  # name, first part of its topics' names; "" of a fleet, whose topics have it already
     services: dict[str, ServiceConfig]  # those of the lock step, by name
     beside: dict[str, Any]  # what processes outside of the lock step are given, by name

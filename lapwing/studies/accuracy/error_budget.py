@@ -55,7 +55,7 @@ def errors(scene: Scene) -> list[Part]:
     rate, interval = scene[Communication].rate, scene[Communication].interval
 
     def flown(factor: int, coupling: str, solver: list[str]) -> FlightData:
-        settings = [*base, *_exchange(scene, rate * factor), f"exchange.coupling={coupling}", *solver]
+        settings = [*base, *_exchange(scene, rate * factor), f"communication.coupling={coupling}", *solver]
         flight: FlightData = fly(load(scene.path, settings), (TRUTH,))
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")
@@ -74,13 +74,13 @@ def errors(scene: Scene) -> list[Part]:
     for accuracy in ACCURACIES if touches(scene) else ():
         flight = flown(1, coupling, fine(1, accuracy))
         parts.append(_part(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
-    sequential = {factor: flown(factor, "sequential", fine(factor)) for factor in (*FINER, FINEST_RATE)}
+    sequential = {factor: flown(factor, "gauss_seidel", fine(factor)) for factor in (*FINER, FINEST_RATE)}
     for factor in FINER:
         label = f"{rate * factor} Hz"
         parts.append(_part(SOURCES[2], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
     for factor in FINER:
-        label = f"parallel at {rate * factor} Hz"
-        parallel = flown(factor, "parallel", fine(factor))
+        label = f"Jacobi at {rate * factor} Hz"
+        parallel = flown(factor, "jacobi", fine(factor))
         parts.append(_part(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     return parts
 
@@ -104,7 +104,7 @@ def _duration(scene: Scene) -> float:
 
 def _clean(scene: Scene) -> list[str]:
     """Overrides that take the noise out."""
-    found = ["autopilot.estimator=truth"] if scene.has("autopilot") else []
+    found = ["autopilot.estimator=ground_truth"] if scene.has("autopilot") else []
     if "random_wind_force" in scene.tables("effects"):
         found.append("effects.random_wind_force.sigma=0.0")
     return found
@@ -112,8 +112,8 @@ def _clean(scene: Scene) -> list[str]:
 
 def _exchange(scene: Scene, rate: int) -> list[str]:
     """Overrides for another exchange rate; what is due at every tick stays so."""
-    bodies = [f"rates.bodies={rate}"] if scene[Rates].bodies == scene[Communication].rate else []
-    return [f"exchange.rate={rate}", *bodies]
+    bodies = [f"rates.body_states={rate}"] if scene[Rates].body_states == scene[Communication].rate else []
+    return [f"communication.rate={rate}", *bodies]
 
 
 def _part(source: str, setting: float, label: str, flight: FlightData, exact: FlightData) -> Part:

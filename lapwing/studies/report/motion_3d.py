@@ -74,7 +74,7 @@ class Motion(NamedTuple):
 
 def motion(flight: FlightData) -> Motion:
     """Return the moving bodies of a flight, in the shape of its vehicle model, otherwise three axes."""
-    model = flight.origin.scene.get("vehicle", {}).get("model", "reduced")
+    model = flight.origin.scene.get("vehicle", {}).get("model", "rigid_body")
     for module in shapes.modules():
         if model in module.MODELS:
             found = module.draw(flight)

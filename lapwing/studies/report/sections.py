@@ -33,7 +33,7 @@ def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
 
     They are drawn one after the other, as they are asked for: each holds all rows of what it shows.
     """
-    models = {flight.origin.scene.get("vehicle", {}).get("model", "reduced") for flight in flights}
+    models = {flight.origin.scene.get("vehicle", {}).get("model", "rigid_body") for flight in flights}
     wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
     if all(len(flight.fleet) < 2 for flight in flights):
         wanted = [module for module in wanted if not getattr(module, "FLEET", False)]

@@ -1,6 +1,6 @@
 """Colours and sizes of every plot, in a browser and on paper."""
 
-STEERED = ("reduced", "multibody", "slung_load")  # the models of vehicles that an autopilot flies
+STEERED = ("rigid_body", "multibody", "slung_load")  # the models of vehicles that an autopilot flies
 
 WIDTH = 10.0  # [inch] of every figure; the page shows 100 pixels an inch
 DPI = 125

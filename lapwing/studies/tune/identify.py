@@ -93,7 +93,7 @@ def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
     height = flight.setpoint.position[:, 2]
     armed = flight.actuators.armed
     n = min(len(thrust), len(rates), len(height))
-    delay = 1 if flight.metadata.get("coupling", "sequential") == "sequential" else 2
+    delay = 1 if flight.metadata.get("coupling", "gauss_seidel") == "gauss_seidel" else 2
     demands = np.linalg.pinv(np.array(p.shares[0])).T  # what thrusts come to
     demand = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ demands])
     smooth, differ = _filters(tick)

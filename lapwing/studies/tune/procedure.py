@@ -95,7 +95,7 @@ def tune(
         say(f"warning: present gains {config.gains} of the scene: {name}: {why}")
     reached = design(model, airframe, tick, wanted, say)
     gains, polished, at_corners = gain_set(model, reached), None, {}
-    if follows_trajectory(scene) and scene[Vehicle].model == "reduced" and not config.operator:
+    if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not config.accept_commands:
         polished = gain_refinement.polish(scene, model, airframe, tick, reached, progress)
         gains = polished.gains
         setup = corners.with_gains(campaign_setup(scene), gains)

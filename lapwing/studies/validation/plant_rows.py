@@ -58,7 +58,7 @@ class PlantRows:
         steps = int(np.ceil(interval / LONGEST_STEP - 1e-9))
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
-        self._clock = {"exchange.rate": rate, "solver.step": interval / steps}
+        self._clock = {"communication.rate": rate, "solver.step": interval / steps}
         first = self._resolved({})
         self._core = first.core
         self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)

@@ -46,7 +46,7 @@ def bodies_port(scene: Scene, n: int) -> Port:
     """The port of n single bodies."""
     zero = (ZERO,) * n
     return Port(
-        ports.BODIES, BodyMotions(zero, (NO_ROTATION,) * n, zero, zero, zero, zero), rate_ticks(scene, "bodies")
+        ports.BODIES, BodyMotions(zero, (NO_ROTATION,) * n, zero, zero, zero, zero), rate_ticks(scene, "body_states")
     )
 
 
@@ -103,14 +103,14 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     n = (0.0,) * len(frame.rotors.position)
     how, steps, step = method(scene)
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
-    settle = round(scene[Run].settle * exchange.rate)
+    settle = round(scene[Run].stop_delay * exchange.rate)
     p = p._replace(tolerance=scene[Solver].contact_tolerance)
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
     start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay = exchange.loop_delay
     return ServiceConfig(
-        PlantSetup("reduced", core, start, wiring(scene, odometry=True, battery=frame.battery)),
+        PlantSetup("rigid_body", core, start, wiring(scene, odometry=True, battery=frame.battery)),
         (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay)),
         (Port(ports.TRUTH, told), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
     )

@@ -25,9 +25,9 @@ def check(scene: Scene) -> None:
     needs(scene, "cooperative_load", "formation")
     can_have(scene)
     rate = scene[Communication].rate
-    if scene[Rates].bodies != rate:
-        expected = f"exchange.rate = {rate} Hz, at which the control works"
-        raise ConfigError("rates.bodies", f"got {scene[Rates].bodies} Hz", expected)
+    if scene[Rates].body_states != rate:
+        expected = f"communication.rate = {rate} Hz, at which the control works"
+        raise ConfigError("rates.body_states", f"got {scene[Rates].body_states} Hz", expected)
     check_system(scene, *system(scene))
 
 

@@ -1,4 +1,4 @@
-"""A multirotor as five bodies: chassis and propellers on hinges, under the same effects and commands as `reduced`."""
+"""A multirotor as five bodies, chassis and propellers on hinges, with the effects and commands of `rigid_body`."""
 
 import math
 from types import ModuleType
@@ -14,7 +14,7 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, active, airframe
 from lapwing.services.plant.blocks.body_states import FiveBodiesView
-from lapwing.services.plant.models import reduced
+from lapwing.services.plant.models import rigid_body
 from lapwing.services.plant.models._common import bodies_port, multirotor_plant
 from lapwing.services.plant.schema import Solver
 from lapwing.services.plant.service_config import PlantEvent
@@ -30,7 +30,7 @@ class Event(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s]
     propeller: int = Field(ge=1, le=4)  # in the order of the airframe
-    becomes: Literal["locked", "free", "torn_off"]  # locked to the chassis, free of its motor, or gone
+    failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, free of its motor, or gone
 
 
 class Multibody(SceneTable):
@@ -58,7 +58,7 @@ class Multibody(SceneTable):
                 gone = f"propeller {event.propeller} is torn off at {lost[event.propeller]:g} s"
                 message = f"{gone}; nothing can become of it after that"
                 raise ConfigError(f"multibody.event.{i}.propeller", message)
-            if event.becomes == "torn_off":
+            if event.failure == "torn_off":
                 lost[event.propeller] = event.time
 
 
@@ -68,7 +68,7 @@ def _settings(scene: Scene) -> Multibody:
 
 def check(scene: Scene) -> None:
     """As of the reduced model; the airframe tells of single rotors, which turn little in a step."""
-    reduced.check(scene)
+    rigid_body.check(scene)
     try:
         multirotor_multibody.drone_of(airframe(scene))
     except ValueError as error:
@@ -85,7 +85,7 @@ def longest_step(scene: Scene) -> float:
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:
-    """As `reduced.described`."""
+    """As `rigid_body.described`."""
     s = _settings(scene)
     form = FORM[s.coordinates]
     return form, form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
@@ -100,7 +100,7 @@ def resolve(scene: Scene) -> ServiceConfig:
     form, p = described(scene)
     found = multirotor_plant(scene, form, p)
     events = tuple(
-        PlantEvent(_tick(scene, event.time), event.propeller - 1, event.becomes)
+        PlantEvent(_tick(scene, event.time), event.propeller - 1, event.failure)
         for event in sorted(_settings(scene).event, key=lambda event: event.time)
     )
     plant = found.parameters

@@ -1,4 +1,4 @@
-"""A multirotor that carries a load on a cable, under the same effects and commands as `reduced`."""
+"""A multirotor that carries a load on a cable, under the same effects and commands as `rigid_body`."""
 
 from types import ModuleType
 from typing import Any, ClassVar
@@ -22,7 +22,7 @@ from lapwing.services.common.vehicle_schema import (
     wake_slopes,
 )
 from lapwing.services.plant.blocks.slung_load import SlungLoadView
-from lapwing.services.plant.models import reduced
+from lapwing.services.plant.models import rigid_body
 from lapwing.services.plant.models._common import bodies_port, multirotor_plant, needs
 from lapwing.services.plant.schema import Solver
 
@@ -79,11 +79,11 @@ def _sling(scene: Scene) -> Sling:
 def check(scene: Scene) -> None:
     """As of the reduced model; and there is a load."""
     needs(scene, NAME)
-    reduced.check(scene)
+    rigid_body.check(scene)
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:
-    """As `reduced.described`."""
+    """As `rigid_body.described`."""
     return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
 
 

@@ -12,16 +12,16 @@ class Chirp(Segment):
 
     kind: Literal["chirp"] = "chirp"
     amplitude: Finite  # [u]
-    first_frequency: Positive  # [Hz]
-    last_frequency: Positive  # [Hz]
+    start_frequency: Positive  # [Hz]
+    end_frequency: Positive  # [Hz]
     duration: Positive  # [s]
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one swept piece."""
-        sweep = math.pi * (self.last_frequency - self.first_frequency) / self.duration
-        return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.first_frequency, sweep)]
+        sweep = math.pi * (self.end_frequency - self.start_frequency) / self.duration
+        return [Piece(self.duration, (start,), self.amplitude, 2.0 * math.pi * self.start_frequency, sweep)]
 
     def end(self, start: float) -> float:
         """Return the value at the end of the chirp."""
-        cycles = 0.5 * (self.first_frequency + self.last_frequency) * self.duration
+        cycles = 0.5 * (self.start_frequency + self.end_frequency) * self.duration
         return start + self.amplitude * math.sin(2.0 * math.pi * (cycles - round(cycles)))

@@ -31,7 +31,7 @@ duration = 1.0
 [effects.ground_contact]
 [autopilot]
 gains = "tuned"
-estimator = "truth"
+estimator = "ground_truth"
 [[trajectory.phase]]
 name = "climb"
 z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
@@ -152,8 +152,8 @@ def test_topics_of_a_vehicle_of_a_fleet():
 
 WRONG = {
     "vehicle.7.name=x": "--set vehicle.7.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
-    "vehicle.left.start=[0,0]": (
-        "--set vehicle.left.start=[0,0]: which vehicle? expected vehicle.N.start, N from 0 to 2"
+    "vehicle.left.initial_position=[0,0]": (
+        "--set vehicle.left.initial_position=[0,0]: which vehicle? expected vehicle.N.start, N from 0 to 2"
     ),
     "vehicle.left.airframe.mass.total=3": (
         "--set vehicle.left.airframe.mass.total=3: which vehicle? expected vehicle.N.airframe.mass.total, N from 0 to 2"
@@ -178,7 +178,7 @@ def test_a_fault_names_the_vehicle_and_the_key(override):
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
-        ("[vehicle.exchange]\nrate = 100\n", "many.toml:15: vehicle.0.exchange: all vehicles share it"),
+        ("[vehicle.communication]\nrate = 100\n", "many.toml:15: vehicle.0.communication: all vehicles share it"),
         ("[vehicle.effects.gravty]\n", "many.toml:15: vehicle.0.effects.gravty: unknown effect 'gravty'"),
         ("[[vehicle]]\nairframe = 3\n", "many.toml:16: vehicle.1.airframe: expected a text, got 3"),
         ("[[vehicle]]\n" * 50, "vehicle: 51 vehicles; expected 1 to 50"),

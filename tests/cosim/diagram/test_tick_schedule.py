@@ -85,9 +85,9 @@ def test_an_input_that_nobody_gives_is_named_with_who_needs_it():
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-@pytest.mark.parametrize("coupling", ["sequential", "parallel"])
+@pytest.mark.parametrize("coupling", ["gauss_seidel", "jacobi"])
 def test_every_scene_has_an_order(path, coupling):
-    setup = resolve(load(path, [f"exchange.coupling={coupling}"]))
+    setup = resolve(load(path, [f"communication.coupling={coupling}"]))
     assert sorted(setup.order) == sorted(setup.services)
     place = {name: i for i, name in enumerate(setup.order)}
     for name, service in setup.services.items():

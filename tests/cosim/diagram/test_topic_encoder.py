@@ -107,11 +107,13 @@ def check_every_topic(setup, random):
 
 
 def test_forces_on_feet_are_their_values_one_by_one():
-    check_every_topic(resolve(load("hover", ["rates.contact=50"])), np.random.default_rng(5))
+    check_every_topic(resolve(load("hover", ["rates.contact_forces=50"])), np.random.default_rng(5))
 
 
 def test_the_scenes_that_ship_and_one_that_is_asked_for_more_speak_on_every_topic():
-    asked = load("bridge", ["autopilot.operator=true", "rates.contact=50"])  # tells what it got of the airspeed, too
+    asked = load(
+        "bridge", ["autopilot.accept_commands=true", "rates.contact_forces=50"]
+    )  # tells what it got of the airspeed, too
     scenes = [*map(load, SCENES), asked]
     spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
     assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}

@@ -18,7 +18,7 @@ from lapwing.messages.cdr_arrays import Record, stamp_columns
 from lapwing.messages.topics import CLOCK, IMU
 
 TICKS, TICK = 2500, 4_000_000  # the ticks' length in ns
-SETUP = RunConfig("made_up", "", 1, TICKS - 1, 250, TICK, "sequential", "drone1", {}, {}, {})
+SETUP = RunConfig("made_up", "", 1, TICKS - 1, 250, TICK, "gauss_seidel", "drone1", {}, {}, {})
 
 
 def pages(first, stop):

@@ -65,7 +65,7 @@ def test_every_scene_is_valid_and_has_a_title(path):
 
 def test_settings_by_class_and_by_key():
     scene = load(DELIVERY)
-    assert scene[Communication].rate == scene.lookup("exchange.rate") == 250
+    assert scene[Communication].rate == scene.lookup("communication.rate") == 250
     assert scene[Communication].interval_ns == 4_000_000
     assert scene.lookup("sensors.gps.rate") > 0
     assert scene.has("autopilot")
@@ -76,7 +76,7 @@ def test_settings_by_class_and_by_key():
 def test_overrides_change_values_add_tables_and_reach_into_lists():
     overrides = [
         "run.seed=7",
-        "exchange.coupling=parallel",
+        "communication.coupling=jacobi",
         "effects.gyroscopic_torque={}",
         "trajectory.phase.1.duration=2",
     ]
@@ -293,8 +293,8 @@ def test_choices_are_listed():
         ("run=3", "--set run: expected a table [run], got 3"),
         ("effects.gravity=3", "--set effects.gravity: expected a table [effects.gravity], got 3"),
         ("vehicle.name=1x", "--set vehicle.name: expected a text of the form"),
-        ("exchange.rate=300", "--set exchange.rate: expected a rate with a whole number of ns"),
-        ("rates.pose=33", "--set rates.pose: expected a rate that divides exchange.rate = 250 Hz (250, 125, 50"),
+        ("communication.rate=300", "--set communication.rate: expected a rate with a whole number of ns"),
+        ("rates.pose=33", "--set rates.pose: expected a rate that divides communication.rate = 250 Hz (250, 125, 50"),
         ("solver.step=0.003", "--set solver.step: expected a step that divides the exchange interval of 0.004 s"),
         ("published.rmse.q=3", "--set published.rmse.q: expected 'x', 'y'"),
         ("trajectory.phase=[]", "--set trajectory.phase: expected at least 1"),
@@ -309,8 +309,8 @@ def test_choices_are_listed():
         ("gains.tilt_limit=1.5", "--set gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5"),
         ("autopilot.parameters=none.params", "--set autopilot.parameters: lapwing/scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),
-        ("autopilot.estimator=sensors", '--set autopilot.estimator: "sensors" needs [sensors.imu], [sensors.magneto'),
-        ("autopilot.trajectory=false", "--set autopilot.trajectory: false leaves no source of setpoints"),
+        ("autopilot.estimator=kalman", '--set autopilot.estimator: "kalman" needs [sensors.imu], [sensors.magneto'),
+        ("autopilot.follow_trajectory=false", "--set autopilot.follow_trajectory: false leaves no source of setpoints"),
     ],
 )
 def test_a_bad_override_is_named(override, expected):
@@ -389,9 +389,17 @@ def test_a_recorded_scene_that_is_none_is_named():
 
 
 def test_each_table_is_declared_once():
-    assert {"run", "exchange", "vehicle", "solver", "sensors", "autopilot", "trajectory", "airframe", "gains"} <= set(
-        vocabulary().sections
-    )
+    assert {
+        "run",
+        "communication",
+        "vehicle",
+        "solver",
+        "sensors",
+        "autopilot",
+        "trajectory",
+        "airframe",
+        "gains",
+    } <= set(vocabulary().sections)
 
 
 def test_what_is_found_in_a_scene_is_found_once():

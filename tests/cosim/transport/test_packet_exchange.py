@@ -76,7 +76,7 @@ def exchanged(inputs):
     """What the consumer of these inputs notes, and how many bundles came by key."""
     ports = tuple(Port(name, 0.0, period) for name, period in zip(NAMES, PERIODS, strict=True))
     services = {"giver": ServiceConfig(None, (), ports), "taker": ServiceConfig(None, inputs, ())}
-    setup = RunConfig("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    setup = RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     bus = Bus()
 
     def process(name):

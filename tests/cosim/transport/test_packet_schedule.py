@@ -21,7 +21,7 @@ def setup_of(links):
         )
         for name in NAMES
     }
-    return RunConfig("", "", 1, LAST, 250, 4_000_000, "sequential", "drone1", services, {}, {})
+    return RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
 
 
 def newest_needed(setup, producer, consumer, tick):

@@ -8,7 +8,7 @@ from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
 
 SCENE = "hover"
-OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false"]
+OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false"]
 RATE = 250  # [Hz] of this scene
 NAN = float("nan")
 
@@ -57,7 +57,7 @@ UP_BY_SENSORS = {0.04: [command("takeoff", 4.0), command("arm", NAN, 10.0)]}
 
 def fly_by_sensors(seconds, script, *overrides):
     """The recorded flight of the ground station's vehicle, which climbs to 4 m; in wind, by its sensors."""
-    scene = load("groundstation", ["autopilot.trajectory=false", f"run.duration={seconds}", *overrides])
+    scene = load("groundstation", ["autopilot.follow_trajectory=false", f"run.duration={seconds}", *overrides])
     return memory_log.fly(scene, scripted(UP_BY_SENSORS | script))
 
 

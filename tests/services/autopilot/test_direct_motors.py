@@ -10,7 +10,7 @@ from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim import memory_log
 
-EVERY_TICK = f"rates.operator={RATE}"
+EVERY_TICK = f"rates.commands={RATE}"
 START = [command("offboard"), command("arm")]
 
 
@@ -74,7 +74,7 @@ def test_what_is_no_voltage_for_each_motor_is_not_taken(volts):
 
 
 def test_six_motors_take_six():
-    sets = [*OPERATED, "run.duration=1", "autopilot.estimator=truth"]
+    sets = [*OPERATED, "run.duration=1", "autopilot.estimator=ground_truth"]
     script = {0.0: [motors(*range(1, 7)), *START], (0.1, 1.0): [motors(*range(1, 7))]}
     flown = memory_log.fly(load("hexacopter", sets), scripted(script))
     last = flown.column("actuators", lambda m: tuple(m.motor_voltage))[-1]

@@ -86,7 +86,7 @@ def test_a_lost_rotor_is_noticed_before_the_vehicle_has_fallen():
 
 GPS_LOST = 'sensors.gps.faults=[{kind="dropout", start=%g, stop=%g}]'
 SENSORS = [
-    "autopilot.estimator=sensors", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
+    "autopilot.estimator=kalman", "sensors.imu.preset=mpu6000", "sensors.gps.preset=rtk", "sensors.magnetometer={}",
     "sensors.barometer={}", "autopilot.parameters.COM_POS_FS_DELAY=3.0",
 ]  # fmt: skip
 

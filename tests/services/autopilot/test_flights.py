@@ -137,7 +137,7 @@ def test_what_stands_disarmed_cannot_return_or_land_and_says_so():
 
 def test_the_setpoint_is_what_is_followed_also_after_the_trajectory_was_left():
     script = {4.0: [command("goto", 2.0, 0.0, 1.5)]}
-    flown = fly(10, script, "autopilot.operator=true", operated=False)
+    flown = fly(10, script, "autopilot.accept_commands=true", operated=False)
     assert mode(flown, 3.9) == "mission"
     assert at(flown, "setpoint", 3.9, lambda m: m.phase) == "hover"
     assert at(flown, "setpoint", 9.9, lambda m: tuple(m.position)) == pytest.approx((2.0, 0.0, 1.5), abs=0.01)
@@ -244,7 +244,7 @@ def test_gains_change_in_flight_and_act():
 
 def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
-    sets = ["autopilot.estimator=sensors", *[f"sensors.{each}" for each in sensors]]
+    sets = ["autopilot.estimator=kalman", *[f"sensors.{each}" for each in sensors]]
     # with 3, 8, 11 and 16 the receiver was refused for 10 s; a fix of before the touch-down was fused as if after it
     for seed in (1, 2, 3, 8, 11, 16):
         again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}

@@ -55,7 +55,7 @@ def test_a_rangefinder_that_looks_down_stands_in_for_a_sonar():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.position=[0,0,-0.2]"]
     slope = "environment.terrain={slope=[0.1,0.0]}"
-    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=sensors", *sensors, *laser, slope, *EFFECTS, *WIND)
+    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=kalman", *sensors, *laser, slope, *EFFECTS, *WIND)
     x, _, z = place(flown, 17.0)
     assert x == pytest.approx(14.0, abs=0.2)
     assert z - 0.1 * x == pytest.approx(3.0, abs=0.15)
@@ -81,4 +81,4 @@ def test_the_other_sensor_takes_over(unit):
 
 def test_a_reference_that_is_not_carried_is_refused():
     with pytest.raises(ConfigError, match=r"EKF2_HGT_REF.*\[sensors\.sonar\]"):
-        load("hover", [SONAR, "autopilot.estimator=sensors", *[f"sensors.{name}={{}}" for name in NEEDED]])
+        load("hover", [SONAR, "autopilot.estimator=kalman", *[f"sensors.{name}={{}}" for name in NEEDED]])

@@ -87,7 +87,7 @@ FAILING = [unit for unit in UNITS if unit not in OF_SYSTEMS]
 
 def received(kind, seconds=4.0, start=1.0):
     """What sensors and estimator hand over on the ground where every sensor fails in one way from `start` [s] on."""
-    scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.trajectory=false", f"run.duration={seconds}"])
+    scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.follow_trajectory=false", f"run.duration={seconds}"])
     setup = resolve(scene)
     operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(FAILING)]})
     graph = BlockDiagram(
@@ -208,7 +208,13 @@ def test_a_battery_that_is_stuck_does_not_warn():
 
 def test_each_of_six_motors_can_fail():
     script = {0.04: [command("takeoff", 3.0), command("arm")], 6: [inject("motor", OFF, 6)]}
-    overrides = [ENABLED, *OPERATED, "run.duration=7", "autopilot.estimator=truth", "effects.rotor_damage.time=99.0"]
+    overrides = [
+        ENABLED,
+        *OPERATED,
+        "run.duration=7",
+        "autopilot.estimator=ground_truth",
+        "effects.rotor_damage.time=99.0",
+    ]
     flown = memory_log.fly(load("hexacopter", overrides), scripted(script))
     assert at(flown, "status", 6.9, lambda m: m.failed_motor) == 6
     assert set(voltages(flown, 6.1)[:, 5]) == {0.0}

@@ -80,7 +80,7 @@ def test_a_rangefinder_that_looks_down_fails_as_the_distance_sensor(kind):
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3"]
     script = {0.04: UP_TO_3, 8: [inject("distance_sensor", kind)]}
-    flown = fly(13, script, ENABLED, "autopilot.estimator=sensors", *sensors, *laser)
+    flown = fly(13, script, ENABLED, "autopilot.estimator=kalman", *sensors, *laser)
     assert results(flown)[7] == ACCEPTED
     assert rejected(flown, 9.0, "sonar") > 0.5
     assert height(flown, 13.0) == pytest.approx(height(flown, 8.0), abs=0.3)
@@ -102,7 +102,7 @@ def test_a_rangefinder_that_the_autopilot_does_not_read_cannot_fail():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     ahead = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.elevation_deg=0"]
     script = {0.1: [inject("distance_sensor", OFF)]}
-    flown = fly(0.3, script, ENABLED, "autopilot.estimator=sensors", *sensors, *ahead)
+    flown = fly(0.3, script, ENABLED, "autopilot.estimator=kalman", *sensors, *ahead)
     assert results(flown)[7] == DENIED
     assert "inject failure: there is no distance_sensor" in said(flown)
 

@@ -10,7 +10,7 @@ from lapwing.services.scene_resolver import load
 
 DRONE = load_airframe(SHIPPED / "vehicles" / "delivery_drone.toml")
 ELECTRIC = {"effects.dc_motor": {}}
-SENSORS = {"autopilot.estimator": "sensors", "sensors": {"imu": {}, "magnetometer": {}, "gps": {}}}
+SENSORS = {"autopilot.estimator": "kalman", "sensors": {"imu": {}, "magnetometer": {}, "gps": {}}}
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from tests.cosim import memory_log
 pytestmark = pytest.mark.long
 
 MISSION, GROUND = "delivery_mission", "groundstation"
-OPERATOR = "autopilot.operator=true"
+OPERATOR = "autopilot.accept_commands=true"
 SOON = [f"autopilot.parameters.{name}" for name in ("COM_POS_FS_DELAY=0.5", "RTL_RETURN_ALT=3.0", "COM_DL_LOSS_T=1.0")]
 FENCE = [item("fence_circle_in", 0.0, 0.0, radius=1.0)]
 ITEMS = [item("takeoff", z=3.0), item("waypoint", 2.0, 0.0, 3.0), item("return")]
@@ -33,8 +33,8 @@ CASES = {
     "nobody says anything": (MISSION, 4.0, {}, [OPERATOR]),
     "from the ground to the ground": (MISSION, 12.0, {}, [OPERATOR, *SHORT]),
     "commands after the landing": (MISSION, 9.0, {7.5: [command("hold")], 8.2: [command("arm")]}, [OPERATOR, *SHORT]),
-    "answers once a second": (MISSION, 4.0, LINK, [OPERATOR, "rates.operator=1"]),
-    "answers at other ticks than looks": (MISSION, 7.0, LINK, [OPERATOR, "rates.operator=125", *SOON]),
+    "answers once a second": (MISSION, 4.0, LINK, [OPERATOR, "rates.commands=1"]),
+    "answers at other ticks than looks": (MISSION, 7.0, LINK, [OPERATOR, "rates.commands=125", *SOON]),
     "the link is lost": (MISSION, 8.0, LINK, [OPERATOR, *SOON, "autopilot.parameters.NAV_DLL_ACT=2"]),
     "a fence is left": (MISSION, 17.0, {14.0: [command("fence_upload", items=FENCE)]}, [OPERATOR]),
     "goto and back by hand": (MISSION, 8.0, {4.0: [command("goto", 1.0, 0.0, 3.0)], 6.0: [command("return")]},

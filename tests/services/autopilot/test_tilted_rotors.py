@@ -57,9 +57,9 @@ def test_the_spin_up_reaction_is_that_of_the_plant():
 @pytest.mark.parametrize(
     ("model", "axis", "message"),
     [
-        ("reduced", [[0.0, 3.0, 1.0]] * 4, "maximum thrust"),  # 72 degrees to the side: cannot hover
-        ("reduced", [[0.0, 0.0, 0.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
-        ("reduced", [[0.0, 0.0, -1.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
+        ("rigid_body", [[0.0, 3.0, 1.0]] * 4, "maximum thrust"),  # 72 degrees to the side: cannot hover
+        ("rigid_body", [[0.0, 0.0, 0.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
+        ("rigid_body", [[0.0, 0.0, -1.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
         ("multibody", [[0.1, 0.0, 1.0]] * 4, "rotors.axis: the five bodies need rotors that push along body z"),
     ],
 )

@@ -14,7 +14,7 @@ from lapwing.services.common.parameter_file import read, write
 from lapwing.services.scene_resolver import load, resolve
 
 HOVER = Path("lapwing/scenes/hover.toml")
-OPERATED = ["autopilot.operator=true", "autopilot.trajectory=false", "run.duration=1.0"]
+OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false", "run.duration=1.0"]
 
 
 def lapwing(*arguments):

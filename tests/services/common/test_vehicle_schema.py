@@ -63,7 +63,7 @@ def test_vehicle_rests_on_a_slope():
 def test_rate_must_divide_the_communication_rate():
     scene = load("hover")
     assert ticks(scene, 50, "rates.pose") == 5
-    with pytest.raises(ConfigError, match=r"^rates.pose: expected a rate that divides exchange.rate = 250 Hz"):
+    with pytest.raises(ConfigError, match=r"^rates.pose: expected a rate that divides communication.rate = 250 Hz"):
         ticks(scene, 33, "rates.pose")
 
 

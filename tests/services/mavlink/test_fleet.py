@@ -14,7 +14,7 @@ from lapwing.runs.resimulate import resimulate
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links import numbered
 
-SETS = ("autopilot.trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
+SETS = ("autopilot.follow_trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
 
 
 def heard(station, kind, system, seconds=120.0):

@@ -62,7 +62,7 @@ class Station:
 @contextmanager
 def run(tmp_path, name, *options):
     log = tmp_path / f"{name}.mcap"
-    sets = ("autopilot.trajectory=false", f"run.duration={DURATION}")
+    sets = ("autopilot.follow_trajectory=false", f"run.duration={DURATION}")
     command = [sys.executable, "-m", "lapwing", "run", "hover", *(p for s in sets for p in ("--set", s)), *options]
     command += ["--speed", "4", "--log", str(log), "--key-prefix", f"test-secured-{name}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:

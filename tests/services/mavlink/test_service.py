@@ -57,7 +57,7 @@ def test_a_client_flies_the_autopilot_of_a_live_run(tmp_path):
             pass
         return ack.result
 
-    sets = ("autopilot.trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=60")
+    sets = ("autopilot.follow_trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=60")
     more = [part for each in sets for part in ("--set", each)]
     url = f"udpout:127.0.0.1:{port}"
     with run(tmp_path, "test-mavlink", "--mavlink", url, "--speed", "5", *more) as process:
@@ -157,7 +157,7 @@ def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
     assert sent > 100_000
     assert re.search(r"\d+ faster than a link takes", said), said
     quiet = tmp_path / "quiet.mcap"
-    fly_single(resolve(load(HOVER, ["autopilot.operator=true"])), quiet)
+    fly_single(resolve(load(HOVER, ["autopilot.accept_commands=true"])), quiet)
     with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:
         assert flooded.digest() == read.digest()
 

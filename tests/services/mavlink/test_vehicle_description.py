@@ -13,7 +13,7 @@ FOLDER = Path("services/mavlink")
 
 def test_a_scenes_vehicle_is_described_whole():
     d = describe(
-        load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system=7", "exchange.rate=500"])
+        load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system=7", "communication.rate=500"])
     )
     assert (d.name, d.system, d.flavour, len(d.rotors), d.tick_ns) == ("bee", 7, "px4", 4, 2_000_000)
     assert d.sensors == ("barometer", "gps", "imu", "magnetometer", "sonar")

@@ -22,7 +22,7 @@ duration = 7.0
 {load}
 [autopilot]
 gains = "tuned"
-estimator = "truth"
+estimator = "ground_truth"
 [[trajectory.phase]]
 name = "climb"
 x = {{ kind = "minimum_jerk", to = 2.0, duration = 5.0 }}
@@ -38,11 +38,11 @@ TWO = """
 [[vehicle]]
 name = "left"
 airframe = "delivery_drone"
-start = [0.0, 1.0]
+initial_position = [0.0, 1.0]
 [[vehicle]]
 name = "right"
 airframe = "delivery_drone"
-start = [0.0, -1.0]
+initial_position = [0.0, -1.0]
 """
 
 
@@ -117,7 +117,10 @@ def test_a_set_up_survives_text(setup):
     ("override", "message"),
     [
         ("vehicle.1.effects.shared_slung_load.mass=3.0", r"vehicle\.1\.effects\.carried_load\.mass: .*the same load"),
-        ("vehicle.1.start=[0.0, -6.0]", r"effects\.carried_load\.length: .*m away, in the middle of its carriers"),
+        (
+            "vehicle.1.initial_position=[0.0, -6.0]",
+            r"effects\.carried_load\.length: .*m away, in the middle of its carriers",
+        ),
         ("effects.shared_slung_load.stiffness=1e5", r"effects\.carried_load\.stiffness: .*softer cable"),
         ("vehicle.0.vehicle.model=multibody", "tells of bodies of its own"),
     ],

@@ -8,8 +8,13 @@ from lapwing.cosim.scene import SceneError
 from lapwing.services.scene_resolver import load, resolve
 
 G = 9.80665
-ASKED = {"rates.contact": 250}
-STANDING = {"autopilot.operator": True, "autopilot.trajectory": False, "run.duration": 1.0, **ASKED}  # nobody arms it
+ASKED = {"rates.contact_forces": 250}
+STANDING = {
+    "autopilot.accept_commands": True,
+    "autopilot.follow_trajectory": False,
+    "run.duration": 1.0,
+    **ASKED,
+}  # nobody arms it
 
 
 def up_of_body(orientation):
@@ -75,10 +80,12 @@ def test_a_scene_that_does_not_ask_tells_nothing_of_them_and_one_that_does_flies
 
 @pytest.mark.parametrize("scene", ["gyrostat_chaotic", "cooperative_load", "os4_motors"])
 def test_where_nothing_touches_the_ground_they_cannot_be_asked_for(scene):
-    with pytest.raises(SceneError, match=r"rates.contact: no effect of the scene tells of forces on feet; expected a"):
-        resolve(load(scene, {"rates.contact": 50}))
+    with pytest.raises(
+        SceneError, match=r"rates.contact_forces: no effect of the scene tells of forces on feet; expected a"
+    ):
+        resolve(load(scene, {"rates.contact_forces": 50}))
 
 
 def test_their_rate_divides_the_exchange_rate():
-    with pytest.raises(SceneError, match=r"rates.contact: expected a rate that divides exchange.rate"):
-        load("hover", {"rates.contact": 70})
+    with pytest.raises(SceneError, match=r"rates.contact_forces: expected a rate that divides communication.rate"):
+        load("hover", {"rates.contact_forces": 70})

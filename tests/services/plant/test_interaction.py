@@ -21,7 +21,7 @@ duration = 4.0
 [effects.collision]
 [autopilot]
 gains = "tuned"
-estimator = "truth"
+estimator = "ground_truth"
 [[vehicle]]
 name = "above"
 airframe = "delivery_drone"
@@ -34,7 +34,7 @@ y = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
 [[vehicle]]
 name = "below"
 airframe = "delivery_drone"
-start = [0.0, 3.0]
+initial_position = [0.0, 3.0]
 [[vehicle.trajectory.phase]]
 name = "up"
 z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
@@ -73,7 +73,7 @@ def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
 
 def test_who_meets_nobody_flies_as_one_without_the_effects(tmp_path, setup):
     """No wash and no contact: the same bits as if they knew nothing of one another."""
-    far = ["vehicle.1.start=[0.0, 500.0]", "run.duration=1.0"]
+    far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]
     there = fly(resolve(scene(tmp_path, *far)))
     alone = fly(members(resolve(scene(tmp_path, *far)))[1]._replace(services=_unacquainted(setup, tmp_path, far)))
     assert there.payloads("below/truth") == alone.payloads("truth")
@@ -100,6 +100,6 @@ def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
 
 @pytest.mark.parametrize(("start", "away"), [("[0.0, 0.0]", "0"), ("[0.0, 0.9]", "0.9")])
 def test_vehicles_that_touch_at_the_start_are_refused(tmp_path, start, away):
-    said = f"vehicle.1.start: expected at least 1.55 m between them, got a place {away} m from above"
+    said = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a place {away} m from above"
     with pytest.raises(ValueError, match=said):
-        resolve(scene(tmp_path, f"vehicle.1.start={start}"))
+        resolve(scene(tmp_path, f"vehicle.1.initial_position={start}"))

@@ -32,7 +32,7 @@ def ticks(scene, count):
 def test_a_scene_moves_as_the_library_does(path, model):
     scene = load(path)
     count, solver = 20, scene.lookup("solver")
-    steps = round(1.0 / scene.lookup("exchange.rate") / solver.step)
+    steps = round(1.0 / scene.lookup("communication.rate") / solver.step)
     p, start = model.system(scene)
     _, rows = simulate(get(solver.integrator), p, start, solver.step, count * steps, every=steps)
     for row, truth in zip(rows, ticks(scene, count + 1), strict=True):
@@ -143,7 +143,11 @@ WRONG = {
     "a pack that does not fit": (CRATE, "unloading.depth=0.15", "unloading.pack_size: expected a pack that fits"),
     "friction that grows": (CRATE, "unloading.door_friction=[0.1, 0.2]", "expected [static, dynamic] with 0 < dyn"),
     "a step of zero": (OS4, "solver.step=0", "solver.step: expected a number at least 1e-09"),
-    "control slower than the exchange": (LOAD, "rates.bodies=100", "rates.bodies: expected exchange.rate = 400 Hz"),
+    "control slower than the exchange": (
+        LOAD,
+        "rates.body_states=100",
+        "rates.body_states: expected communication.rate = 400 Hz",
+    ),
 }
 
 
@@ -166,7 +170,7 @@ def test_numbers_that_run_away_are_named_with_their_time():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("hover", "does not fit the model reduced: it is for states of attitude and omega_body"),
+        ("hover", "does not fit the model rigid_body: it is for states of attitude and omega_body"),
         ("gyrostat_feedback", "does not fit the model gyrostat: it is for a torque that does not depend on the rate"),
     ],
 )

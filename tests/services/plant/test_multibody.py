@@ -44,7 +44,7 @@ def test_it_rises_as_the_reduced_model_does():
 
 
 def event(time, propeller, becomes):
-    return f'{{time={time}, propeller={propeller}, becomes="{becomes}"}}'
+    return f'{{time={time}, propeller={propeller}, failure="{becomes}"}}'
 
 
 BROKEN = f"multibody.event=[{event(0.1, 1, 'locked')}, {event(0.1, 2, 'free')}, {event(0.15, 3, 'torn_off')}]"
@@ -110,7 +110,7 @@ WRONG = {
     "an unknown fate": (
         [FLOWN],
         f"multibody.event=[{event(1.0, 1, 'bent')}]",
-        "multibody.event.0.becomes: expected 'locked', 'free' or 'torn_off', got 'bent'",
+        "multibody.event.0.failure: expected 'locked', 'free' or 'torn_off', got 'bent'",
     ),
     "what is gone already": (
         [FLOWN],
@@ -120,12 +120,12 @@ WRONG = {
     "the reduced model": (
         [],
         f"multibody.event=[{event(1.0, 1, 'free')}]",
-        'multibody: the model reduced knows no such table; set vehicle.model = "multibody"',
+        'multibody: the model rigid_body knows no such table; set vehicle.model = "multibody"',
     ),
     "a table for nobody": (
         [],
         "multibody.drive=speed",
-        'the model reduced knows no such table; set vehicle.model = "mul',
+        'the model rigid_body knows no such table; set vehicle.model = "mul',
     ),
     "unknown coordinates": ([FLOWN], "multibody.coordinates=so3", "multibody.coordinates: expected"),
     "a long step": (

@@ -7,7 +7,11 @@ import lapwing
 
 pytestmark = pytest.mark.long
 
-STANDING = {"autopilot.operator": True, "autopilot.trajectory": False, "run.duration": 0.2}  # nobody arms it
+STANDING = {
+    "autopilot.accept_commands": True,
+    "autopilot.follow_trajectory": False,
+    "run.duration": 0.2,
+}  # nobody arms it
 UNEVEN = [[0.20, 0.25, -0.30], [-0.20, 0.20, -0.35], [-0.20, -0.25, -0.36], [0.25, -0.25, -0.32]]
 CASES = {
     "level": {},

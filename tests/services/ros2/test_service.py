@@ -165,7 +165,7 @@ def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
 
 
 def test_a_node_drives_the_motors(tmp_path, port, graph):
-    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=12", "--set", "autopilot.estimator=truth")
+    run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=12", "--set", "autopilot.estimator=ground_truth")
     try:
         poses = graph.subscribe("/drone1/pose", PoseStamped)
         arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
@@ -191,7 +191,7 @@ def test_a_node_drives_the_motors(tmp_path, port, graph):
 
 
 def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, graph):
-    more = ["--speed", "1", "--set", "run.duration=8", "--set", "autopilot.operator=true"]
+    more = ["--speed", "1", "--set", "run.duration=8", "--set", "autopilot.accept_commands=true"]
     run = fly(tmp_path, port, *more, scene="fleet")
     try:
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/right/events", Log)
@@ -222,7 +222,14 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
 
 
 def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tmp_path, port, graph):
-    sets = ["--set", "run.duration=8", "--set", "autopilot.operator=true", "--set", "autopilot.estimator=truth"]
+    sets = [
+        "--set",
+        "run.duration=8",
+        "--set",
+        "autopilot.accept_commands=true",
+        "--set",
+        "autopilot.estimator=ground_truth",
+    ]
     names = [*needed(resolve(load("groundstation", sets[1::2]))), ROS2]
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, MONITOR]).items())
     common = ["groundstation", *sets, "--set", "success.require=[]", "--endpoints", table, "--key-prefix", "elsewhere"]

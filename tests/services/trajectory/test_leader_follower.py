@@ -18,11 +18,11 @@ duration = 2.0
 [effects.ground_contact]
 [autopilot]
 gains = "tuned"
-estimator = "truth"
+estimator = "ground_truth"
 [[vehicle]]
 name = "leader"
 airframe = "delivery_drone"
-start = [1.0, 0.5]
+initial_position = [1.0, 0.5]
 [[vehicle.trajectory.phase]]
 name = "climb"
 z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
@@ -36,10 +36,10 @@ z = { kind = "minimum_jerk", to = 0.0, duration = 2.0 }
 [[vehicle]]
 name = "wing"
 airframe = "quad_x"
-start = [-2.0, 1.5]
+initial_position = [-2.0, 1.5]
 autopilot = { gains = "quad_x" }
 [vehicle.trajectory]
-follow = "leader"
+leader = "leader"
 [[vehicle.trajectory.phase]]
 name = "beside"
 duration = 3.0
@@ -109,9 +109,9 @@ def test_follower_setpoint_follows_the_leader(tmp_path):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("vehicle.1.trajectory.follow=lead", "vehicle.1.trajectory.follow: expected .* no leader: leader, got lead"),
-        ("vehicle.0.trajectory.follow=wing", "vehicle.0.trajectory.follow: expected .* there is none"),
-        ("vehicle.1.trajectory.follow=wing", "vehicle.1.trajectory.follow: expected a vehicle with a trajectory"),
+        ("vehicle.1.trajectory.leader=lead", "vehicle.1.trajectory.leader: expected .* no leader: leader, got lead"),
+        ("vehicle.0.trajectory.leader=wing", "vehicle.0.trajectory.leader: expected .* there is none"),
+        ("vehicle.1.trajectory.leader=wing", "vehicle.1.trajectory.leader: expected a vehicle with a trajectory"),
         ("vehicle.0.trajectory.frame=world", "trajectory.frame: has no leader"),
     ],
 )  # fmt: skip
@@ -122,7 +122,7 @@ def test_invalid_leader_is_rejected(tmp_path, override, message):
 
 def test_phases_equal_to_the_leaders_are_rejected(tmp_path):
     text = SCENE.split('[[vehicle.trajectory.phase]]\nname = "beside"')[0]
-    climb = SCENE.split("[[vehicle]]")[1].split("start = [1.0, 0.5]\n")[1]
+    climb = SCENE.split("[[vehicle]]")[1].split("initial_position = [1.0, 0.5]\n")[1]
     text = text.replace("[[vehicle]]", climb.replace("vehicle.", "") + "[[vehicle]]", 1).replace(climb, "", 1)
     with pytest.raises(SceneError, match=r"vehicle.1.trajectory.phase: .*repeats the phases of leader"):
         resolve(parse(tmp_path / "two.toml", text))

@@ -26,7 +26,7 @@ def scene(tmp_path, solver):
     text = (ROOT / "lapwing/scenes/os4_experiment_2.toml").read_text()
     head, _, rest = text.partition("[solver]")
     path = tmp_path / "os4.toml"
-    path.write_text(f"{head}[solver]\n{solver}\n[exchange]{rest.partition('[exchange]')[2]}")
+    path.write_text(f"{head}[solver]\n{solver}\n[communication]{rest.partition('[communication]')[2]}")
     return path
 
 

@@ -18,7 +18,7 @@ from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
-BREAKS = 'multibody.event=[{time=1.0, propeller=2, becomes="locked"}]'
+BREAKS = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ BREAKS = 'multibody.event=[{time=1.0, propeller=2, becomes="locked"}]'
     [
         ("hover", []),
         ("delivery_mission", ["run.duration=20.0"]),
-        ("delivery_mission", ["run.duration=10.0", "exchange.coupling=parallel"]),
+        ("delivery_mission", ["run.duration=10.0", "communication.coupling=jacobi"]),
         ("hover", ["effects.battery.initial_charge=0.071"]),
         ("hover", ["run.duration=2.0", "vehicle.model=multibody", BREAKS]),
     ],

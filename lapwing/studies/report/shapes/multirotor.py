@@ -8,7 +8,7 @@ from lapwing.studies.report.motion_3d import Body, Link, Motion, Rotor, Stroke, 
 from lapwing.studies.report.shapes._outlines import box
 from lapwing.studies.report.style import BOUND, COLOURS, QUIET
 
-MODELS = ("reduced", "multibody", "slung_load")
+MODELS = ("rigid_body", "multibody", "slung_load")
 DENSITY = 400.0  # [kg/m^3] of a payload or load, which fixes the size of its box
 GAP = 0.03  # [m] between the arms and the payload
 HULL = "#C3CAD1"  # of a mesh

@@ -25,10 +25,10 @@ def drawn(seed: int) -> list[str]:
     found = {
         "run.seed": seed,
         "run.duration": 1.0,
-        "exchange.rate": rate,
+        "communication.rate": rate,
         "trajectory.phase.0.duration": 0.2,
         "sensors.imu.rate": rate,
-        "exchange.coupling": str(rng.choice(["sequential", "parallel"])),
+        "communication.coupling": str(rng.choice(["gauss_seidel", "jacobi"])),
         "solver.step": 1.0 / rate / rng.integers(1, 9) / max(1, 250 // rate),
         "airframe.mass.total": mass,
         "airframe.mass.inertia": [float(size * i) for i in (0.27, 0.26, 0.42)],

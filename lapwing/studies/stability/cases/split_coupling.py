@@ -36,7 +36,13 @@ def apart(rate: int, coupling: str) -> np.ndarray:
     solver = f"solver.step={interval / round(interval / STEP)!r}"
     truth = flown(
         "cooperative_load",
-        [f"exchange.rate={rate}", f"rates.bodies={rate}", f"exchange.coupling={coupling}", solver, *slow],
+        [
+            f"communication.rate={rate}",
+            f"rates.body_states={rate}",
+            f"communication.coupling={coupling}",
+            solver,
+            *slow,
+        ],
     ).truth
     found = np.full((LOOKS + 1, 3), np.nan)
     at = truth.position[:: round(DURATION / LOOKS * rate)]
@@ -54,9 +60,9 @@ def run() -> CaseResult:
     """In one and in two."""
     one = float(np.linalg.norm(together(1000) - together(2000), axis=1).max())
     why = "the formation flies at 5 m/s: in an exchange of 2.5 ms it moves by 12 mm"
-    broken, drowned = off(apart(SLOW, "parallel")), "two processes in parallel (Jacobi) at 20 Hz"
+    broken, drowned = off(apart(SLOW, "jacobi")), "two processes in parallel (Jacobi) at 20 Hz"
     what, exchanging = "load's distance [m] from the same in one", "two processes at 400 Hz"
-    near, far = off(apart(400, "sequential")), off(apart(400, "parallel"))
+    near, far = off(apart(400, "gauss_seidel")), off(apart(400, "jacobi"))
     how = "control inside of the plant's equations, 5 ms"
     cost = "a hundredth of what the exchange costs is what the step may"
     figures = [
@@ -67,7 +73,7 @@ def run() -> CaseResult:
     t = np.linspace(0.0, DURATION, LOOKS + 1)
     curves = [
         Curve(f"{coupling}, {rate} Hz", t, np.linalg.norm(apart(rate, coupling) - together(2000), axis=1))
-        for coupling in ("sequential", "parallel")
+        for coupling in ("gauss_seidel", "jacobi")
         for rate in (400, 40, SLOW)
     ]
     return CaseResult(figures, Plot("time [s]", "distance from the run in one process [m]", curves, ALLOWED))
@@ -78,7 +84,7 @@ def sweep() -> Sweep:
     intervals = 1.0 / np.array(RATES)
     curves = [
         Curve(f"two processes, {coupling}", intervals, np.array([off(apart(rate, coupling)) for rate in RATES]))
-        for coupling in ("sequential", "parallel")
+        for coupling in ("gauss_seidel", "jacobi")
     ]
     one = np.array([off(together(round(DURATION * rate))) if rate >= LOOKS / DURATION else np.nan for rate in RATES])
     return Sweep("exchange interval, or step [s]", "distance [m]", 1.0, [*curves, Curve("one process", intervals, one)])

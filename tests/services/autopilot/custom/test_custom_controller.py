@@ -173,7 +173,7 @@ def test_a_command_that_is_not_finite_is_refused(scene):
     ("module", "text", "name", "overrides", "said"),
     [
         ("own", IN_PYTHON, "Altitud", (), "unknown name in own 'Altitud'; did you mean Altitude?"),
-        ("own", IN_PYTHON.replace("125.0", "100.0"), "Altitude", (), "expected a rate that divides exchange.rate"),
+        ("own", IN_PYTHON.replace("125.0", "100.0"), "Altitude", (), "expected a rate that divides communication.rate"),
         ("own", IN_PYTHON.replace("rate = 125.0", ""), "Altitude", (), "Altitude has rate = None"),
         ("own", "x = 1 +", "Altitude", (), "own.py, line 1: invalid syntax"),
         ("own", "import nowhere", "Altitude", (), "own: ModuleNotFoundError: No module named 'nowhere'"),

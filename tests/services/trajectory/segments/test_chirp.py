@@ -8,7 +8,7 @@ from lapwing.services.trajectory.segments import KINDS
 
 
 def test_chirp_frequency_sweeps_linearly():
-    chirp = KINDS["chirp"](amplitude=0.5, first_frequency=0.2, last_frequency=3.0, duration=10.0)
+    chirp = KINDS["chirp"](amplitude=0.5, start_frequency=0.2, end_frequency=3.0, duration=10.0)
     (piece,) = chirp.pieces(1.0)
     t = np.linspace(0.0, 10.0, 2001)
     phase = 2.0 * math.pi * np.cumsum(np.concatenate(([0.0], (0.2 + 0.28 * (t[1:] + t[:-1]) / 2.0) * np.diff(t))))

@@ -14,7 +14,7 @@ def check(scene: Scene) -> None:
     """KeyedError where the airframe's file is missing or unsound, nobody flies it, or the integrator does not fit."""
     airframe(scene)
     needs(scene, "autopilot")
-    if not scene.lookup("autopilot.operator"):
+    if not scene.lookup("autopilot.accept_commands"):
         needs(scene, "trajectory")
     p = multirotor.parameters(airframe(scene))
     check_integrator(scene, p, multirotor.initial_state(p).motion)
