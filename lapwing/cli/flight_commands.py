@@ -11,10 +11,11 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, claim
+from lapwing.cli.output_paths import check_distinct, check_log, claim
 
 Flights = Annotated[
-    list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or .csv and .csv.gz with --mapping")
+    list[Path],
+    typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), ULogs (.ulg), or .csv and .csv.gz with --mapping"),
 ]
 MappingName = Annotated[
     str | None, typer.Option("--mapping", metavar="NAME|FILE", help="columns of CSV files: nanobench, or a .toml file")
@@ -59,6 +60,86 @@ def validate(
         if report:
             report_page.write(report, found)
             typer.echo(f"{report}: errors over the envelope and residual spectra")
+
+
+@app.command()
+def identify(
+    scene: SceneFile,
+    flights: Flights,
+    free: Annotated[str, typer.Option(metavar="KEY,KEY,...", help="parameters to estimate: numbers of the scene")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="the airframe file to write (.toml)")],
+    mapping: MappingName = None,
+    windows: Annotated[int, typer.Option(metavar="N", min=20, help="windows to fit, about")] = 1000,
+    trim_force: TrimForce = FORCE_MEMORY,
+    trim_torque: TrimTorque = TORQUE_MEMORY,
+    seed: Annotated[int, typer.Option(metavar="N", help="seed of the choice of held-out flights")] = 1,
+    set_: Overrides = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write estimates and correlations as JSON")] = None,
+) -> None:
+    """Estimate parameters of a scene's plant from recorded flights.
+
+    An interrupted estimation continues where it was, from FILE.progress beside the airframe file.
+    """
+    from lapwing.studies.identification import console_output, procedure
+    from lapwing.studies.terminal import console
+    from lapwing.studies.validation.start_states import TrimMemory
+
+    with user_errors():
+        _check_flights(flights)
+        if out.suffix != ".toml":
+            raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        keys = [key.strip() for key in free.split(",") if key.strip()]
+        if not keys or len(set(keys)) < len(keys):
+            raise ValueError(f"--free {free}: expected different keys with commas between them")
+        check_distinct({"--out": out, "--json": json})
+        claim(out)
+        claim(json)
+        memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
+        with _bar() as say:
+            found = procedure.identify(scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say)
+        console_output.show(console(), found)
+        procedure.write_airframe(out, scene, found, set_ or [])
+        typer.echo(f"{out}: the airframe; its first lines hold what belongs to the scene")
+        if json:
+            console_output.write_json(json, found)
+
+
+@app.command("import")
+def import_(
+    flight: Annotated[
+        Path, typer.Argument(metavar="FLIGHT", help="a ULog of PX4 (.ulg), or .csv, .csv.gz with --mapping")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="the log to write (.mcap)")],
+    mapping: MappingName = None,
+) -> None:
+    """Convert a recorded flight into a log for info, report, view, export, validate and identify."""
+    from lapwing.studies.flight_import.open_flight import open_flight
+    from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
+    from lapwing.studies.flight_import.write_log import write_log
+
+    with user_errors():
+        _check_flights([flight])
+        check_distinct({"FLIGHT": flight, "--out": out})
+        if out.suffix != ".mcap" or flight.suffix == ".mcap":
+            raise ValueError(f"--out {out}: expected a .mcap file, made from a flight of another format")
+        unknown: tuple[str, ...] = ()
+        if flight.suffix == ".ulg":
+            recording, unknown = read_ulog_flight(flight)
+        else:
+            recording = open_flight(flight, mapping)
+        if not recording.valid.any():
+            raise ValueError(f"{flight}: no valid sample; check the --mapping")
+        check_log(out)
+        write_log(out, recording, flight.name, unknown)
+        typer.echo(
+            f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out"
+        )
+        for cause, count in recording.faults.items():
+            typer.echo(f"marked samples: {cause}: {count}")
+        for note in recording.notes:
+            typer.echo(note)
+        if unknown:
+            typer.echo(f"topics without a counterpart: {', '.join(unknown)}")
 
 
 def _horizons(text: str) -> tuple[int, ...]:

@@ -21,8 +21,8 @@ def time_offset(turning: np.ndarray, omega: np.ndarray, valid: np.ndarray, inter
     n = len(valid)
     if valid.sum() < 4 * reach or n < 4 * reach:
         return 0.0, 0.0
-    a = np.where(valid[:, None], np.nan_to_num(turning), 0.0)
-    b = np.where(valid[:, None], np.nan_to_num(omega), 0.0)
+    a, b = (np.nan_to_num(v) - np.nan_to_num(v)[valid].mean(axis=0) for v in (turning, omega))
+    a, b = np.where(valid[:, None], a, 0.0), np.where(valid[:, None], b, 0.0)
     inner = slice(reach, n - reach)
     norm = np.sqrt((a[inner] ** 2).sum() * (b[inner] ** 2).sum())
     if norm == 0.0:

@@ -22,7 +22,8 @@ STEP = 1e-4  # of a scaled parameter, for derivatives
 RANGE = 50.0  # times the start value, and its fraction, within which a positive parameter is sought
 HORIZONS = (10, 25, 50)  # samples
 LOSS_SCALE = 0.5  # residual, in units of its scale, where the robust loss turns from square to linear
-CLUSTER = 4.0  # [s] of flight that counts as one independent observation for standard errors
+CLUSTER = 1.0  # [s] of flight that counts as one independent observation for standard errors
+NO_INFLUENCE = 1e-12  # of the largest information, below which a parameter changes no prediction
 LARGEST = 1e3  # residual, in units of its scale
 FIELDS = ("position", "velocity", "attitude", "rate")
 
@@ -173,14 +174,17 @@ class OutputError:
         total = np.zeros((count, len(x)))
         np.add.at(total, names, score)
         total -= total.mean(axis=0)
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        size = np.diag(information)
+        dead = size <= NO_INFLUENCE * size.max(initial=0.0)
+        scale = np.sqrt(np.where(dead, 1.0, size))
         normal = information / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(normal)
         inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
-        middle = total.T @ total * count / max(count - 1, 1)
+        middle = total.T @ total * count / max(count - len(x), 1)
         covariance = inverse @ middle @ inverse
-        deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        correlation = covariance / np.maximum(np.outer(deviation, deviation), 1e-300)
+        deviation = np.where(dead, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        correlation = np.where(dead | dead[:, None], np.eye(len(x)), covariance / np.outer(spread, spread))
         vague = deviation > 0.5 * np.maximum(np.abs(x), 1e-2)
         mixed = np.abs(correlation - np.eye(len(x))).max(axis=1, initial=0.0) > 0.98
         return Fit(

@@ -1,0 +1,195 @@
+"""Identification of a scene's plant from flights: estimate, check on held-out flights, write an airframe file."""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.scene import Overrides, Scene
+from lapwing.services.common.vehicle_schema import VehicleAirframe
+from lapwing.services.scene_resolver import load_one
+from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
+from lapwing.studies.identification.output_error import Fit, OutputError
+from lapwing.studies.identification.toml_tables import dump
+from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.prediction_metrics import magnitudes
+from lapwing.studies.validation.procedure import read_flights
+from lapwing.studies.validation.start_states import TrimMemory, start_states
+from lapwing.studies.validation.windows import compare, predict, window_starts
+
+HELD_OUT = 0.2  # share of the flights that estimation does not see
+HORIZON = (50,)  # samples at which held-out flights are compared
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Estimated parameters and what they predict."""
+
+    scene: str
+    fit: Fit
+    used: tuple[str, ...]  # names of the flights
+    held_out: tuple[str, ...]
+    before: np.ndarray  # mean absolute errors on held-out flights after 50 samples, in the order of the metrics
+    after: np.ndarray
+
+
+def identify(
+    scene: Scene | str | Path,
+    paths: Sequence[Path],
+    mapping: str | None,
+    keys: Sequence[str],
+    memory: TrimMemory,
+    overrides: Overrides = (),
+    windows: int = 1000,
+    seed: int = 1,
+    progress: Path | None = None,
+    say: Callable[[str, int, int], None] = lambda text, done, total: None,
+    most: int = 15,
+) -> Identification:
+    """Estimate the free parameters.
+
+    Args:
+        scene: the plant, with the start values.
+        paths: flights of one rate.
+        mapping: of raw files.
+        keys: of the scene (numbers), or of `flight_parameters`.
+        memory: of the trim.
+        overrides: of the scene.
+        windows: about how many to fit.
+        seed: of the choice of held-out flights.
+        progress: file that keeps the values after each step; an interrupted estimation continues from it.
+        say: called with what is done, steps done, and steps at most.
+        most: steps at most.
+
+    Raises:
+        ValueError: a flight or key is invalid, or no flight leaves the ground.
+    """
+    base = load_one(scene, overrides)
+    start = [_start(base, key) for key in keys]
+    recordings = [r for r in read_flights(paths, mapping, say) if len(window_starts(r, HORIZON[-1], 1))]
+    if not recordings:
+        raise ValueError("no flight has a valid window in the air; give flights that leave the ground")
+    chosen = _held_out(len(recordings), seed)
+    used = [r for k, r in enumerate(recordings) if k not in chosen]
+    held = [r for k, r in enumerate(recordings) if k in chosen]
+    plant = PlantRows(base, recordings[0].interval)
+    problem = OutputError(plant, used, keys, start, windows, memory)
+    stamp = _stamp(base, keys, [r.name for r in used], windows, seed, memory)
+    begin = _resumed(progress, stamp)
+
+    def kept(step: int, values: np.ndarray, cost: float) -> None:
+        say(f"loss {cost:.4g}", step, most)
+        if progress:
+            progress.write_text(json.dumps({"stamp": stamp, "values": values.tolist()}), encoding="utf-8")
+
+    fit = problem.solve(begin, most, kept)
+    judged = held or used
+    before = _errors(plant, judged, keys, np.array(start), memory)
+    after = _errors(plant, judged, keys, fit.values, memory)
+    if progress:
+        progress.unlink(missing_ok=True)
+    name = str(getattr(base, "name", scene))
+    return Identification(name, fit, tuple(r.name for r in used), tuple(r.name for r in held), before, after)
+
+
+def write_airframe(path: Path, scene: Scene | str | Path, found: Identification, overrides: Overrides = ()) -> None:
+    """Write the scene's airframe with the estimated values, and those of effects as comments for the scene."""
+    base = load_one(scene, overrides)
+    table = base[VehicleAirframe].model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    table |= {"mass": base[VehicleAirframe].mass.model_dump(mode="json")}
+    values = {k: float(v) for k, v in zip(found.fit.keys, found.fit.values, strict=True)}
+    others = {}
+    for key, value in values.items():
+        first, _, rest = key.partition(".")
+        if first == "airframe":
+            _put(table, rest.split("."), value)
+        else:
+            others[key] = value
+    lines = [
+        f"# Identified by output error from {len(found.used)} flights: {', '.join(found.used)}.",
+        f"# Held out: {', '.join(found.held_out) or 'none'}.",
+    ]
+    for key, value, error in zip(found.fit.keys, found.fit.values, found.fit.standard_errors, strict=True):
+        state = ", not determined by the flights" if key in found.fit.undetermined else ""
+        lines.append(f"# {key} = {value:.6g}, standard error {error:.2g}{state}")
+    if others:
+        lines.append("# For the scene, beside vehicle.airframe:")
+        lines += [f"#   {key} = {value:.9g}" for key, value in others.items()]
+    text = "\n".join(lines) + "\n\n" + dump(table)
+    tomllib.loads(text)
+    path.write_text(text, encoding="utf-8")
+
+
+def _start(scene: Scene, key: str) -> float:
+    """Return the value of a key in the scene.
+
+    Raises:
+        ValueError: no such key, or not a number.
+    """
+    if is_flight_parameter(key):
+        return 0.0
+    table, _, rest = key.partition(".")
+    value: Any = None
+    try:
+        if table == "effects":
+            value = scene.section(table).tables
+            for part in rest.split("."):
+                value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+        else:
+            prefix, _, element = key.rpartition(".")
+            value = scene.lookup(prefix)[int(element)] if element.isdigit() else scene.lookup(key)
+    except (KeyError, IndexError, AttributeError, TypeError, ValueError):
+        value = None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(
+            f"--free {key}: no number of this name in the scene; name a key that the scene or airframe sets"
+        )
+    return float(value)
+
+
+def _held_out(count: int, seed: int) -> set[int]:
+    size = round(HELD_OUT * count) if count > 2 else 0
+    return set(np.random.default_rng(seed).permutation(count)[:size].tolist())
+
+
+def _stamp(scene: Scene, keys: Sequence[str], flights: list[str], windows: int, seed: int, memory: TrimMemory) -> str:
+    parts = [*(f"{k}={_start(scene, k)!r}" for k in keys), *flights, str(windows), str(seed), repr(memory)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def _resumed(progress: Path | None, stamp: str) -> np.ndarray | None:
+    if progress is None or not progress.exists():
+        return None
+    try:
+        content = json.loads(progress.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return np.array(content["values"], float) if content.get("stamp") == stamp else None
+
+
+def _errors(
+    plant: PlantRows, flights: list[Recording], keys: Sequence[str], values: np.ndarray, memory: TrimMemory
+) -> np.ndarray:
+    own = {k: float(v) for k, v in zip(keys, values, strict=True)}
+    plant.set_parameters([{k: v for k, v in own.items() if not is_flight_parameter(k)}])
+    moved = [apply_flight_parameters(f, {k: v for k, v in own.items() if is_flight_parameter(k)}) for f in flights]
+    found = []
+    for flight, state in zip(moved, start_states(plant, moved, memory), strict=True):
+        starts = window_starts(flight, HORIZON[-1], 10)
+        found.append(magnitudes(compare(flight, starts, HORIZON, predict(plant, flight, starts, state, HORIZON)))[:, 0])
+    return np.nanmean(np.concatenate(found), axis=0)
+
+
+def _put(table: Any, keys: list[str], value: float) -> None:
+    for key in keys[:-1]:
+        table = table[int(key)] if isinstance(table, list) else table[key]
+    if isinstance(table, list):
+        table[int(keys[-1])] = value
+    else:
+        table[keys[-1]] = value

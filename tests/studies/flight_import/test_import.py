@@ -1,0 +1,75 @@
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from flight_recordings import INTERVAL, real_flights, simulated, write_csv
+
+from lapwing.studies.flight_import.open_flight import open_flight
+from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
+from lapwing.studies.flight_import.write_log import write_log
+from lapwing.studies.validation.plant_rows import PlantRows
+
+
+@pytest.fixture(scope="module")
+def flight() -> Recording:
+    return simulated(PlantRows("crazyflie_21", INTERVAL), 3.0, [1])[0]
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
+
+
+def test_imported_log_reads_back_as_same_recording(flight, tmp_path):
+    write_log(tmp_path / "flight.mcap", flight, "flight.csv")
+    found = open_flight(tmp_path / "flight.mcap")
+    n = len(found)
+    assert n >= len(flight) - 1
+    assert found.position == pytest.approx(flight.position[:n], abs=1e-9)
+    assert found.attitude == pytest.approx(flight.attitude[:n], abs=1e-9)
+    assert found.omega == pytest.approx(flight.omega[:n], abs=1e-9)
+    assert found.motor_voltage == pytest.approx(flight.motor_voltage[:n], abs=1e-9)
+
+
+def test_command_writes_log_that_other_commands_read(flight, tmp_path):
+    source, out = write_csv(tmp_path / "flight.csv", flight), tmp_path / "flight.mcap"
+    done = run("import", source, "--mapping", "nanobench", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert "vehicle clock" in done.stdout
+    told = run("info", out)
+    assert told.returncode == 0, told.stderr
+    assert "/drone1/truth" in told.stdout
+    assert run("report", out, "--out", tmp_path / "flight.html").returncode == 0
+
+
+def broken(path, text):
+    path.write_bytes(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("flight.ulg", b"no log", "is not a readable ULog file"),
+        ("flight.csv", b"a,b\n1,2\n", "no known column"),
+        ("flight.csv.gz", b"no gzip", "cannot be read"),
+        ("flight.txt", b"1 2 3", "unknown format"),
+    ],
+)
+def test_command_rejects_unreadable_files(tmp_path, name, content, message):
+    path, out = broken(tmp_path / name, content), tmp_path / "out.mcap"
+    done = run("import", path, "--mapping", "nanobench", "--out", out)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not out.exists()
+
+
+def test_ulog_of_real_vehicle_has_consistent_axes(tmp_path):
+    shutil.copy(real_flights("ulog") / "sample.ulg", tmp_path)
+    found, unknown = read_ulog_flight(tmp_path / "sample.ulg")
+    assert "cpuload" in unknown
+    assert "correlation 1.00" in found.notes[-1] or "correlation 0.9" in found.notes[-1]
+    assert np.median(found.specific_force[:, 2]) == pytest.approx(9.8, abs=0.5)

@@ -1,0 +1,103 @@
+import json
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from flight_recordings import INTERVAL, simulated, write_csv
+
+from lapwing.studies.identification.output_error import OutputError
+from lapwing.studies.identification.procedure import identify
+from lapwing.studies.identification.toml_tables import dump
+from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.start_states import NO_TRIM
+
+SCENE = "crazyflie_21"
+TRUE = {
+    "effects.rotor_quadratic.thrust_constant": 1.75e-8,
+    "airframe.motor.time_constant": 0.0557,
+    "effects.h_force.coefficient": 1.89e-6,
+    "airframe.mass.inertia.0": 1.89e-4,
+}
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return PlantRows(SCENE, INTERVAL)
+
+
+def estimate(flight, windows=60):
+    start = [1.05 * value for value in TRUE.values()]
+    fit = OutputError(PlantRows(SCENE, INTERVAL), [flight], list(TRUE), start, windows, NO_TRIM).solve(most=12)
+    return fit, (fit.values - np.array(list(TRUE.values()))) / fit.standard_errors
+
+
+@pytest.mark.long
+def test_true_values_lie_within_standard_errors(plant):
+    deviations = np.array([estimate(flight)[1] for flight in simulated(plant, 8.0, [1, 2])])
+    assert (np.abs(deviations) < 4.0).all()
+    assert np.mean(np.abs(deviations) < 2.0) >= 0.75
+
+
+@pytest.mark.long
+def test_estimate_repeats_for_one_seed(plant):
+    (flight,) = simulated(plant, 4.0, [4])
+    fits = [
+        OutputError(PlantRows(SCENE, INTERVAL), [flight], list(TRUE)[:2], [1.7e-8, 0.06], 20, NO_TRIM).solve(most=3)
+        for _ in range(2)
+    ]
+    assert np.array_equal(fits[0].values, fits[1].values)
+
+
+@pytest.mark.long
+def test_parameter_without_influence_is_reported(plant):
+    (flight,) = simulated(plant, 4.0, [1])
+    keys = ["effects.rotor_quadratic.thrust_constant", "airframe.motor.no_load_current"]
+    problem = OutputError(PlantRows(SCENE, INTERVAL), [flight], keys, [1.75e-8, 0.05], 20, NO_TRIM)
+    assert problem.solve(most=4).undetermined == ("airframe.motor.no_load_current",)
+
+
+def test_grounded_flights_are_rejected(plant, tmp_path):
+    (flight,) = simulated(plant, 2.0, [1])
+    flight.position[:, 2] = 0.05
+    path = write_csv(tmp_path / "flight.csv", flight)
+    with pytest.raises(ValueError, match="leave the ground"):
+        identify(SCENE, [path], "nanobench", list(TRUE), NO_TRIM)
+
+
+def test_toml_of_nested_tables_reads_back():
+    tables = {"mesh": "a.stl", "mass": {"total": 1.5e-3, "inertia": [1e-5, 2.0, 3.0], "deep": {"flag": True}}}
+    assert tomllib.loads(dump(tables)) == tables
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
+
+
+@pytest.mark.long
+def test_command_writes_airframe_with_provenance(plant, tmp_path):
+    paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
+    out, figures = tmp_path / "mine.toml", tmp_path / "mine.json"
+    done = run(
+        "identify", SCENE, *paths, "--mapping", "nanobench", "--free",
+        "airframe.motor.time_constant,effects.h_force.coefficient", "--out", out, "--json", figures,
+        "--windows", "60", "--trim-force", "0", "--trim-torque", "0", "--set", "airframe.motor.time_constant=0.08",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(0.0557, rel=0.1)
+    assert "Identified by output error from 2 flights" in out.read_text()
+    assert len(json.loads(figures.read_text())["held_out"]) == 1
+    assert not out.with_name("mine.toml.progress").exists()
+
+
+@pytest.mark.parametrize(
+    ("free", "message"),
+    [("airframe.motor.colour", "no number of this name"), ("a,a", "expected different keys")],
+)
+def test_command_rejects_unknown_parameters(plant, tmp_path, free, message):
+    path = write_csv(tmp_path / "flight.csv", simulated(plant, 2.0, [1])[0])
+    done = run("identify", SCENE, path, "--mapping", "nanobench", "--free", free, "--out", tmp_path / "out.toml")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "out.toml").exists()
