@@ -89,9 +89,20 @@ def test_run_that_fails_early_ignores_an_older_log(lapwing, monkeypatch):
 @pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
 def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
     """Of a log with every sensor only the topics that page, figures and events are made of."""
-    log = package.fly(package.load(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
+    log = package.fly(package.load_scene(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
     (part,), whole = FlightData.read_all(log, SHOWN), FlightData.read(log)
     assert set(part.topics) < set(whole.topics)
     assert flight_page([part]) == flight_page([whole]) == flight_page([FlightData.read(log, only=SHOWN)])
     assert part.events == whole.events
     assert str(metrics(part)) == str(metrics(whole))  # as texts: some are NaN
+
+
+def test_run_that_ends_in_failsafe_fails(lapwing):
+    fault = 'sensors.gps.faults=[{kind="dropout", start=5.0}]'
+    code, out, err = lapwing("run", "delivery_mission", "--mode", "single-process", "--json", "a.json", *sets(fault))
+    assert code == 4
+    assert "ended in failsafe" in err
+    outcome = json.loads(Path("a.json").read_text())["outcome"]
+    assert outcome["kind"] == "ended in failsafe"
+    assert outcome["failsafe"] in out
+    assert outcome["target_distance"] > 1.0

@@ -12,7 +12,7 @@ from lapwing import rerun
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     """A second of the delivery mission, with all its sensors."""
-    scene = package.load("delivery_mission", {"run.duration": 1.0})
+    scene = package.load_scene("delivery_mission", {"run.duration": 1.0})
     return package.fly(scene).save(tmp_path_factory.mktemp("view") / "mission.mcap")
 
 

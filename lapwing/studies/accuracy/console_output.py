@@ -9,7 +9,7 @@ from rich.table import Table
 
 from lapwing.studies.accuracy.error_budget import Part
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.work_precision import Point, telling
+from lapwing.studies.accuracy.work_precision import Point, pareto_points
 
 LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are shown
 
@@ -36,7 +36,7 @@ def show(console: Console, problem: Problem, points: list[Point], chosen: Point 
     for name in ("error", "time\n[ms]", "evaluations", *drifts):
         table.add_column(name, justify="right", no_wrap=True)
     before = None
-    for point in telling(points, LEVELS):
+    for point in pareto_points(points, LEVELS):
         if point.way != before:
             table.add_row(f"{point.way} ({point.order})")
         table.add_row(

@@ -101,7 +101,7 @@ def cheapest(points: list[Point], target: float) -> Point:
     return min(met, key=lambda p: p.time)
 
 
-def telling(points: list[Point], levels: list[float]) -> list[Point]:
+def pareto_points(points: list[Point], levels: list[float]) -> list[Point]:
     """Return the fastest point of each method at each of these errors."""
     kept: list[Point] = []
     for way in dict.fromkeys(p.way for p in points):

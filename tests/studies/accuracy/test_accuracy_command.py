@@ -8,7 +8,7 @@ import pytest
 from lapwing.studies.accuracy import accuracy_command, console_output
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.targets import find, scene_of
-from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, telling
+from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, pareto_points
 from lapwing.studies.accuracy.work_precision_plot import draw
 from lapwing.studies.terminal import console
 
@@ -61,7 +61,7 @@ def test_the_cheapest_that_meets_a_target_is_named():
     assert cheapest(points(), 1e-6).way == "two"
     with pytest.raises(ValueError, match=r"--target 1e-09: no method meets this error; the smallest .* 5e-07, by two"):
         cheapest(points(), 1e-9)
-    assert [p.setting for p in telling(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
+    assert [p.setting for p in pareto_points(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
 
 
 @pytest.mark.parametrize("goal", [0.0, -1e-3, float("nan"), float("inf")])
