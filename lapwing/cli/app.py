@@ -8,7 +8,7 @@ from typer.core import TyperGroup
 GROUPS = {  # in the order of a workflow
     "Fly": ("scenes", "check", "run", "service"),
     "Look": ("report", "view", "parameters"),
-    "Study": ("performance", "effects", "accuracy", "stability", "tune", "campaign", "compare"),
+    "Study": ("performance", "effects", "accuracy", "stability", "tune", "validate", "campaign", "compare"),
     "Logs": ("info", "verify", "recover", "export", "replay", "resimulate"),
     "Set up": ("new", "precompile", "certificates", "protocol", "schema"),
 }

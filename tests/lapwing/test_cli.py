@@ -39,7 +39,7 @@ BAD = {
     "preset": ([DELIVERY, "--set", "sensors.imu.preset=x"], "unknown preset 'x'; expected one of"),
     "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown figure 'tim'; did you mean time?"),
-    "no expression": ([HOVER, "--set", 'success.require=["exit()"]'], "expected an expression over figures of the"),
+    "no expression": ([HOVER, "--set", 'success.require=["exit()"]'], "expected an expression over metrics of the"),
     "run alone": ([HOVER, "--run", "3"], "--run and --campaign: belong together; expected both"),
     "no campaign": ([HOVER, "--run", "3", "--campaign", "scenes"], "scenes: no campaign there; expected the folder"),
     "no value": ([HOVER, "--set", "run.seed"], "--set run.seed: expected KEY=VALUE"),
