@@ -1,0 +1,142 @@
+"""Every option of every command is used by a test that runs the command as a process."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from lapwing.cli.main import app
+
+SHORT = "--set run.duration=0.2 --set success.require=[]"
+COMMANDS = {  # run here, in this order, in one folder
+    "run": f"run hover {SHORT} --mode single-process --speed max --log a.mcap --report a.pdf --json a.json",
+    "check": "check hover --set run.seed=2",
+    "campaign": "campaign hover --set run.duration=0.2 --runs 4 --seed 2 --vary vehicle.mass=normal(10.4,0.1) --design lhs"
+    " --out c --csv --json c.json --report c.html --workers 1",
+    "campaign's sweep": "campaign hover --set run.duration=0.2 --sweep sweep.csv --out d --ci-half-width 0.9 --workers 1",
+    "campaign's shard": "campaign hover --set run.duration=0.2 --runs 4 --seed 2 --out e --shard 1/1 --workers 1",
+    "run of a campaign": "run hover --run 1 --campaign c --mode single-process --log r.mcap",
+    "compare": "compare c e --json compare.json",
+    "certificates": "certificates keys --days 2",
+    "recover": "recover cut.mcap --out b.mcap",
+    "export": "export a.mcap --csv csv --parquet parquet --mat a.mat --topics /clock,/drone1/pose",
+    "resimulate": "resimulate a.mcap --allow-code",
+    "report": "report a.mcap --out b.png --vehicle drone1",
+    "parameters": "parameters a.mcap --save a.params",
+    "protocol": "protocol hover --set run.seed=2 --json protocol.json",
+    "schema": "schema gains --out schema.json",
+    "performance": "performance hover --json performance.json",
+    "stability": "stability exact_time --json stability.json --report stability.html",
+    "new vehicle": "new vehicle my_quad --set mass=2.0",
+}
+ELSEWHERE = {  # other tests by option; a test's file contains the option
+    "run": {
+        "--plan": "tests/lapwing/test_environment_faults.py::test_broken_plan_is_rejected",
+        "--key-prefix": "tests/lapwing/test_output_lock.py::test_run_rejects_a_log_that_is_being_written",
+        "--foxglove": "tests/services/foxglove/test_foxglove.py",
+        "--ros2": "tests/services/ros2/test_service.py",
+        "--ros2-router": "tests/services/ros2/test_service.py",
+        "--mavlink": "tests/services/mavlink/test_secured_run.py",
+        "--mavlink-key": "tests/services/mavlink/test_secured_run.py",
+        "--listen": "tests/cosim/test_run.py",
+        "--insecure": "tests/cosim/test_run.py",
+        "--endpoints": "tests/lapwing/test_joined.py",
+        "--external": "tests/examples/test_rust_controller.py",
+        "--keys": "tests/cosim/test_join.py",
+        "--view": "tests/lapwing/test_live.py",
+        "--realtime": "tests/cosim/executors/test_deadlines.py",
+    },
+    "service": {
+        "--set": "tests/lapwing/test_joined.py",
+        "--endpoints": "tests/lapwing/test_joined.py",
+        "--insecure": "tests/lapwing/test_joined.py",
+        "--key-prefix": "tests/lapwing/test_joined.py",
+        "--log": "tests/lapwing/test_joined.py",
+        "--foxglove": "tests/lapwing/test_joined.py",
+        "--keys": "tests/cosim/test_join.py",
+        "--listen": "tests/test_compose.py",
+        "--ros2": "tests/services/ros2/test_service.py",
+        "--ros2-router": "tests/services/ros2/test_service.py",
+    },
+    "campaign": {"--cluster": "tests/studies/campaign/test_cluster.py"},
+    "replay": {
+        **dict.fromkeys(("--speed", "--from", "--to", "--loop", "--topics", "--listen"), "tests/cosim/test_replay.py"),
+        **dict.fromkeys(("--key-prefix", "--record"), "tests/cosim/test_replay.py"),
+        "--foxglove": "tests/services/foxglove/test_foxglove.py",
+        "--insecure": "tests/services/foxglove/test_foxglove.py",
+        "--ros2": "tests/services/ros2/test_service.py",
+        "--ros2-router": "tests/services/ros2/test_service.py",
+        "--mavlink-key": "tests/services/mavlink/test_secured_run.py",
+    },
+    "view": {"--rerun": "tests/lapwing/test_view.py"},
+    "validate": dict.fromkeys(("--json", "--report"), "tests/studies/validation/test_prediction.py"),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("options")
+    (path / "sweep.csv").write_text("vehicle.mass\n10.3\n10.4\n")
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", COMMANDS)
+def test_command_runs_with_its_options(folder, name):
+    if name == "recover":
+        (folder / "cut.mcap").write_bytes((folder / "a.mcap").read_bytes()[:-500])
+    command = [sys.executable, "-m", "lapwing", *COMMANDS[name].split()]
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def options(command, path=()):
+    if hasattr(command, "commands"):
+        for name, each in command.commands.items():
+            yield from options(each, (*path, name))
+    for parameter in command.params:
+        if parameter.param_type_name == "option" and parameter.name not in ("help", "version"):
+            yield " ".join(path), parameter.opts[0]
+
+
+def untested():
+    here = {(command, option) for command, option in options(typer.main.get_command(app))}
+    used = {
+        (command, option)
+        for line in COMMANDS.values()
+        for command in {command for command, _ in here}
+        if line.startswith(f"{command} ")
+        for option in re.findall(r" (--[a-z-]+)", line)
+    }
+    return here - used - {(command, option) for command, tests in ELSEWHERE.items() for option in tests}
+
+
+UNTESTED = {  # options that no test uses in a process; remove an entry with the test that does
+    *((command, "--set") for command in ("accuracy", "effects", "tune", "validate")),
+    *((command, option) for command in ("accuracy", "effects") for option in ("--json", "--plot")),
+    *(("accuracy", "--target"), ("effects", "--tolerance"), ("protocol", "--plot"), ("replay", "--mavlink")),
+    *(("service", option) for option in ("--mavlink", "--mavlink-key", "--plan", "--speed")),
+    *(("stability", option) for option in ("--slow", "--sweep")),
+    *(("tune", option) for option in ("--altitude", "--attitude", "--position", "--yaw")),
+    *(("tune", option) for option in ("--from", "--force", "--out", "--report")),
+    *(("validate", option) for option in ("--horizons", "--mapping", "--stride", "--trim-force", "--trim-torque")),
+}
+
+
+def test_every_option_has_a_test_that_runs_it():
+    assert untested() == UNTESTED
+
+
+def test_referenced_tests_exist_and_use_the_option():
+    for tests in ELSEWHERE.values():
+        for option, test in tests.items():
+            path, _, name = test.partition("::")
+            text = Path(path).read_text()
+            assert f"def {name}" in text, test
+            assert option in text, (test, option)
