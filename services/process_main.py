@@ -2,7 +2,6 @@
 or a fork that
 calls `main`, reads that from standard input, as the launcher writes it."""
 
-import importlib
 import json
 import os
 import struct
@@ -108,6 +107,7 @@ def take_part(given: ProcessSpec) -> ExitCode:
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
         process = Participant(given.name, setup, bus, participants, others, *pace)
+        process.create_service = partial(process_table.create, setup)
         if given.with_parent:
             process.end_with_parent(given.peers[given.name])
         elif watched:
@@ -120,8 +120,7 @@ def take_part(given: ProcessSpec) -> ExitCode:
                 service = process_table.create(setup, given.name, operators)
                 run_lockstep(process, service, given.name == process_table.CLOCK_OWNER, process_table.RECORDER)
             else:
-                module = __import__(f"{entry.package}.service", fromlist=["run"])
-                module.run(process, given)
+                entry.service().run(process, given)
         except Stopped:
             if process.abandoned:
                 raise LockStepError(f"{given.name}: {process.abandoned} is gone before the run has ended") from None
@@ -134,11 +133,11 @@ def take_part(given: ProcessSpec) -> ExitCode:
 
 def import_ahead(names: Iterable[str]) -> None:
     """Import what processes of these names will need, which may be before the scene is read."""
+    import lapwing.cosim.executors.lockstep  # noqa: F401 (for a fork to inherit)
     from lapwing.services import process_table
 
-    importlib.import_module("lapwing.cosim.executors.lockstep")
     for name in names:
-        importlib.import_module(f"{process_table.entry(process_table.encoded(name) or name).package}.service")
+        process_table.entry(process_table.encoded(name) or name).service()
 
 
 def _heard(process: Any) -> dict[str, Any]:

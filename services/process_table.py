@@ -1,13 +1,12 @@
-"""The process table: every process of a run, and when it is wanted.
+"""The process table: every process of a run, and when it is required.
 
-A service of the lock step has `resolve(scene)` in `resolve.py`, which gives its `ServiceSetup`, or None where the scene
-does not call for it, and `create(setup)` in `service.py`; any other has `run(process, participation)` in `service.py`,
-and a `resolve(scene)` too where it has to know of the scene.
+A service of the lock step has `resolve(scene)` in `resolve.py`, which returns its `ServiceConfig`, or None if the scene
+does not need it, and `create(config)` in `service.py`. Any other process has `run(participant, spec)` in `service.py`,
+and `resolve(scene)` if it reads the scene (`lapwing.services.scene_resolver`).
 """
 
-import importlib
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
@@ -20,35 +19,95 @@ class ProcessEntry(NamedTuple):
     """A process of a run."""
 
     name: str
-    package: str  # folder of its code
-    lock_step: bool  # steps with the others; wanted where the set-up has it
-    resolves: bool = False  # has a `resolve.py` although it is no part of the lock step
-    needs: tuple[str, ...] = ()  # what it is given besides the set-up
-    optional: bool = False  # wanted only where its option is given, and the run goes on without it
+    service: Callable[[], ModuleType]  # imports its module `service`, so that a process loads only its own
+    lock_step: bool  # steps with the others; required if the run configuration has it
+    resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
+    needs: tuple[str, ...] = ()  # fields of the process specification that it reads besides the run configuration
+    optional: bool = False  # started only if its option is given; the run continues without it
     mode: str = "peer"  # of its Zenoh session
 
 
+def _plant() -> ModuleType:
+    from lapwing.services.plant import service
+
+    return service
+
+
+def _sensors() -> ModuleType:
+    from lapwing.services.sensors import service
+
+    return service
+
+
+def _autopilot() -> ModuleType:
+    from lapwing.services.autopilot import service
+
+    return service
+
+
+def _trajectory() -> ModuleType:
+    from lapwing.services.trajectory import service
+
+    return service
+
+
+def _formation() -> ModuleType:
+    from lapwing.services.formation import service
+
+    return service
+
+
+def _recorder() -> ModuleType:
+    from lapwing.services.recorder import service
+
+    return service
+
+
+def _router() -> ModuleType:
+    from lapwing.services.router import service
+
+    return service
+
+
+def _mavlink() -> ModuleType:
+    from lapwing.services.mavlink import service
+
+    return service
+
+
+def _foxglove() -> ModuleType:
+    from lapwing.services.foxglove import service
+
+    return service
+
+
+def _ros2() -> ModuleType:
+    from lapwing.services.ros2 import service
+
+    return service
+
+
 PROCESSES = (
-    ProcessEntry("plant", "lapwing.services.plant", True),
-    ProcessEntry("sensors", "lapwing.services.sensors", True),
-    ProcessEntry("autopilot", "lapwing.services.autopilot", True),
-    ProcessEntry("trajectory", "lapwing.services.trajectory", True),
-    ProcessEntry("formation", "lapwing.services.formation", True),
-    ProcessEntry("recorder", "lapwing.services.recorder", False, needs=("log",)),
-    ProcessEntry("router", "lapwing.services.router", False, needs=("open",), optional=True, mode="router"),
-    ProcessEntry("mavlink", "lapwing.services.mavlink", False, resolves=True, needs=("mavlink",), optional=True),
-    ProcessEntry("foxglove", "lapwing.services.foxglove", False, needs=("foxglove",), optional=True),
-    ProcessEntry("ros2", "lapwing.services.ros2", False, needs=("ros2",), optional=True),
+    ProcessEntry("plant", _plant, True),
+    ProcessEntry("sensors", _sensors, True),
+    ProcessEntry("autopilot", _autopilot, True),
+    ProcessEntry("trajectory", _trajectory, True),
+    ProcessEntry("formation", _formation, True),
+    ProcessEntry("recorder", _recorder, False, needs=("log",)),
+    ProcessEntry("router", _router, False, needs=("open",), optional=True, mode="router"),
+    ProcessEntry("mavlink", _mavlink, False, resolves=True, needs=("mavlink",), optional=True),
+    ProcessEntry("foxglove", _foxglove, False, needs=("foxglove",), optional=True),
+    ProcessEntry("ros2", _ros2, False, needs=("ros2",), optional=True),
 )
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"
 CLOCK_OWNER = "plant"  # keeps the pace, and says which tick is the last
 
 
 def entry(name: str) -> ProcessEntry:
-    """The entry of a name.
+    """Return the entry of a process.
 
     Raises:
-        ValueError: there is none; names the choices.
+        ValueError: unknown name; the text lists the choices.
     """
     for process in PROCESSES:
         if process.name == name:
@@ -57,13 +116,13 @@ def entry(name: str) -> ProcessEntry:
 
 
 def needed(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
-    """The processes without which a run cannot go on; a service in `external` is a program of somebody else's."""
+    """Return the names of the processes that a run requires, with an encoder for each service in `external`."""
     own = [p.name for p in PROCESSES if (p.name in setup.services if p.lock_step else not p.optional)]
     return own + [f"{name}{ENCODER}" for name in external]
 
 
 def usual() -> list[str]:
-    """The processes that a run may need whatever its options are."""
+    """Return the names of the processes that a run may need without any option."""
     return [p.name for p in PROCESSES if not p.optional]
 
 
@@ -73,7 +132,7 @@ def optional() -> list[str]:
 
 
 def encoded(name: str) -> str:
-    """The service whose messages the process of this name makes, "" for any other process."""
+    """Return the service whose messages an encoder process encodes, "" for any other process."""
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""
 
 
@@ -81,8 +140,8 @@ Operator = Callable[[int], Iterable[Any]]  # gives the commands that have come u
 
 
 def create(setup: RunConfig, name: str, operators: Mapping[str, Operator] = MappingProxyType({})) -> Service:
-    """A service of the lock step of a run; `operators` give the commands of each vehicle, by its name."""
-    module = importlib.import_module(f"{entry(name).package}.service")
+    """Create a service of the lock step; `operators` by vehicle name return the external commands up to a tick."""
+    module = entry(name).service()
 
     def of(member: RunConfig) -> Service:
         own = {"operator": operators[member.vehicle]} if name == "autopilot" and member.vehicle in operators else {}
@@ -95,11 +154,11 @@ def create(setup: RunConfig, name: str, operators: Mapping[str, Operator] = Mapp
 
 
 def create_all(setup: RunConfig, operator: Operator | Mapping[str, Operator] | None = None) -> list[Service]:
-    """All services of the lock step of a run, in their order of execution.
+    """Create all services of the lock step, in their order of execution.
 
     Args:
-        setup: the run.
-        operator: gives commands to the vehicle, or one for each by the vehicle's name.
+        setup: configuration of the run.
+        operator: returns the external commands up to a tick; a mapping by vehicle name for several vehicles.
     """
     if operator is None:
         operator = {}

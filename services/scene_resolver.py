@@ -22,7 +22,26 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.services.plant import models
-from lapwing.services.process_table import PROCESSES, entry
+from lapwing.services.process_table import PROCESSES
+
+
+def _resolvers() -> dict[str, ModuleType]:
+    """Return the module `resolve` of each process that has one; imported only once a scene is resolved."""
+    from lapwing.services.autopilot import resolve as autopilot
+    from lapwing.services.formation import resolve as formation
+    from lapwing.services.mavlink import resolve as mavlink
+    from lapwing.services.plant import resolve as plant
+    from lapwing.services.sensors import resolve as sensors
+    from lapwing.services.trajectory import resolve as trajectory
+
+    return {
+        "autopilot": autopilot,
+        "formation": formation,
+        "mavlink": mavlink,
+        "plant": plant,
+        "sensors": sensors,
+        "trajectory": trajectory,
+    }
 
 
 def _configurations() -> list[ModuleType]:
@@ -87,7 +106,7 @@ def reseed(setup: RunConfig, seed: int) -> RunConfig:
         return multi_vehicle.joined([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
     services_of = dict(setup.services)
     for name, given in services_of.items():
-        module = importlib.import_module(f"{entry(name).package}.resolve")
+        module = _resolvers()[name]
         if hasattr(module, "reseed"):
             services_of[name] = module.reseed(given, seed, setup.vehicle)
     run = {**setup.resolved[Run.TABLE], "seed": seed}
@@ -123,7 +142,7 @@ def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
     """
     keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
     for name in dict.fromkeys(name for member in members for name in member.services):
-        module = importlib.import_module(f"{entry(name).package}.resolve")
+        module = _resolvers()[name]
         if hasattr(module, "fleet"):
             shares = {member.vehicle: member.services[name] for member in members if name in member.services}
             found = module.fleet(shares, keys)
@@ -142,7 +161,7 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
     beside: dict[str, Any] = {}
     for process in PROCESSES:
         if process.lock_step or process.resolves:
-            given = importlib.import_module(f"{process.package}.resolve").resolve(scene)
+            given = _resolvers()[process.name].resolve(scene)
             if given is not None:
                 (found if process.lock_step else beside)[process.name] = given
     if plan := plans.get(scene[Vehicle].name):

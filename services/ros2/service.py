@@ -12,7 +12,6 @@ from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
-from lapwing.services.process_table import create
 from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
 
@@ -26,7 +25,7 @@ def run(process: Participant, given: Any) -> None:
     setup = process.setup
     topics, authors = {}, {}
     for name in setup.services:
-        for topic in create(setup, name).topics:
+        for topic in process.create_service(name).topics:
             topics[process.key(topic)] = topic
             authors[process.key(topic)] = process.participants.author(name)
     given_to = {topic: commands for commands in _commands(setup) for topic in commands.messages}

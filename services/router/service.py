@@ -7,14 +7,13 @@ import time
 from typing import Any
 
 from lapwing.cosim.executors.participant import POLL, Participant, Stopped
-from lapwing.services.process_table import RECORDER
 
 
 def run(process: Participant, given: Any) -> None:
     """Listen until the recorder has the whole run, or until asked to stop."""
     process.join()
     process.confirm()  # it takes no messages, but passes them on
-    process.end_with(RECORDER)
+    process.end_with("recorder")
     while not process.stopping:
         time.sleep(POLL)
     if not process.abandoned:

@@ -28,17 +28,17 @@ print(json.dumps([compiled, looked_up]))
 JOINS = """
 import sys
 from pathlib import Path
-from lapwing.cosim.executors.participant import Process
+from lapwing.cosim.executors.participant import Participant
 from lapwing.kernels import on_compile
 from lapwing.cli.main import app
-joined, join, told = [], Process.join, Path(sys.argv[1])
+joined, join, told = [], Participant.join, Path(sys.argv[1])
 def watched(process, *given):
     join(process, *given)
     joined.append(process.name)
 def compiles(kernel):
     with told.open("a") as stream:
         stream.write(f"{kernel} {' '.join(joined)}\\n")
-Process.join = watched
+Participant.join = watched
 on_compile(compiles)
 app(sys.argv[2:], standalone_mode=False)
 """

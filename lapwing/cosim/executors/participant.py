@@ -12,6 +12,7 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.run_config_message import pack, unpack
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
+from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.run_errors import END_SIGNAL, LockStepError
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
@@ -83,6 +84,7 @@ class Participant:
         self.terminated = False  # by SIGTERM, which does not come from the launcher
         self.orphaned = False  # the launcher is gone
         self.abandoned = ""  # who watched the run, and is gone
+        self.create_service: Callable[[str], Service]  # by name, for its topics
         self._compiling = False
         self._refused = 0
         self._there = set(others) - {name}  # participants that have joined, or must, and have not left

@@ -207,7 +207,7 @@ class ZenohBus:
     def close(self) -> None:
         """Close the session. What was put just before may be lost (`tests/cosim/test_close.py`): whoever publishes what
         must arrive waits until the others have confirmed it, as
-        `lapwing.cosim.executors.participant.Process.leave` does."""
+        `lapwing.cosim.executors.participant.Participant.leave` does."""
         self._closed.set()
         with suppress(zenoh.ZError):  # it has waited for one of these
             self._session.close()
